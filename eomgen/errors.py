@@ -32,10 +32,64 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from .texts import shortened, visible
 
+#: What kinds of faults there are: the ``code`` of every error and problem, which stays as it is when texts change.
+CODES = {
+    "EG-USAGE": "A call or a command line is not of the form it must have.",
+    "EG-UNSUPPORTED": "The model, the method or the target cannot do what is asked.",
+    "EG-NAME-UNKNOWN": "Nothing has the name that is given.",
+    "EG-NAME-TAKEN": "A name is that of something else already, or reserved.",
+    "EG-NAME-FORM": "A text cannot be a name.",
+    "EG-TYPE": "A value is not of the kind that is needed.",
+    "EG-SHAPE": "An array, a list or a table has not as many entries as are needed.",
+    "EG-NUMBER": "A value is not a finite number.",
+    "EG-RANGE": "A value lies outside what is allowed.",
+    "EG-CHOICE": "A word is none of those to choose from.",
+    "EG-MISSING": "Something that is needed is not given.",
+    "EG-CONFLICT": "What is given does not go together.",
+    "EG-REFERENCE": "What is named exists, and is not of the kind that can stand there.",
+    "EG-CIRCLE": "Something contains itself, or is needed for itself.",
+    "EG-TOO-LARGE": "Something is larger, longer or deeper than is allowed.",
+    "EG-ENDLESS": "A run would take too many steps to end.",
+    "EG-FILE": "A file or folder cannot be read or written, or is not of a known kind.",
+    "EG-FILE-DAMAGED": "A file is damaged, or its content is not what its kind must have.",
+    "EG-REFUSED": "Something is not done unless it is allowed, as it could do harm.",
+    "EG-UNIT": "A unit is unknown, or cannot be used there.",
+    "EG-DIMENSION": "The dimensions of quantities do not agree.",
+    "EG-NOTATION": "A text is not the LaTeX of a symbol.",
+    "EG-EXPRESSION": "A text is not an expression, or not one of the form that is needed.",
+    "EG-MODEL": "The description of the model is wrong in another way.",
+    "EG-TOPOLOGY": "The joints do not connect the bodies as they must.",
+    "EG-UNDEFINED": "An angle, a direction or a length is not defined by what it is measured between.",
+    "EG-LOOP-OPEN": "The loops do not close from the guess.",
+    "EG-CONTRADICTION": "Given values contradict each other, or the constraints.",
+    "EG-REDUNDANT": "A constraint or a driver has no effect, or repeats others.",
+    "EG-UNDETERMINED": "What is given does not determine what is asked.",
+    "EG-PARTITION": "The chosen coordinates are not independent.",
+    "EG-INERTIA": "No body can have the inertia that is given.",
+    "EG-NO-INERTIA": "A motion has no inertia behind it.",
+    "EG-SINGULAR": "The mass matrix is singular at a state.",
+    "EG-PROJECTION": "A state could not be brought onto the constraints.",
+    "EG-UNSOLVED": "Rounding leaves a linear system unsolved.",
+    "EG-NOT-FINITE": "A result is not a finite number.",
+    "EG-EVALUATION": "A kernel could not be evaluated for another reason.",
+    "EG-JUMP": "A value jumps where it must be smooth.",
+    "EG-EVENT": "An event, a gap or a switch cannot be used so.",
+    "EG-STALLED": "The integration ended early.",
+    "EG-ZENO": "Events follow each other ever faster.",
+    "EG-NO-DERIVATIVE": "A run has no derivative by its parameters.",
+    "EG-NO-EQUILIBRIUM": "No equilibrium was found from the guess.",
+    "EG-INTERRUPTED": "Ctrl-C came during a run.",
+    "EG-CACHE": "The cache of compiled code cannot be used.",
+    "EG-COMPILER-MISSING": "A compiler, or what it needs, is not there.",
+    "EG-COMPILER-FAILED": "A compiler failed.",
+    "EG-PACKAGE-MISSING": "An optional package is needed.",
+    "EG-UNAVAILABLE": "There is no such attribute.",
+}
 #: Characters of each part of a problem that are shown: names and expressions may be as long as the file.
 SHOWN = 2000
 #: What to do where a value is not finite.
@@ -77,7 +131,23 @@ def _cell(file: str) -> str:
 
 
 class EomgenError(Exception):
-    """Base of every error eomgen raises on purpose; what does not print in a message is shown as its number."""
+    """Base of every error eomgen raises on purpose; what does not print in a message is shown as its number.
+
+    Attributes
+    ----------
+    code : str
+        What kind of fault it is: a stable word such as ``EG-SHAPE``, one of ``eomgen.errors.CODES``.
+    """
+
+    code: str = "EG-MODEL"
+
+    def __init_subclass__(cls, code: str = "", **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.code = code or cls.code
+
+    def __init__(self, *args: object, code: str = "", **more: Any) -> None:
+        super().__init__(*args, **more)
+        self.code = code or self.code
 
     def __str__(self) -> str:
         return visible(super().__str__())
@@ -109,6 +179,7 @@ class Problem(NamedTuple):
     remedy: str = ""  #: what is allowed, or what to do
     file: str = ""  #: model file, or the file of the Python call
     line: int = 0  #: 1-based line in that file, 0 if none
+    code: str = "EG-MODEL"  #: the kind of fault
 
     def __str__(self) -> str:
         place = f"{_cell(self.file) or self.file}:{self.line}: " if self.file else ""
@@ -122,15 +193,15 @@ class ModelError(EomgenError):
     Attributes
     ----------
     problems : tuple of Problem
-        Every fault found, in the order of the description.
+        Every fault found, in the order of the description; the ``code`` is that of the first.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(p) for p in self.problems))
+        super().__init__("\n".join(map(str, self.problems)), code=self.problems[0].code if self.problems else "")
 
 
-class ExpressionError(EomgenError, ValueError):
+class ExpressionError(EomgenError, ValueError, code="EG-EXPRESSION"):
     """A text is not an expression that a model may use.
 
     Attributes
@@ -145,10 +216,10 @@ class ExpressionError(EomgenError, ValueError):
         The whole expression.
     """
 
-    def __init__(self, message: str, column: int = 0, remedy: str = "", text: str = "") -> None:
+    def __init__(self, message: str, column: int = 0, remedy: str = "", text: str = "", code: str = "") -> None:
         self.message, self.column, self.remedy, self.text = message, column, remedy, text
         tail = f"; {remedy}" if remedy else ""
-        super().__init__(f"{self.place()}{tail}")
+        super().__init__(f"{self.place()}{tail}", code=code)
 
     def place(self) -> str:
         """The message with the column and the expression (shortened)."""
@@ -156,7 +227,7 @@ class ExpressionError(EomgenError, ValueError):
         return f"{self.message} in column {self.column} of {shown!r}" if self.column else self.message
 
 
-class AssemblyError(EomgenError):
+class AssemblyError(EomgenError, code="EG-LOOP-OPEN"):
     """The loops do not close from the given guess, or given values contradict each other.
 
     Attributes
@@ -165,12 +236,12 @@ class AssemblyError(EomgenError):
         Labels of the constraint rows that stay open the most, such as ``C.r_x`` of joint C.
     """
 
-    def __init__(self, message: str, rows: Sequence[str] = ()) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, rows: Sequence[str] = (), code: str = "") -> None:
+        super().__init__(message, code=code)
         self.rows = tuple(rows)
 
 
-class UsageError(EomgenError, ValueError):
+class UsageError(EomgenError, ValueError, code="EG-USAGE"):
     """A call names something the model does not have, or passes an array of the wrong shape."""
 
 
@@ -186,43 +257,43 @@ class ParameterError(ModelError, UsageError):
     """
 
 
-class UnavailableError(UsageError, AttributeError):
+class UnavailableError(UsageError, AttributeError, code="EG-UNAVAILABLE"):
     """An attribute that there is not, or that a module of this method or kind does not have, such as ``canonical``.
 
     It is an AttributeError too, so that ``hasattr``, ``inspect`` and the completion of notebooks pass over it.
     """
 
 
-class EvaluationError(EomgenError):
+class EvaluationError(EomgenError, code="EG-EVALUATION"):
     """A kernel failed at a state; a recoverable failure, so integrators see NaN and shorten their step."""
 
-    def __init__(self, message: str, time: float | None = None, state: object = None) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, time: float | None = None, state: object = None, code: str = "") -> None:
+        super().__init__(message, code=code)
         self.time = time
         self.state = state
 
 
-class SingularMassMatrixError(EvaluationError):
+class SingularMassMatrixError(EvaluationError, code="EG-SINGULAR"):
     """The mass matrix of the degrees of freedom is not positive definite."""
 
 
-class ProjectionError(EvaluationError):
+class ProjectionError(EvaluationError, code="EG-PROJECTION"):
     """Newton's iteration onto the constraint manifold did not converge."""
 
 
-class PartitionError(EvaluationError):
+class PartitionError(EvaluationError, code="EG-PARTITION"):
     """The chosen independent coordinates are not independent at this configuration."""
 
 
-class UnsolvedError(EvaluationError):
+class UnsolvedError(EvaluationError, code="EG-UNSOLVED"):
     """Rounding leaves the linear system of a method unsolved: its accelerations would be wrong."""
 
 
-class NonFiniteError(EvaluationError):
+class NonFiniteError(EvaluationError, code="EG-NOT-FINITE"):
     """A result is NaN or infinite."""
 
 
-class EquilibriumError(EomgenError):
+class EquilibriumError(EomgenError, code="EG-NO-EQUILIBRIUM"):
     """No equilibrium was found from the guess.
 
     Attributes
@@ -236,15 +307,15 @@ class EquilibriumError(EomgenError):
         self.forces = dict(forces or {})
 
 
-class SimulationError(EomgenError):
+class SimulationError(EomgenError, code="EG-STALLED"):
     """The integration could not be finished."""
 
 
-class ZenoError(SimulationError):
+class ZenoError(SimulationError, code="EG-ZENO"):
     """Events that reset the state follow each other ever faster, or a reset leads nowhere."""
 
 
-class NoDerivativeError(SimulationError):
+class NoDerivativeError(SimulationError, code="EG-NO-DERIVATIVE"):
     """A run has no derivative by its parameters: an event grazes its surface, or two happen at once."""
 
 
@@ -259,6 +330,8 @@ class SimulationInterrupted(KeyboardInterrupt):
         The run up to there, made when it is asked for.
     """
 
+    code = "EG-INTERRUPTED"
+
     def __init__(self, message: str, complete: Callable[[], Any]) -> None:
         super().__init__(message)
         self._complete = complete
@@ -269,7 +342,7 @@ class SimulationInterrupted(KeyboardInterrupt):
         return self._complete()
 
 
-class ToolchainError(EomgenError):
+class ToolchainError(EomgenError, code="EG-COMPILER-FAILED"):
     """A compiler is missing or failed.
 
     Attributes
@@ -280,15 +353,34 @@ class ToolchainError(EomgenError):
         What the compiler printed.
     """
 
-    def __init__(self, message: str, command: str = "", output: str = "") -> None:
-        super().__init__(message)
+    def __init__(self, message: str, command: str = "", output: str = "", code: str = "") -> None:
+        super().__init__(message, code=code)
         self.command = command
         self.output = output
 
 
-class MissingDependencyError(EomgenError, ImportError):
+class MissingDependencyError(EomgenError, ImportError, code="EG-PACKAGE-MISSING"):
     """An optional package is needed for this call."""
 
+
+# errors of the codes that calls meet most
+cannot = partial(UsageError, code="EG-UNSUPPORTED")
+no_such = partial(UsageError, code="EG-NAME-UNKNOWN")
+ill_typed = partial(UsageError, code="EG-TYPE")
+ill_shaped = partial(UsageError, code="EG-SHAPE")
+ill_placed = partial(UsageError, code="EG-REFERENCE")
+ill_chosen = partial(UsageError, code="EG-PARTITION")
+no_number = partial(UsageError, code="EG-NUMBER")
+not_finite = partial(UsageError, code="EG-NOT-FINITE")
+off_range = partial(UsageError, code="EG-RANGE")
+no_choice = partial(UsageError, code="EG-CHOICE")
+incomplete = partial(UsageError, code="EG-MISSING")
+at_odds = partial(UsageError, code="EG-CONFLICT")
+untrue = partial(UsageError, code="EG-CONTRADICTION")
+too_large = partial(UsageError, code="EG-TOO-LARGE")
+bad_file = partial(UsageError, code="EG-FILE")
+bad_data = partial(UsageError, code="EG-FILE-DAMAGED")
+bad_cache = partial(ToolchainError, code="EG-CACHE")
 
 #: What a kernel's status code means; 0 is success, positive codes are recoverable (the C header has the same table).
 STATUS: dict[int, type[EvaluationError]] = {

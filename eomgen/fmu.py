@@ -17,7 +17,7 @@ from .compilation.build import compile_c_library
 from .compilation.options import Options
 from .emit.fmu import emit_fmu
 from .emit.fmu.versions import KERNELS, check_version, refuse_impacts
-from .errors import UsageError
+from .errors import bad_file
 from .files.path_names import as_path
 from .files.writing import refuse_link, write_whole
 from .numeric.scales import Array
@@ -78,7 +78,7 @@ def write_fmu(
     version = check_version(version)
     where = as_path("path", path if path is not None else f"{equations.name}.fmu")
     if where.suffix != ".fmu":
-        raise UsageError(f"the name of an FMU ends in .fmu, not as in {str(where)!r}")
+        raise bad_file(f"the name of an FMU ends in .fmu, not as in {str(where)!r}")
     write_whole(where, fmu_bytes(equations, version, progress))
     return where
 
@@ -93,7 +93,7 @@ def generate_fmu(equations: Derivation, directory: Path, version: str = "2.0") -
     """
     where = directory / f"{equations.name}.fmu"
     if os.path.lexists(where) and not _is_ours(where):
-        raise UsageError(f"{where} exists and was not written by eomgen; move it, or choose another --out")
+        raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")
     directory.mkdir(parents=True, exist_ok=True)
     return write_fmu(equations, where, version)
 

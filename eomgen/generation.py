@@ -10,7 +10,7 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
-from .errors import EomgenError, UsageError
+from .errors import EomgenError, cannot
 from .files.path_names import as_path
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
@@ -62,7 +62,7 @@ def generate(
     equations = derive(model, method, independent, baumgarte)
     if row.whole:
         if precision != "double":
-            raise UsageError(f"precision is for packages; target {target} makes one file")
+            raise cannot(f"precision is for packages; target {target} makes one file")
         return row.write(equations, folder, fmi)
     program = build(equations, target)
     if row.kernels and not row.module:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from .api.model import Model
 from .describe import describe_yaml_file
-from .errors import ModelError, UsageError
+from .errors import ModelError, at_odds, bad_file, no_choice, no_such
 from .files.path_names import as_name
 from .numeric.rigid_inertia import CHECKS, word_of_check
 from .shipped import example_files, find_example
@@ -75,16 +75,16 @@ def load(
         from .robots.robot import CONVERTED
 
         if suffix in CONVERTED:
-            raise UsageError(f"{path}: files with the ending {suffix} cannot be loaded; {CONVERTED[suffix]}")
+            raise bad_file(f"{path}: files with the ending {suffix} cannot be loaded; {CONVERTED[suffix]}")
         ending = suffix or "(none)"
-        raise UsageError(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
+        raise bad_file(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
     if robot:
-        raise UsageError(f"{path} is a model file; only robot files take the options {', '.join(robot)}")
+        raise at_odds(f"{path} is a model file; only robot files take the options {', '.join(robot)}")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)
         if word is None:
-            raise UsageError(f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {check_inertia!r}")
+            raise no_choice(f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {check_inertia!r}")
         model.check_inertia = word
     return _with_notes(model)
 
@@ -113,9 +113,9 @@ def load_example(name: str, **options: Unpack[LoadOptions]) -> Model:
     if file is None:
         models = [key for key in found if not key.endswith(".py")]
         near = hint(str(name), models, quoted=False) or f"there are: {', '.join(models)}"
-        raise UsageError(f"no example {shown(name)}; {near}")
+        raise no_such(f"no example {shown(name)}; {near}")
     if file.suffix == ".py":
-        raise UsageError(f"{name} is a script and no model; copy it by 'eomgen examples {name}' and run it")
+        raise bad_file(f"{name} is a script and no model; copy it by 'eomgen examples {name}' and run it")
     return load(file, **options)
 
 

@@ -21,7 +21,17 @@ from .describe.sympy_face import names_of
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
-from .errors import AssemblyError, EomgenError, ModelError, ToolchainError, UsageError
+from .errors import (
+    AssemblyError,
+    EomgenError,
+    ModelError,
+    ToolchainError,
+    UsageError,
+    cannot,
+    ill_typed,
+    no_such,
+    off_range,
+)
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.other_branches import other_branches
@@ -58,17 +68,17 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
     """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
     bare = mechanism.lagrangian is not None
     if not isinstance(method, str):
-        raise UsageError(f"method must be the name of a method, not {shown(method)}")
+        raise ill_typed(f"method must be the name of a method, not {shown(method)}")
     if mechanism.given is not None:
         if method not in ("auto", GIVEN):
-            raise UsageError(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")
+            raise cannot(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")
         return GIVEN
     if method == "auto" and bare:
         return "lagrange"
     if method not in ("auto", *METHODS):
         raise unknown("method", method, ("auto", *METHODS))
     if bare and method not in OF_LAGRANGIANS:
-        raise UsageError(
+        raise cannot(
             f"method {method!r} needs bodies; for a bare Lagrangian there are: auto, {', '.join(OF_LAGRANGIANS)}"
         )
     return method
@@ -148,15 +158,15 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
     from .equations.augmented import stabilise
 
     if method != "augmented":
-        raise UsageError(f"baumgarte works with method 'augmented' only, not {method!r}; other methods project states")
+        raise cannot(f"baumgarte works with method 'augmented' only, not {method!r}; other methods project states")
     try:
         alpha, beta = (float(x) for x in baumgarte)
     except (TypeError, ValueError):
-        raise UsageError(f"baumgarte must be two numbers (alpha, beta) in 1/s, not {baumgarte!r}") from None
+        raise ill_typed(f"baumgarte must be two numbers (alpha, beta) in 1/s, not {baumgarte!r}") from None
     if not (0.0 <= alpha < float("inf") and 0.0 <= beta < float("inf")):
-        raise UsageError(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
+        raise off_range(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
     if not kinematics.constraints.labels:
-        raise UsageError("baumgarte stabilises constraints, and this model has no constraints; leave it out")
+        raise cannot("baumgarte stabilises constraints, and this model has no constraints; leave it out")
     return stabilise(kinematics, alpha, beta)
 
 
@@ -229,7 +239,7 @@ def _assemble_start(equations: Derivation) -> list[str]:
         module.x0()
     except (AssemblyError, UsageError) as error:
         named = next((name for name in more if name in str(error)), more[0] if more else "")
-        problem = mechanism.problem(f"initial.{named}" if named else "initial", str(error))
+        problem = mechanism.problem(f"initial.{named}" if named else "initial", str(error), code=error.code)
         if isinstance(error, AssemblyError):
             raise AssemblyError(str(problem), error.rows) from None
         raise ModelError([problem]) from None
@@ -277,7 +287,7 @@ def compile_core(
     if not find_target(target).module:
         modules = " or ".join(name for name, row in TARGETS.items() if row.module)
         about = f"target {target!r} makes a {TARGETS[target].about}, not a Python module"
-        raise UsageError(f"{about}; use generate, or target {modules}")
+        raise cannot(f"{about}; use generate, or target {modules}")
     if kernels is not None:
         return _load(equations, build(equations, target, kernels), target, options)
     with _timed(equations.seconds, "program"):
@@ -318,7 +328,7 @@ def _load(
         from .emit.numpy_functions import twins
 
         if options:
-            raise UsageError(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
+            raise cannot(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
         with alone(), _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
@@ -331,7 +341,7 @@ def _load(
     allowed = Options.__dataclass_fields__
     unknown = [name for name in options if name not in allowed]
     if unknown:
-        raise UsageError(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
+        raise no_such(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     chosen = Options(**options)
     with alone(), _timed(seconds, "emit"):
         shortcut = Shortcut(fingerprint(program), chosen)

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .errors import UsageError
+from .errors import no_such
 
 Files = dict[str, str]
 
@@ -121,5 +121,5 @@ def find_target(name: str, allowed: Iterable[str] | None = None) -> Target:
     """
     names = list(TARGETS if allowed is None else allowed)
     if not isinstance(name, str) or name not in names:
-        raise UsageError(f"no target {name!r}; there are {', '.join(names)}")
+        raise no_such(f"no target {name!r}; there are {', '.join(names)}")
     return TARGETS[name]

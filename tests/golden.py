@@ -132,7 +132,7 @@ def kept(array: Any) -> Any:
 
 
 def faults() -> dict[str, Any]:
-    """Return for every fault of the table the class of the error, and the places that it names."""
+    """Return for every fault of the table the class of the error, and the places that it names with their codes."""
     out: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         for path, new in FAULTS.items():
@@ -142,9 +142,9 @@ def faults() -> dict[str, Any]:
                 eg.load(file).compile(target="numpy").simulate()
                 out[path] = "none"
             except eg.ModelError as error:
-                out[path] = ["ModelError", *sorted(problem.path for problem in error.problems)]
+                out[path] = ["ModelError", *sorted(f"{problem.path} {problem.code}" for problem in error.problems)]
             except eg.EomgenError as error:
-                out[path] = [type(error).__name__]
+                out[path] = [type(error).__name__, error.code]
     return out
 
 

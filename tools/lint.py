@@ -11,6 +11,7 @@ import inspect
 import re
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
@@ -191,6 +192,17 @@ def keywords() -> Iterator[str]:
             yield f"eomgen.runtime.option_types: {known}: {name}"
 
 
+def codes() -> Iterator[str]:
+    """Codes of errors that are not in the table, and those of the table that no error has."""
+    from eomgen.errors import CODES
+
+    constants = [(name, node) for name, nodes in NODES.items() for node in nodes if isinstance(node, ast.Constant)]
+    used = [(name, str(node.value)) for name, node in constants if re.fullmatch("EG-[A-Z-]+", str(node.value))]
+    yield from (f"{name}: {code} is no code of eomgen.errors.CODES" for name, code in used if code not in CODES)
+    counts = Counter(code for _, code in used)
+    yield from (f"eomgen.errors: no error has the code {code}" for code in CODES if counts[code] < 2)
+
+
 def public_tests() -> Iterator[str]:
     """Tests that import what no page of the documentation names, or that are too long to be read."""
     pages = [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
@@ -212,7 +224,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
     wrong = [
         line
-        for check in (forbidden, limits, directions, references, packages, keywords, public_tests)
+        for check in (forbidden, limits, directions, references, packages, keywords, codes, public_tests)
         for line in check()
     ]
     print("\n".join(wrong) or "source text: nothing wrong")

@@ -14,6 +14,7 @@ from sphinx.util.nodes import make_refnode
 import eomgen
 import eomgen.limits as eomgen_limits
 from eomgen.constraints import CONSTRAINTS
+from eomgen.errors import CODES
 from eomgen.forces import FORCES
 from eomgen.joints import JOINTS
 
@@ -65,6 +66,16 @@ class ElementMethods(SphinxDirective):
         """The nodes in place of the directive."""
         lines = [line for name in ELEMENTS[self.arguments[0]] for line in (_directive(name), "")]
         return self.parse_text_to_nodes(_rst(lines), allow_section_headings=True)
+
+
+class Codes(SphinxDirective):
+    """``{eomgen-codes}``: every code of :mod:`eomgen.errors`, and what it means."""
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes in place of the directive."""
+        table = [".. list-table::", "   :widths: 28 72", "", "   * - ``code``", "     - meaning"]
+        table += [line for code, text in CODES.items() for line in (f"   * - ``{code}``", f"     - {text}")]
+        return self.parse_text_to_nodes(_rst(table))
 
 
 class Limits(SphinxDirective):
@@ -140,6 +151,7 @@ def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
     app.add_directive("eomgen-model", ModelClass)
     app.add_directive("eomgen-methods", ElementMethods)
+    app.add_directive("eomgen-codes", Codes)
     app.add_directive("eomgen-limits", Limits)
     app.connect("missing-reference", resolve)
     app.connect("autodoc-process-signature", hide_construction)

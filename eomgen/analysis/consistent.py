@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ProjectionError, UsageError
+from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
 from ..limits.constraints import ACCEPTED, EXACT, GENTLE
 from ..limits.constraints import STATE as RANK
 from ..limits.motions import NEAREST
@@ -83,9 +83,9 @@ def consistent(
     layout, t = module.layout, read_number("t", t)
     state = np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
-        raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+        raise ill_shaped(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     if layout.given_rates:
-        raise UsageError(
+        raise cannot(
             "consistent() works for models with q' = v only, and the rates of this model's coordinates are given; "
             "use project(x)"
         )
@@ -93,7 +93,7 @@ def consistent(
     if isinstance(weights, Mapping):
         weights = {name: read_number(f"weights: that of {name}", weight) for name, weight in weights.items()}
     elif weights is not None and not (isinstance(weights, str) and weights == "mass"):
-        raise UsageError(f"weights must be a mapping of names to weights, or 'mass', not {shown(weights)}")
+        raise ill_typed(f"weights must be a mapping of names to weights, or 'mass', not {shown(weights)}")
     _check_names(layout, weights, held)
     if not layout.n_c:
         return np.asarray(module.project(state, t=t))
@@ -108,11 +108,11 @@ def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held
         for name in names:
             if name not in allowed:
                 near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
-                raise UsageError(f"{what}: no coordinate or velocity {name!r}; {near}")
+                raise no_such(f"{what}: no coordinate or velocity {name!r}; {near}")
     if isinstance(weights, Mapping):
         for name, weight in weights.items():
             if not weight > 0.0:
-                raise UsageError(f"weights: that of {name} must be positive, not {weight}; hold= keeps a value exactly")
+                raise off_range(f"weights: that of {name} must be positive, not {weight}; hold= keeps a value exactly")
 
 
 def _metric(
@@ -126,7 +126,8 @@ def _metric(
         except np.linalg.LinAlgError:
             raise UsageError(
                 "weights='mass' needs a positive definite mass matrix of the tree, and this one is not: a body has no "
-                "mass, or a negative inertia; give weights={name: weight}"
+                "mass, or a negative inertia; give weights={name: weight}",
+                code="EG-NO-INERTIA",
             ) from None
     factors = np.ones(layout.n_v)
     if isinstance(weights, Mapping):

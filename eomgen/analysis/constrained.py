@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, ill_shaped, no_number
 from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array, Scales
@@ -61,7 +61,7 @@ class ProjectedStates(NamedTuple):
         if out is None:
             return np.ascontiguousarray(result)
         if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != result.dtype:
-            raise UsageError(f"out must be an array of shape {result.shape} and type {result.dtype}")
+            raise ill_shaped(f"out must be an array of shape {result.shape} and type {result.dtype}")
         if not out.flags.writeable:
             raise UsageError("out is read-only")
         out[...] = result
@@ -89,18 +89,18 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
         u = layout.values("input", layout.u, u, module.u)
     state = read_numbers("x", x)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
-        raise UsageError(
+        raise ill_shaped(
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
         )
     if not state.size and layout.n_x:
-        raise UsageError(f"x of shape {state.shape} contains no state")
+        raise ill_shaped(f"x of shape {state.shape} contains no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
     time = as_real(read_number("t", t) if isinstance(t, str) else with_numbers("t", t))
     if time is None:
-        raise UsageError(f"t must be a number or an array of them, not {shown(t)}")
+        raise no_number(f"t must be a number or an array of them, not {shown(t)}")
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
-        raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
+        raise ill_shaped(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
     options = {"p": p, "u": u}
     projected = module.project(np.ascontiguousarray(columns), t=times, **options)
@@ -176,7 +176,7 @@ def evaluate(
         return states.shaped(find(states), out)
     states = prepare(module, t, x, p)
     if states.single or inputs.shape != (module.n_u, len(states.t)):
-        raise UsageError(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
+        raise ill_shaped(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
     parts = [
         find(prepare(module, states.t[k : k + 1], states.x[:, k : k + 1], p, np.ascontiguousarray(inputs[:, k])))
         for k in range(len(states.t))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_typed, off_range
 from ..runtime.given_start import Start
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
@@ -125,10 +125,10 @@ def _follow_both_ways(
     if within is not None:
         bounds = read_numbers("within", within)
         if bounds.shape != (2,):
-            raise UsageError(f"within must be (lowest, highest), not {shown(within)}")
+            raise ill_typed(f"within must be (lowest, highest), not {shown(within)}")
         low, high = bounds.tolist()
     if not low <= here <= high:
-        raise UsageError(f"{name} is {here:.6g} at the start, which is not within {low:.6g} .. {high:.6g}")
+        raise off_range(f"{name} is {here:.6g} at the start, which is not within {low:.6g} .. {high:.6g}")
     found: list[tuple[float, Singular | None, str]] = []
     singular: list[Singular] = []
     for sign, bound in ((1.0, high), (-1.0, low)):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
 from ..limits.constraints import STATE as RANK
 from ..limits.rounding import TINY
 from ..limits.statics import AFFINE, REACHED, REMAINDER, WELL_ABOVE
@@ -62,7 +62,7 @@ class ActuatorForces:
 
     def __getitem__(self, name: str) -> Any:
         if name not in self.names:
-            raise UsageError(f"no drive {name!r}; there are {', '.join(self.names)}")
+            raise no_such(f"no drive {name!r}; there are {', '.join(self.names)}")
         return self.forces[self.names.index(name)]
 
     def as_dict(self) -> dict[str, Any]:
@@ -135,7 +135,9 @@ def actuator_forces(
         found = _solve(A, want, weights)
         left = want - A @ found
         if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), TINY):
-            raise UsageError(_out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None))
+            raise UsageError(
+                _out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None), code="EG-UNDETERMINED"
+            )
         forces[:, k] = found
     _check_inputs(states, names, accelerations, forces, bases, S)
     rest = needed - np.einsum("jik,ik->jk", S, forces - base[:, None])
@@ -193,7 +195,7 @@ def _check_inputs(
         )
         size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
         if (np.abs(left) > REACHED * np.maximum(size, TINY)).any():
-            raise UsageError(
+            raise cannot(
                 f"the forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together, "
                 "because these multiply each other; name one of them, or the coordinates that they drive"
             )
@@ -220,9 +222,9 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     for name in names:
         if name not in allowed:
             near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
-            raise UsageError(f"actuated: no coordinate or input {name!r}; {near}")
+            raise no_such(f"actuated: no coordinate or input {name!r}; {near}")
     if not names or len(set(names)) < len(names):
-        raise UsageError("actuated must name at least one coordinate or input, and each only once")
+        raise incomplete("actuated must name at least one coordinate or input, and each only once")
     return names
 
 
@@ -254,14 +256,14 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         keys = rows | {layout.a[i]: i for i in rows.values()}
         for name in given:
             if name not in keys:
-                raise UsageError(
+                raise ill_placed(
                     f"a: {name!r} is not an independent coordinate or its acceleration; there are {', '.join(keys)}"
                 )
         values = np.zeros((layout.n_v, count))
         for name, value in given.items():
             row = read_numbers(f"a: {name}", value)
             if row.shape not in ((), (count,)):
-                raise UsageError(f"a: {name} must be a number or have shape ({count},), one a state, not {row.shape}")
+                raise ill_shaped(f"a: {name} must be a number or have shape ({count},), one a state, not {row.shape}")
             values[keys[name]] = row
         chosen = list(layout.independent)
         result = np.array(free)
@@ -272,14 +274,15 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
             if algebra.cond(part) > 1 / RANK:
                 raise UsageError(
                     f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not determine the others (a "
-                    "dead centre); give the accelerations of all velocities as an array"
+                    "dead centre); give the accelerations of all velocities as an array",
+                    code="EG-UNDETERMINED",
                 )
             result[:, k] += B @ algebra.solve(part, values[chosen, k] - free[chosen, k])
         return result
     array = read_numbers("a", a)
     wanted = (layout.n_v,) if states.single else (layout.n_v, count)
     if array.shape != wanted:
-        raise UsageError(f"a must have shape {wanted} [{', '.join(layout.a)}], not {array.shape}")
+        raise ill_shaped(f"a must have shape {wanted} [{', '.join(layout.a)}], not {array.shape}")
     result = np.array(array.reshape(layout.n_v, count))
     if layout.n_c:
         J = states.jacobian()
@@ -287,7 +290,7 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         size = np.einsum("kij,jk->ik", np.abs(J), np.abs(result) + np.abs(free)) / layout.scales.c[:, None]
         worst = np.unravel_index(int((np.abs(off) / (size + 1.0)).argmax()), off.shape)
         if np.abs(off[worst]) > REMAINDER * (size[worst] + 1.0):
-            raise UsageError(
+            raise untrue(
                 f"a violates the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
                 f"t = {states.t[int(worst[1])]:g}; name the independent accelerations (a={{...}}) instead"
             )
@@ -324,7 +327,7 @@ def _input_effect(states: ProjectedStates, j: int) -> Array:
         h.append(np.asarray(module.kernels.bias(states.t, states.x, u=u)))
     slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
     if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), TINY):
-        raise UsageError(
+        raise cannot(
             f"the forces are not linear in the input {module.u_names[j]!r}; name the coordinate that it drives instead"
         )
     return np.asarray(slope)

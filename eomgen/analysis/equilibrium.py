@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import AssemblyError, UsageError
+from ..errors import AssemblyError, ill_placed, ill_shaped
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
@@ -83,7 +83,7 @@ def equilibrium(
     refuse_closed(module.layout, states, "equilibrium")
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
-        raise UsageError(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
+        raise ill_placed(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
     q = _start(module, guess, given, time)
     here = read_coordinates(module, q, time)
     for name in wanted:
@@ -94,7 +94,7 @@ def equilibrium(
     search = Search(module, time, given, unknowns, states)
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
-        raise UsageError(
+        raise ill_shaped(
             f"{rows} held coordinates need {rows} unknowns, and these are given: {', '.join(unknowns)}; give as many "
             "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
@@ -123,13 +123,13 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
         named = {name: value for name, value in (guess or {}).items() if name not in module.layout.states}
         values = {name: read_number(name, value) for name, value in named.items()}
         if initial.sort(values).rates:
-            raise UsageError("guess is a position: name coordinates in it, not rates")
+            raise ill_placed("guess is a position: name coordinates in it, not rates")
         loose = {name: value for name, value in values.items() if name not in held}
         q = initial.from_guess(loose) if loose else initial.assembled({})
     else:
         q = np.array(read_numbers("guess", guess))
         if q.shape not in ((module.n_q,), (module.n_x,)):
-            raise UsageError(f"guess must name coordinates or have shape ({module.n_q},), not {q.shape}")
+            raise ill_shaped(f"guess must name coordinates or have shape ({module.n_q},), not {q.shape}")
         q = q[: module.n_q]
     if held:
         if not module.layout.n_h:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, at_odds, cannot, ill_shaped, no_such, untrue
 from ..limits.constraints import MEASURED
 from ..limits.impacts import BEYOND, HELD, ROUNDED, TOUCHING
 from ..numeric import algebra
@@ -78,7 +78,7 @@ class Impact:
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
-            raise UsageError(f"no gap or locked coordinate {name!r}; there are {', '.join(self.names)}")
+            raise no_such(f"no gap or locked coordinate {name!r}; there are {', '.join(self.names)}")
         return float(self.impulses[self.names.index(name)])
 
     def __repr__(self) -> str:
@@ -160,9 +160,7 @@ def impact(
     found, locked = check_gaps(module.layout, gaps, lock)
     rough = check_friction(module.layout, friction, found)
     if rough and locked:
-        raise UsageError(
-            "an impact has friction= or lock=, not both: lock the coordinates in a call before or after it"
-        )
+        raise at_odds("an impact has friction= or lock=, not both: lock the coordinates in a call before or after it")
     states = _one_state(module, read_number("t", t), x)
     watched = Gaps(module, tuple(found))
     rows = watched.normals(float(states.t[0]), states.x[:, 0])
@@ -239,7 +237,7 @@ def strike_events(
         change = kernel(t, x, u=u + np.eye(layout.n_u)[k]) - values
         for i in gaps:
             if change[i] != 0.0:
-                raise UsageError(
+                raise cannot(
                     f"event {events[i]['name']}: the gap depends on the input {layout.u[k]}, which depends on the "
                     "state, so an impact would change its rate; write the gap in coordinates instead"
                 )
@@ -248,7 +246,7 @@ def strike_events(
     q, v = states.q[:, 0], states.v[:, 0]
     for i in gaps:
         if np.abs(slopes[i][layout.n_q :]).max(initial=0.0) > 0.0:
-            raise UsageError(f"event {events[i]['name']}: a gap must depend on positions only, not on velocities")
+            raise cannot(f"event {events[i]['name']}: a gap must depend on positions only, not on velocities")
     rows = np.array([by_velocity(layout, q, slopes[i][: layout.n_q]) for i in gaps])
     moved = moving_inputs(layout, u)
     rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
@@ -265,7 +263,7 @@ def strike_events(
 def _one_state(module: BoundModel, t: float, x: ArrayLike) -> ProjectedStates:
     states = prepare(module, t, x)
     if not states.single:
-        raise UsageError(f"x must be one state ({module.layout.n_x},)")
+        raise ill_shaped(f"x must be one state ({module.layout.n_x},)")
     return states
 
 
@@ -277,7 +275,8 @@ def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
             unit = gaps.layout.unit(name)
             raise UsageError(
                 f"gap {name} is {value:.6g}{' ' * bool(unit)}{unit} ({how}); an impact needs a gap of 0, up to "
-                f"{limit:.2g}; give a state where the gap is 0, or treat any gap as closed (closed=True, --closed)"
+                f"{limit:.2g}; give a state where the gap is 0, or treat any gap as closed (closed=True, --closed)",
+                code="EG-EVENT",
             )
 
 
@@ -324,7 +323,7 @@ def _apply(
     for i in np.flatnonzero(fixed[:count]).tolist():
         if rates[i] < -rest[i] or (i >= len(e) and rates[i] > rest[i]):
             what = f"gap {names[i]} closes" if i < len(e) else f"lock: {names[i]} moves"
-            raise UsageError(
+            raise untrue(
                 f"{what} at the rate {rates[i]:.6g}, which drivers or constraints prescribe: no impulse can change it"
             )
     if B.shape[1]:

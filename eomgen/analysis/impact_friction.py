@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import untrue
 from ..limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
 from ..numeric.contact_impulses import solve_contacts
 from ..numeric.contact_problem import ContactProblem
@@ -166,7 +166,7 @@ def _in_the_plane(W: Array, rates: Array, rest: float, mu: float, e: float, name
             opens = -y_n / rise if rise > STRUCK * A else np.inf
         step = min(stops, opens)
         if not np.isfinite(step):
-            raise UsageError(
+            raise untrue(
                 f"gap {name}: friction of {mu:g} jams it, and no impulse stops it from closing; give a smaller "
                 "coefficient of friction"
             )
@@ -217,7 +217,7 @@ def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Arr
         low, high = 0.0, 1.0
         impulses, gained = strike(0.0)
         if gained > 0.0:
-            raise UsageError(
+            raise untrue(
                 f"the search for impulses of the gaps {', '.join(names)} that obey the laws of impact and friction did "
                 "not end, with restitutions of 0 either (there may be some); give smaller coefficients of friction"
             )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, ill_typed, incomplete, no_such, off_range
 from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed
@@ -92,7 +92,7 @@ class Gaps:
             slopes = self._kernel("output_derivatives")(q, v, np.zeros_like(v), t=t, u=u)
             for i, j in self.outputs:
                 if np.abs(slopes[j, layout.n_q : layout.n_x + layout.n_v]).max(initial=0.0) > 0.0:
-                    raise UsageError(
+                    raise cannot(
                         f"gap {self.names[i]}: this output depends on velocities; a gap must depend on positions only"
                     )
                 rows[i] = by_velocity(layout, q, slopes[j, : layout.n_q])
@@ -142,14 +142,14 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     name, value = forcing.names[index], forcing.formulas.get(index, forcing.varying[index])
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
-        raise UsageError(words)
+        raise cannot(words)
     known = isinstance(value, Expressed) or (hasattr(value, "derivative") and value.derivative() is not None)
     if known and not isinstance(value, DeclaredSignal):
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
         rate = rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate
         return float(rate(t, x) if callable(rate) else rate)
     if any(forcing(t, x + move)[index] != forcing(t, x)[index] for move in ELSEWHERE * np.eye(len(x))):
-        raise UsageError(words)
+        raise cannot(words)
     return float(drift(lambda time: forcing(time, x)[[index]], t)[0])
 
 
@@ -184,14 +184,14 @@ def check_gaps(
     """
     word, other = words
     if gaps is not None and not isinstance(gaps, Mapping):
-        raise UsageError(f"{word} must be a mapping of names to restitutions, {{name: 0.5}}, not {gaps!r}")
+        raise ill_typed(f"{word} must be a mapping of names to restitutions, {{name: 0.5}}, not {gaps!r}")
     locked = (lock,) if isinstance(lock, str) else lock
     if not isinstance(locked, Sequence) or not all(isinstance(name, str) for name in locked):
-        raise UsageError(f"{other} must be a list of coordinates, not {lock!r}")
+        raise ill_typed(f"{other} must be a list of coordinates, not {lock!r}")
     if not gaps and not locked:
-        raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
+        raise incomplete("an impact needs gaps={name: restitution} or lock=[coordinates]")
     if layout.given_rates:
-        raise UsageError("impacts need a model with q' = v, and the rates of this model's coordinates are given")
+        raise cannot("impacts need a model with q' = v, and the rates of this model's coordinates are given")
     gaps, locked = without_dots(gaps or {}, layout.instances), [layout.plain(name) for name in locked]
     coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
@@ -199,10 +199,10 @@ def check_gaps(
         for name in names:
             if name not in allowed:
                 near = joined(hint(name, allowed), f"there are {', '.join(allowed) or 'none'}")
-                raise UsageError(f"{what}: no coordinate or output {name!r}; {near}")
+                raise no_such(f"{what}: no coordinate or output {name!r}; {near}")
     found: dict[str, float] = {}
     for name, e in (gaps or {}).items():
         found[name] = read_number(f"{word}: the restitution of {name}", e)
         if not 0.0 <= found[name] <= 1.0:
-            raise UsageError(f"{word}: the restitution of {name} must be between 0 and 1, not {e}")
+            raise off_range(f"{word}: the restitution of {name} must be between 0 and 1, not {e}")
     return found, tuple(locked)

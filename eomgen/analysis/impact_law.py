@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import untrue
 from ..limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -62,7 +62,7 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
         change = np.asarray(algebra.lstsq(locks.T, -rates[count:], rcond=None))
     left = np.abs(locks.T @ change + rates[count:])
     if (left > rest[count:] + LEFT * np.abs(rates[count:]).max(initial=0.0)).any():
-        raise UsageError("no impulses satisfy the constraints: the locked coordinates cannot all stop; lock fewer")
+        raise untrue("no impulses satisfy the constraints: the locked coordinates cannot all stop; lock fewer")
     free = gaps - locks @ algebra.lstsq(locks, gaps, rcond=None) if locks.shape[1] else gaps
     impulses = np.zeros(count)
     live = np.linalg.norm(free, axis=0) > FREE
@@ -79,7 +79,7 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
         if found is None:  # what is left after ever smaller impacts at one instant is plastic
             if k == 0 or -now.min() > ENDLESS * fastest:
                 jammed = ", ".join(str(name) for name, one in zip(names, involved, strict=False) if one)
-                raise UsageError(
+                raise untrue(
                     f"the gaps {jammed} cannot open together: bodies are jammed between them, and Newton's law has no "
                     "solution; give them restitution 0"
                 )

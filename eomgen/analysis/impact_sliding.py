@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, ill_placed, ill_typed, no_such, off_range
 from ..limits.impacts import ROUNDED
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
@@ -49,36 +49,37 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
     if friction is None:
         return {}
     if not isinstance(friction, Mapping):
-        raise UsageError(f"{word} must be a mapping {{gap: (coefficient, sliding velocity)}}, not {friction!r}")
+        raise ill_typed(f"{word} must be a mapping {{gap: (coefficient, sliding velocity)}}, not {friction!r}")
     found: dict[str, tuple[float, tuple[str, ...]]] = {}
     placed = [name for name in (*layout.velocity_labels, *layout.loops) if name in layout.q + layout.loops]
     allowed = [*placed, *layout.y]
     for gap, given in without_dots(friction, layout.instances).items():
         if gap not in gaps:
-            raise UsageError(f"{word}: {gap!r} is no gap of this call; {joined(hint(gap, gaps), _listed(gaps))}")
+            raise no_such(f"{word}: {gap!r} is no gap of this call; {joined(hint(gap, gaps), _listed(gaps))}")
         if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
-            raise UsageError(
+            raise ill_typed(
                 f"{word}: of gap {gap} give the coefficient and the output that is its sliding velocity, "
                 f"(0.3, 'slide'), not {given!r}"
             )
         mu = read_number(f"{word}: the coefficient of {gap}", given[0])
         if not mu >= 0.0:
-            raise UsageError(f"{word}: the coefficient of {gap} must be 0 or greater, not {given[0]}")
+            raise off_range(f"{word}: the coefficient of {gap} must be 0 or greater, not {given[0]}")
         names = (given[1],) if isinstance(given[1], str) else tuple(given[1])
         if not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
-            raise UsageError(
+            raise ill_typed(
                 f"{word}: of gap {gap} give one sliding velocity, or two at right angles in space, not {given[1]!r}"
             )
         names = tuple(layout.plain(name) for name in names)
         for name in names:
             if name not in allowed:
                 near = joined(hint(name, allowed), _listed(allowed))
-                raise UsageError(f"{word}: no coordinate or output {name!r} for the sliding of {gap}; {near}")
+                raise no_such(f"{word}: no coordinate or output {name!r} for the sliding of {gap}; {near}")
         for name in (gap, *names):
             if layout.unit(name) not in SI:
                 raise UsageError(
                     f"{word}: the output {name} is in {layout.unit(name)}, and friction at {gap} needs SI units: give "
-                    "another output without a unit"
+                    "another output without a unit",
+                    code="EG-UNIT",
                 )
         found[gap] = mu, names
     return found
@@ -137,7 +138,7 @@ def find_sliding(
         by_v = slopes[j, n_q : layout.n_x]
         uneven = np.abs(by_v - rest[j, n_q : layout.n_x]) > ROUNDED * np.abs(by_v)
         if uneven.any() or np.abs(slopes[j, layout.n_x : layout.n_x + layout.n_v]).max(initial=0.0) > 0.0:
-            raise UsageError(
+            raise ill_placed(
                 f"output {name} cannot be the sliding velocity of {gaps[owner[k]]}: it must be linear in the "
                 "velocities and know no accelerations, as vx(rod.tip)"
             )

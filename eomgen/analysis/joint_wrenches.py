@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.constraints import UNMOVED
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -40,7 +40,7 @@ def joint_table(module: BoundModel) -> dict[str, Any]:
     """
     table: dict[str, Any] | None = module.metadata.get("wrenches")
     if table is None:
-        raise UsageError(
+        raise cannot(
             f"model {module.name!r} has no joints between bodies, so there are no reactions; "
             "multipliers(t, x) gives the forces of its constraint equations"
         )

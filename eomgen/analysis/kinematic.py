@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import AssemblyError, PartitionError, UsageError
+from ..errors import (
+    AssemblyError,
+    PartitionError,
+    ill_chosen,
+    ill_placed,
+    ill_shaped,
+    incomplete,
+    no_number,
+    too_large,
+)
 from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
@@ -63,15 +72,15 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     for name in named:
         base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)
         if name not in names and base not in names:
-            raise UsageError(f"{name} is given without values of {base}; give both")
+            raise incomplete(f"{name} is given without values of {base}; give both")
     arrays = {name: _column(name, value) for name, value in named.items()}
     if t is not None:
         arrays["t"] = _column("t", t)
     sizes = {name: x.size for name, x in arrays.items() if x.ndim}
     if not sizes:
-        raise UsageError("there is no range: give times t, or values of a coordinate, as an array")
+        raise incomplete("there is no range: give times t, or values of a coordinate, as an array")
     if len(set(sizes.values())) > 1:
-        raise UsageError(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
+        raise ill_shaped(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
     n = next(iter(sizes.values()))
     require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
 
@@ -83,7 +92,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     y, y1 = stack(""), stack("_dot")
     for k, name in enumerate(names):
         if np.ptp(times) and np.ptp(y[k]) and name + "_dot" not in named:
-            raise UsageError(f"{name} varies with t: give {name}_dot too (and {name}_ddot, unless it is 0)")
+            raise incomplete(f"{name} varies with t: give {name}_dot too (and {name}_ddot, unless it is 0)")
     return Range(np.array(times), names, y, y1, stack("_ddot"))
 
 
@@ -91,7 +100,7 @@ def _column(name: str, value: Any) -> Array:
     array = read_numbers(name, value)
     require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
-        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
+        raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
     return array
 
 
@@ -200,13 +209,13 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
     if isinstance(initial, Mapping):
         given = here.sort({name: read_number(name, value) for name, value in initial.items()})
         if given.rates:
-            raise UsageError(f"initial takes positions only, not {', '.join(given.rates)}")
+            raise ill_placed(f"initial takes positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)
     q = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if q.shape == (layout.n_x,):
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):
-        raise UsageError(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
+        raise ill_shaped(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
     return t0, here.system.close(q, {}).q if layout.n_h else q
 
 
@@ -225,7 +234,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     layout = module.layout
     initial: Initial = Initial(module.kernels, t)
     if len(names) > layout.n_dof:
-        raise UsageError(
+        raise ill_chosen(
             f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be prescribed: {_freedom(module, q, t)}"
         )
     free = [layout.velocity_labels[i] for i in layout.independent if layout.velocity_labels[i] in layout.q]
@@ -245,7 +254,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     if len(names) + len(held) < layout.n_dof:
         module.layout.require_minimal_form()
         plural = "s" * (layout.n_dof != 1)
-        raise UsageError(
+        raise ill_chosen(
             f"{layout.n_dof} degree{plural} of freedom, but fewer coordinates can be prescribed at this position"
         )
     result = (*names, *held)
@@ -263,7 +272,7 @@ def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array)
     ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / driven.led_scales
     k = int(ways.argmax()) if ways.size else 0
     if ways.size and ways[k] > LONGEST:
-        raise UsageError(
+        raise too_large(
             f"the path of {names[k]} from the initial position to the end of the range is {ways[k]:.6g} rad or length "
             f"scales long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are allowed; positions repeat "
             "after a turn, so give angles within one turn, or an initial position near the first point"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
@@ -108,11 +108,9 @@ class KinematicAnalysis(Trajectory):
             The time is constant in the range, or the column has no rate.
         """
         if name + "_dot" not in self.names:
-            raise UsageError(f"{name!r} has no rate among the columns")
+            raise cannot(f"{name!r} has no rate among the columns")
         if len(self.t) < 2 or not np.diff(self.t).any():
-            raise UsageError(
-                "the time is constant in this range, so there are no rates; give t together with the values"
-            )
+            raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
         y, rate = self[name], self[name + "_dot"]
         found = []
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):

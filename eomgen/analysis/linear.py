@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import cannot, ill_shaped, no_choice
 from ..numeric.scales import Array
 from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
 from ..runtime.room import read_number, read_numbers
@@ -73,22 +73,22 @@ def linearize(
     if module.layout.given_rates:
         refuse_inputs(module.layout)
     if not isinstance(form, str) or form not in FORMS:
-        raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
+        raise no_choice(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     refuse_rigid(module.layout, "linearize")
     refuse_sampled(module.layout, "linearize")
     module = module if p is None and u is None else module.bind(p, u)
     layout, time = module.layout, read_number("t", t)
     state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
-        raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+        raise ill_shaped(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     state = module.project(state, t=time)
     rates, J = module.rhs(time, state), module.jacobian(time, state)
     U = module.input_jacobian(time, state) if layout.n_u else np.zeros((layout.n_x, 0))
     if form == "full":
         if independent is not None:
-            raise UsageError("independent= chooses the states of the minimal form; the full form has all of x")
+            raise cannot("independent= chooses the states of the minimal form; the full form has all of x")
         if layout.given_rates:
-            raise UsageError(
+            raise cannot(
                 "the rates of this model's coordinates are given, and the full form of such models is not derived; use "
                 "jacobian(t, x), which is its A"
             )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, ill_chosen
 from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
@@ -82,7 +82,7 @@ def _chosen(among: Sequence[str], names: Sequence[str], count: int) -> tuple[Ind
         return None
     if len(set(found)) != count or len(found) != count:
         named = ", ".join(among[k] for k in found)
-        raise UsageError(f"independent must name {count} different ones of {', '.join(among)}, not {named}")
+        raise ill_chosen(f"independent must name {count} different ones of {', '.join(among)}, not {named}")
     return np.array(found, dtype=np.intp), True
 
 
@@ -101,7 +101,7 @@ def refuse_inputs(layout: Layout) -> None:
     UsageError
     """
     if layout.n_u:
-        raise UsageError(
+        raise cannot(
             f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; derivatives "
             f"by the inputs ({', '.join(layout.u)}) of such a model are not derived; use jacobian(t, x), which is A of "
             "the full form"

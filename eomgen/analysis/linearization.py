@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.statics import COUPLED, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -216,8 +216,8 @@ class Linearization:
         """
         if self.mass is None or self.damping is None or self.stiffness is None:
             if self.layout.given_rates:
-                raise UsageError("no second-order form: the rates of the coordinates are given as functions; use A")
-            raise UsageError("the full form has no second-order form; linearize with form='minimal'")
+                raise cannot("no second-order form: the rates of the coordinates are given as functions; use A")
+            raise cannot("the full form has no second-order form; linearize with form='minimal'")
         chosen = names or self.position_names
         rows = []
         positions, tangent = list(self.position_names), self.tangent
@@ -227,7 +227,7 @@ class Linearization:
                 raise unknown("independent coordinate", name, positions)
             which = np.flatnonzero(tangent.velocities == tangent.positions[positions.index(name)])
             if not which.size:
-                raise UsageError(
+                raise cannot(
                     f"the rate of {name} is not one of the independent velocities ({', '.join(self.velocity_names)}), "
                     f"so {name} has no equation of second order; name coordinates whose rates are independent"
                 )
@@ -241,11 +241,11 @@ class Linearization:
                 worst = int(np.abs(others).max(axis=0).argmax())
                 have = positions if label == "K" else [str(n) for n in self.velocity_names]
                 other = [n for k, n in enumerate(have) if k not in kept][worst]
-                raise UsageError(f"{other} acts on {', '.join(chosen)} through {label}; name {other} too")
+                raise cannot(f"{other} acts on {', '.join(chosen)} through {label}; name {other} too")
             matrices.append(matrix[np.ix_(rows, kept)])
         kinematic = self.A[np.ix_(columns, range(len(positions), len(self.states)))] - np.eye(self.layout.n_dof)[rows]
         if np.abs(kinematic).max(initial=0.0) > COUPLED or np.abs(self.A[columns, : len(positions)]).max() > COUPLED:
-            raise UsageError(f"the rates of {', '.join(chosen)} depend on other velocities too; use A, B, C, D")
+            raise cannot(f"the rates of {', '.join(chosen)} depend on other velocities too; use A, B, C, D")
         return matrices[0], matrices[1], matrices[2]
 
     def state_space(self) -> Any:
@@ -261,7 +261,7 @@ class Linearization:
         signal = require("scipy.signal", "scipy", "state_space")
         if not self.inputs or not self.outputs:
             missing = "inputs" if not self.inputs else "outputs"
-            raise UsageError(
+            raise cannot(
                 f"StateSpace needs inputs and outputs, and model {self.name!r} has no {missing}; use A, B, C, D"
             )
         return signal.StateSpace(self.A, self.B, self.C, self.D)

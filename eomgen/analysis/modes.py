@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EomgenError, UsageError
+from ..errors import EomgenError, cannot, off_range
 from ..files.inline_pictures import image_html
 from ..limits.descriptions import SHOWN_COMPLEX
 from ..limits.statics import SYMMETRIC
@@ -174,7 +174,7 @@ class Modes:
         MissingDependencyError
         """
         if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= len(self.squares):
-            raise UsageError(f"mode is one of 1 to {len(self.squares)}, not {mode!r}")
+            raise off_range(f"mode is one of 1 to {len(self.squares)}, not {mode!r}")
         return self._show().animate_mode(self._module, self.linear.x, self._shown(mode - 1), file, **options)
 
     def _show(self) -> Any:
@@ -219,7 +219,7 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     else:
         values, complexes = algebra.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
-            raise UsageError(
+            raise cannot(
                 "the undamped modes are not real, because the stiffness matrix is not symmetric (a force follows the "
                 "motion of a body); use the eigenvalues of linearize()"
             )
@@ -280,7 +280,7 @@ def modes(
     linear = linearize(module, state, t, independent=independent)
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())
-        raise UsageError(
+        raise cannot(
             f"modes() needs an equilibrium, and at this state {linear.states[k]} changes at a rate of "
             f"{linear.drift[k]:.6g}; find one with equilibrium(), or use the eigenvalues of linearize()"
         )

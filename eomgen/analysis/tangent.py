@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_chosen
 from ..numeric.partitions import partition
 from ..numeric.projection import tangent_projector
 from ..numeric.ranks import rank
@@ -100,7 +100,7 @@ def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
             raise unknown("coordinate of the tree", name, allowed)
         chosen.append((layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name))
     if len(set(chosen)) != count or len(chosen) != count:
-        raise UsageError(f"independent must name {count} different coordinates, not {', '.join(names)}")
+        raise ill_chosen(f"independent must name {count} different coordinates, not {', '.join(names)}")
     return np.array([*chosen, *range(moving, layout.n_v)], dtype=np.intp)
 
 

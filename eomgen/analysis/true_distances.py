@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.constraints import MEASURED
 from ..numeric import algebra
 from ..numeric.ranks import rank
@@ -55,7 +55,7 @@ def require_distances(
             exact = rank(D).rank == 3
             for what, length in zip(said, lengths.tolist(), strict=True):
                 if length > 1.0 + MEASURED or (exact and MEASURED < length < 1.0 - MEASURED):
-                    raise UsageError(
+                    raise cannot(
                         f"{what} changes by {length:.6g} for each unit of length by which joint {name} moves along it: "
                         "friction compares the impulses along the gap and along its sliding velocity, so the gap must "
                         f"be the distance and the velocity that of its place; divide it by {length:.6g}"

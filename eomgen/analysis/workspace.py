@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped
 from ..files.inline_pictures import picture_html
 from ..files.writing import whole_file
 from ..notation.notation import Notation
@@ -128,7 +128,7 @@ class Workspace:
         from .workspace_extent import covered
 
         if len(self.of) != d or len(self.over) < d:
-            raise UsageError(
+            raise ill_shaped(
                 f"{what}() needs {d} outputs over {d} or more coordinates, not {len(self.of)} over {len(self.over)}"
             )
         _, width, raster = covered(self.values, read_count("resolution", resolution, 1))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..numeric import algebra
 from ..numeric.roots import find_root
@@ -139,7 +139,7 @@ class ConditionReader:
         for name, output in zip(self.stage.grid.of, self.outputs, strict=True):
             k = self.layout.y.index(name) if output else -1
             if output and any(np.any(Y[k]) for Y in moving):
-                raise UsageError(f"output {name!r} depends on velocities or accelerations; a workspace has positions")
+                raise cannot(f"output {name!r} depends on velocities or accelerations; a workspace has positions")
 
 
 def find_conditions(stage: Stage, reader: ConditionReader, filled: Flood) -> Conditions:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_chosen, ill_placed, ill_typed, incomplete, no_choice, off_range, too_large
 from ..numeric.counts import as_count, read_count
 from ..numeric.scales import Array
 from ..runtime.near_names import read_names, unknown
@@ -68,7 +68,7 @@ def read_grid(
     """
     layout, points = module.layout, read_count("points", points)
     if not isinstance(over, Mapping) or not over:
-        raise UsageError(
+        raise ill_typed(
             f"over must be a mapping of coordinates to values, such as {{'theta': (0, 6.28, 73)}}, not {shown(over)}"
         )
     coordinates = (*layout.q, *layout.loops)
@@ -76,25 +76,25 @@ def read_grid(
         if name not in (*coordinates, "t"):
             raise unknown("coordinate to vary", name, (*coordinates, "t"))
         if _kind(layout, name) == "parameter":
-            raise UsageError(f"{name} is an Euler parameter, which a grid cannot vary; use rotation: euler_angles")
+            raise ill_placed(f"{name} is an Euler parameter, which a grid cannot vary; use rotation: euler_angles")
     if len(over) > MOST_AXES:
-        raise UsageError(f"a grid must have 1 to {MOST_AXES} coordinates, not {len(over)}: {', '.join(over)}")
+        raise off_range(f"a grid must have 1 to {MOST_AXES} coordinates, not {len(over)}: {', '.join(over)}")
     led = [name for name in over if name != "t"]
     if len(led) > layout.n_dof:
         left = f"vary at most {layout.n_dof}" if layout.n_dof else "the drivers move all bodies: vary t"
-        raise UsageError(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom; {left}")
+        raise ill_chosen(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom; {left}")
     axes = tuple(read_axis(f"over {name}", given) for name, given in over.items())
     size = int(np.prod([len(axis) for axis in axes], dtype=object))
     if size > points:
         shape = " x ".join(str(len(axis)) for axis in axes)
-        raise UsageError(f"{shape} = {size} grid points, more than points={points}; take fewer values or raise points")
+        raise too_large(f"{shape} = {size} grid points, more than points={points}; take fewer values or raise points")
     wanted = read_names("of", of)
     known = dict.fromkeys((*layout.y, *coordinates))
     for name in wanted:
         if name not in known:
             raise unknown("output or coordinate", name, known)
     if not wanted or len(set(wanted)) < len(wanted):
-        raise UsageError(f"of must name outputs or coordinates, and each only once, not {shown(of)}")
+        raise ill_typed(f"of must name outputs or coordinates, and each only once, not {shown(of)}")
     return Grid(tuple(over), axes, wanted, _limits(module, limits))
 
 
@@ -111,10 +111,10 @@ def read_axis(label: str, given: Any) -> Array:
         given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
     values = as_real(given)
     if values is None:
-        raise UsageError(f"{what}, not {shown(given)}")
+        raise ill_typed(f"{what}, not {shown(given)}")
     steps = np.diff(values) if values.ndim == 1 else np.empty(0)
     if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise UsageError(f"{what}, not {shown(given)}")
+        raise ill_typed(f"{what}, not {shown(given)}")
     return values
 
 
@@ -122,7 +122,7 @@ def _bound(name: str, given: Any) -> float:
     """One limit, which may be infinite."""
     found = read_numbers(f"limits {name}", given)
     if found.ndim:
-        raise UsageError(f"limits {name}: give (lower, upper), not {shown(given)} for one of them")
+        raise ill_typed(f"limits {name}: give (lower, upper), not {shown(given)} for one of them")
     return float(found)
 
 
@@ -131,11 +131,11 @@ def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit,
     coordinates = (*module.layout.q, *module.layout.loops)
     if not isinstance(given, Mapping):
         if not isinstance(given, (bool, np.bool_)):
-            raise UsageError(f"limits must be True, False or a mapping {{name: (lower, upper)}}, not {shown(given)}")
+            raise no_choice(f"limits must be True, False or a mapping {{name: (lower, upper)}}, not {shown(given)}")
         declared = module.layout.limits if given else {}
         pairs = {name: (kept.get("lower"), kept.get("upper")) for name, kept in declared.items()}
         if given and not any(x is not None for pair in pairs.values() for x in pair):
-            raise UsageError("limits=True, but no joint of the model has lower or upper limits; give limits={name: ..}")
+            raise incomplete("limits=True, but no joint of the model has lower or upper limits; give limits={name: ..}")
         pairs = {name: pair for name, pair in pairs.items() if name in coordinates}
     else:
         pairs = {}
@@ -143,14 +143,14 @@ def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit,
             if name not in coordinates:
                 raise unknown("coordinate to limit", name, coordinates)
             if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
-                raise UsageError(f"limits {name}: give (lower, upper), None for none, not {pair!r}")
+                raise ill_typed(f"limits {name}: give (lower, upper), None for none, not {pair!r}")
             pairs[name] = (pair[0], pair[1])
     found = []
     for name, (low, high) in pairs.items():
         lower = -np.inf if low is None else _bound(name, low)
         upper = np.inf if high is None else _bound(name, high)
         if not lower <= upper:
-            raise UsageError(f"limits {name}: lower {lower:g} is above upper {upper:g}")
+            raise off_range(f"limits {name}: lower {lower:g} is above upper {upper:g}")
         if lower > -np.inf or upper < np.inf:
             found.append(Limit(name, lower, upper))
     return tuple(found)

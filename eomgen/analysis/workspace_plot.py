@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_typed
 from ..notation.labels import label
 from ..notation.notation import Notation
 from ..runtime.near_names import require
@@ -34,7 +34,7 @@ def plot_workspace(ws: Coloured, by: str, ax: Any = None, figure: Any = None) ->
     """Draw a workspace; see :meth:`.workspace.Workspace.plot`."""
     colour = ws[by]
     if colour.dtype.kind not in "fb":
-        raise UsageError(f"by={by!r}: a workspace can be coloured only by a column of numbers")
+        raise ill_typed(f"by={by!r}: a workspace can be coloured only by a column of numbers")
     if ax is None and figure is None:
         pyplot = require("matplotlib.pyplot", "matplotlib", "plot")
         figure = pyplot.figure(figsize=(11.0, 4.8), layout="constrained")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from .. import pipeline
 from ..describe.builder import Builder
 from ..describe.visit import copied
-from ..errors import UsageError
+from ..errors import too_large
 from ..files.inline_pictures import picture_html, side_by_side
 from ..simulation.progress import waiting
 from .equations import Equations, derive
@@ -96,7 +96,7 @@ class Model(Builder):
     def _small_figure(self) -> Any:
         count = len(self.description.sections["bodies"])
         if count > SMALL:
-            raise UsageError(f"{count} bodies take a while to draw; draw() does it")
+            raise too_large(f"{count} bodies take a while to draw; draw() does it")
         from ..show.draw import small_figure
 
         return small_figure(self.compile(target="numpy"))

@@ -79,6 +79,7 @@ def to_dict(error: BaseException) -> dict[str, Any]:
     return {
         "error": {
             "type": type(error).__name__,
+            "code": getattr(error, "code", "EG-FILE"),
             "exit_code": exit_code(error),
             "message": told(error),
             "problems": problems,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 import numpy as np
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, bad_file, incomplete
 from ..files.writing import save_figure
 from ..notation.notation import Notation
 from .shared_options import split_names
@@ -34,7 +34,7 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
         raise MissingDependencyError(f"{option} needs matplotlib: pip install matplotlib") from error
     known = sorted(FigureCanvasBase.get_supported_filetypes())
     if file.suffix[1:].lower() not in known:
-        raise UsageError(f"{option} {file}: the name of a picture must end in one of .{', .'.join(known)}")
+        raise bad_file(f"{option} {file}: the name of a picture must end in one of .{', .'.join(known)}")
 
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
@@ -71,7 +71,7 @@ def check_picture(file: Path | None, picture: Picture) -> None:
     if file is not None:
         require_plotting(file)
     elif picture != Picture():
-        raise UsageError("--columns, --against and --plot-as need --plot FILE; give it too")
+        raise incomplete("--columns, --against and --plot-as need --plot FILE; give it too")
 
 
 def check_columns(module: Module, picture: Picture) -> None:

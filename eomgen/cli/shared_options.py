@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ModelError, UsageError
+from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number
 from ..files.reading import kind_of
 from ..files.writing import refuse_link
 from ..suggestions import closest
@@ -139,7 +139,7 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
         yield
     except ModelError as error:
         if independent and all(p.path.startswith("independent") for p in error.problems):
-            raise UsageError(
+            raise ill_chosen(
                 "\n".join(str(p._replace(file="", path="--independent")) for p in error.problems)
             ) from None
         raise
@@ -256,7 +256,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
 
         model = load(path, **options)
     else:
-        raise UsageError(_missing(path))
+        raise bad_file(_missing(path))
     from .screen import say
 
     for note in model.notes:
@@ -270,7 +270,7 @@ def _read_stdin(options: dict[str, Any]) -> Model:
     from ..describe.yaml_file import describe_yaml
 
     if options:
-        raise UsageError(f"- reads a model file from the standard input and takes no {', '.join(options)}; name a file")
+        raise at_odds(f"- reads a model file from the standard input and takes no {', '.join(options)}; name a file")
     return Model.from_description(describe_yaml(sys.stdin.read(), "<stdin>"))
 
 
@@ -300,15 +300,15 @@ def require_folder(option: str, file: Path | None) -> None:
         return
     refuse_link(file)
     if file.is_dir():
-        raise UsageError(f"{option} {file}: this is a folder; name a file in it")
+        raise bad_file(f"{option} {file}: this is a folder; name a file in it")
     above = file.absolute().parents
     folder = next(parent for parent in above if parent.exists())
     if folder == Path(file.absolute().anchor) != above[0]:  # rather a slip than a wish for a new folder there
-        raise UsageError(f"{option} {file}: there is no folder {above[-2]}")
+        raise bad_file(f"{option} {file}: there is no folder {above[-2]}")
     if not folder.is_dir():
-        raise UsageError(f"{option} {file}: {folder} is a file, not a folder")
+        raise bad_file(f"{option} {file}: {folder} is a file, not a folder")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
+        raise bad_file(f"{option} {file}: the folder {folder} cannot be written")
 
 
 def require_document_folder(option: str, file: Path | None) -> None:
@@ -320,7 +320,7 @@ def require_document_folder(option: str, file: Path | None) -> None:
     """
     require_folder(option, file)
     if file is not None and not file.absolute().parent.is_dir():
-        raise UsageError(f"{option} {file}: there is no folder {file.absolute().parent}; make it, or name another one")
+        raise bad_file(f"{option} {file}: there is no folder {file.absolute().parent}; make it, or name another one")
 
 
 def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
@@ -342,11 +342,11 @@ def parse_settings(settings: tuple[str, ...], option: str = "--set", example: st
 def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") -> tuple[str, float]:
     name, equals, text = (part.strip() for part in word.partition("="))
     if not equals or not name or not text:
-        raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
+        raise ill_typed(f"{option} {word}: write name=value, for example {option} {example}")
     try:
         return name, parse_number(text)
     except UsageError as error:
-        raise UsageError(f"{option} {word}: {error}") from None
+        raise no_number(f"{option} {word}: {error}") from None
 
 
 def parse_number(text: str) -> float:
@@ -370,7 +370,7 @@ def parse_number(text: str) -> float:
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise UsageError(f"{error.message}; {error.remedy}") from None
+        raise no_number(f"{error.message}; {error.remedy}") from None
     if value is None:
-        raise UsageError("the value is not a number")
+        raise no_number("the value is not a number")
     return value

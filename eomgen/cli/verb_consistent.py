@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ..analysis.tables import without_noise
-from ..errors import UsageError
+from ..errors import at_odds, no_such
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_heading, print_json, print_table
 from .sections import verb_command
@@ -27,12 +27,12 @@ def consistent(
 ) -> None:
     """Bring a rough state (--set, the rest as declared) onto the constraints with the least change."""
     if weight and mass:
-        raise UsageError("give either --weight or --mass")
+        raise at_odds("give either --weight or --mass")
     module = work.module
     rough = module.x0(t=t)
     for name, value in work.initial.items():
         if name not in module.x_names:
-            raise UsageError(f"--set {name}: the names of a rough state are {', '.join(module.x_names)}")
+            raise no_such(f"--set {name}: the names of a rough state are {', '.join(module.x_names)}")
         rough[module.x_names.index(name)] = value
     weights: Any = "mass" if mass else parse_settings(weight, "--weight", "theta=100") or None
     found = module.consistent(rough, t, weights=weights, hold=hold)

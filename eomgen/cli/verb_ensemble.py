@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UsageError
+from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
 from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
@@ -75,7 +75,7 @@ def ensemble(
 ) -> None:  # fmt: skip
     """Run a model many times: for a table of cases, for random values, or over a grid of values."""
     if out is not None and out.suffix not in (".npz", ".csv", ".nc"):
-        raise UsageError(f"--out {out}: ensembles are written as .npz, .csv or .nc")
+        raise bad_file(f"--out {out}: ensembles are written as .npz, .csv or .nc")
     for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
         require_folder(word, path)
     if out is not None and out.suffix == ".csv":
@@ -83,19 +83,19 @@ def ensemble(
     if out is not None and out.suffix == ".nc":
         require("xarray", "xarray h5netcdf h5py", "--out FILE.nc")
     if cases is not None and count is not None:
-        raise UsageError("--count is for values drawn by --vary; --cases has as many runs as rows")
+        raise at_odds("--count is for values drawn by --vary; --cases has as many runs as rows")
     module = work.module
     require_room(f"--count {count}", float(count or 0) * max(len(vary) + 2 * module.n_x, 1), "draw fewer runs")
     require_room(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
     if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
-        raise UsageError(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
+        raise off_range(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     if grid and (cases is not None or vary or count is not None):
-        raise UsageError("--grid defines all runs itself; leave out --cases, --vary and --count")
+        raise at_odds("--grid defines all runs itself; leave out --cases, --vary and --count")
     axes = read_axes("--grid", grid)
     values = _read(cases, module) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
-        raise UsageError("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
+        raise incomplete("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
     sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial), "parameters": {}, "inputs": {}}
     for name, column in values.items():
         kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
@@ -156,25 +156,28 @@ def _read(path: Path, module: Module) -> dict[str, list[float]]:
         try:
             rows = [row for row in csv.reader(file) if row]
         except (UnicodeDecodeError, csv.Error) as error:
-            raise UsageError(f"--cases {path}: this is not a table of text (CSV, UTF-8): {error}") from None
+            raise bad_data(f"--cases {path}: this is not a table of text (CSV, UTF-8): {error}") from None
     if len(rows) < 2:
-        raise UsageError(f"--cases {path}: the table needs a line of names and a line for each run")
+        raise incomplete(f"--cases {path}: the table needs a line of names and a line for each run")
     heads = [split_head(head) for head in rows[0]]
     names = [name for name, _ in heads]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise UsageError(f"--cases {path}: the table has the names {', '.join(twice)} twice")
+        raise at_odds(f"--cases {path}: the table has the names {', '.join(twice)} twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
-            raise UsageError(f"{path}:{number}: {len(row)} values for {len(names)} names")
+            raise ill_shaped(f"{path}:{number}: {len(row)} values for {len(names)} names")
         for name, word in zip(names, row, strict=True):
             try:
                 columns[name].append(float(word))
             except ValueError:
-                raise UsageError(f"{path}:{number}: {name} must be a number, not {word!r}") from None
+                raise no_number(f"{path}:{number}: {name} must be a number, not {word!r}") from None
     for name, unit in heads:
         if unit and unit != (own := module.layout.unit(name)):
-            raise UsageError(f"--cases {path}: {name} is given in {unit}; give values in {own or '1'}, without a unit")
+            raise UsageError(
+                f"--cases {path}: {name} is given in {unit}; give values in {own or '1'}, without a unit",
+                code="EG-UNIT",
+            )
     return columns
 
 
@@ -189,10 +192,10 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
         try:
             limits = parse_number(low), parse_number(high)
         except UsageError as error:
-            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
+            raise no_number(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
         if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
-            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
+            raise no_number(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
         if name.strip() in drawn:
-            raise UsageError(f"--vary {name.strip()} is given twice")
+            raise at_odds(f"--vary {name.strip()} is given twice")
         drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
     return drawn

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import UsageError
+from ..errors import at_odds, bad_file, no_such
 from ..files.writing import write_whole
 from ..shipped import example_files, find_example
 from ..suggestions import hint
@@ -52,7 +52,7 @@ def examples(name: str | None, force: bool, every: bool, target: str, as_json: b
     found = example_files()
     if every:
         if name is not None:
-            raise UsageError(f"--all runs every example; leave out {name} or --all")
+            raise at_odds(f"--all runs every example; leave out {name} or --all")
         _run_all(found, target, as_json)
         return
     if name is None:
@@ -109,9 +109,9 @@ def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
     file = find_example(name, found)
     if file is None:
         near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
-        raise UsageError(f"no example {name!r}; {near}")
+        raise no_such(f"no example {name!r}; {near}")
     target = Path(file.name)
     if target.exists() and not force:
-        raise UsageError(f"{target} exists; add --force to overwrite it")
+        raise bad_file(f"{target} exists; add --force to overwrite it")
     write_whole(target, file.read_bytes())
     return target

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from ..analysis.tables import without_noise
-from ..errors import UsageError
+from ..errors import at_odds, ill_typed, incomplete
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_heading, print_json, print_rows, say
 from .sections import verb_command
@@ -40,12 +40,12 @@ def impact(
     from ..analysis.impact_sliding import check_friction
 
     if not gap and not stop:
-        raise UsageError("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")
+        raise incomplete("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")
     module = work.module
     gaps, locked = check_gaps(module.layout, parse_settings(gap, "--gap", "s=0.5"), stop, ("--gap", "--stop"))
     rough = check_friction(module.layout, dict(map(_read_friction, slip)), gaps, "--slip")
     if rough and locked:
-        raise UsageError("give --slip or --stop, not both")
+        raise at_odds("give --slip or --stop, not both")
     start = module.x0(work.initial or None, t=t)
     found = module.impact(t, start, gaps, lock=locked, closed=closed, friction=rough or None)
     after = dict(zip(module.x_names, found.x.tolist(), strict=True))
@@ -76,5 +76,5 @@ def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
     gap, equals, rest = text.partition("=")
     mu, *names = rest.split(":")
     if not equals or not names:
-        raise UsageError(f"--slip: {text!r} is not NAME=MU:SPEED, such as gap=0.3:vx_tip")
+        raise ill_typed(f"--slip: {text!r} is not NAME=MU:SPEED, such as gap=0.3:vx_tip")
     return gap, (mu, tuple(names))

@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from ..analysis.tables import without_noise
-from ..errors import UsageError
+from ..errors import at_odds, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
 from ..runtime.storage import RUNS
 from .failures import reports_failures
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
@@ -99,7 +99,7 @@ def kinematics(
     asked = [read_range(words) for words in ranges]
     grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in RUNS:
-        raise UsageError(f"--out {out}: the motion is written as {' or '.join(RUNS)}")
+        raise bad_file(f"--out {out}: the motion is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
     require_folder("--out", out)
     require_folder("--plot", plot)
@@ -163,14 +163,14 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
     name, equals, text = words.partition("=")
     parts = text.split(":")
     if not equals or not name.strip() or len(parts) not in (2, 3):
-        raise UsageError(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
+        raise ill_typed(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
     try:
         start, end = (parse_number(part) for part in parts[:2])
         count = _count(parts[2]) if len(parts) == 3 else None
     except ValueError as error:  # a UsageError too
-        raise UsageError(f"--range {words}: {error}") from None
+        raise no_number(f"--range {words}: {error}") from None
     if count is not None and not 1 <= count <= 10_000_000:
-        raise UsageError(f"--range {words}: the count is 1 to 10000000, not {count}")
+        raise off_range(f"--range {words}: the count is 1 to 10000000, not {count}")
     return name.strip(), start, end, count
 
 
@@ -178,7 +178,7 @@ def _count(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise UsageError(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
+        raise off_range(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
 
 
 def range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
@@ -186,14 +186,14 @@ def range_values(module: Module, asked: list[tuple[str, float, float, int | None
     if not asked:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
-            raise UsageError(f"give --range: {_left(module.n_dof)}, for example of {free}")
+            raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     if len(set(names)) < len(names):
-        raise UsageError(f"--range: {', '.join(names)}: give each name once")
+        raise at_odds(f"--range: {', '.join(names)}: give each name once")
     counts = {count for *_, count in asked if count is not None} or {COUNT}
     if len(counts) > 1:
-        raise UsageError(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
+        raise ill_shaped(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
     (count,) = counts
     values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in asked}
     if "t" in values and len(asked) > 1 and count > 1:  # coordinates that are led over time have their rates

@@ -8,7 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import bad_file
 from ..files.writing import whole_file
 from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
@@ -38,7 +38,7 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     Components that redundant constraints leave undetermined are marked with *; the smallest reactions are given.
     """
     if out is not None and (end is None or out.suffix not in (".npz", ".csv")):
-        raise UsageError(f"--out {out}: histories need --end and are written as .npz or .csv")
+        raise bad_file(f"--out {out}: histories need --end and are written as .npz or .csv")
     require_folder("--out", out)
     module = work.module
     x = module.x0(work.initial or None, t=t)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..analysis.tables import without_noise
-from ..errors import UsageError
+from ..errors import bad_file, incomplete
 from ..limits.descriptions import RESTING
 from ..marker_places import place_of_marker
 from ..runtime.near_names import unknown
@@ -126,7 +126,7 @@ def run(
     """
     chosen = parse_settings(settings)
     if out is not None and out.suffix not in RUNS:
-        raise UsageError(f"--out {out}: a run is written as {' or '.join(RUNS)}")
+        raise bad_file(f"--out {out}: a run is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
     if animate is not None:
         from ..show.writers import require_kind
@@ -139,7 +139,7 @@ def run(
     kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
     kept = {key: value for key, value in kept.items() if value is not None}
     if kept and checkpoint is None:
-        raise UsageError("--checkpoint-every and --resume need --checkpoint FILE; give it too")
+        raise incomplete("--checkpoint-every and --resume need --checkpoint FILE; give it too")
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)

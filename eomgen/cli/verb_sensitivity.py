@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import UsageError
+from ..errors import bad_file, incomplete
 from .analysis import Prepared, analysis_options
 from .number_option import NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
@@ -24,12 +24,12 @@ from .shared_options import require_folder
 def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Path | None, as_json: bool) -> None:
     """Integrate a model together with its derivatives, and report the derivatives at the end."""
     if out is not None and out.suffix not in (".npz", ".csv"):
-        raise UsageError(f"--out {out}: sensitivities are written as .npz or .csv")
+        raise bad_file(f"--out {out}: sensitivities are written as .npz or .csv")
     require_folder("--out", out)
     module = work.module
     names = [name for words in by for name in words.split(",") if name] or list(module.p_names)
     if not names:
-        raise UsageError("the model has no parameters; name an input or an initial value with --by")
+        raise incomplete("the model has no parameters; name an input or an initial value with --by")
     with stage("integrate"):
         found = module.sensitivities(names, end, work.initial or None)
     if out is not None:

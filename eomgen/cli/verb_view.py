@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..errors import UsageError
+from ..errors import at_odds, incomplete
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
 from .screen import print_json, say, stage
@@ -96,9 +96,9 @@ def view(
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
     if asked and (end is not None or solver):
-        raise UsageError("--range moves the model without forces; leave out --end and options of the integrator")
+        raise at_odds("--range moves the model without forces; leave out --end and options of the integrator")
     if any(count == 1 for *_, count in asked):
-        raise UsageError("an animation needs two positions: give --range a COUNT of at least 2")
+        raise incomplete("an animation needs two positions: give --range a COUNT of at least 2")
     file = out if out is not None else Path(gettempdir()) / f"eomgen_{model.stem}.html"
     require_kind(file)
     require_folder("--out", None if out is None or not out.suffix else out)

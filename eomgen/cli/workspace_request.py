@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import at_odds, ill_typed, incomplete, no_number
 from ..files.writing import save_figure
 from .screen import finite
 from .shared_options import parse_number
@@ -25,12 +25,12 @@ def read_grid(over: tuple[str, ...], of: tuple[str, ...], within: bool, ranges: 
     """
     if not over:
         if of or within:
-            raise UsageError("--of and --within-limits need --over NAME=LOW:HIGH:COUNT; give it too")
+            raise incomplete("--of and --within-limits need --over NAME=LOW:HIGH:COUNT; give it too")
         return {}
     if not of:
-        raise UsageError("--over needs --of NAME: the outputs or coordinates whose workspace it is")
+        raise incomplete("--over needs --of NAME: the outputs or coordinates whose workspace it is")
     if ranges:
-        raise UsageError("--over and --range cannot be used together: one is a grid, the other a path")
+        raise at_odds("--over and --range cannot be used together: one is a grid, the other a path")
     return read_axes("--over", over)
 
 
@@ -46,14 +46,14 @@ def read_axes(option: str, over: tuple[str, ...]) -> dict[str, Any]:
         name, equals, text = words.partition("=")
         parts = text.split(":")
         if not equals or not name.strip() or len(parts) != 3:
-            raise UsageError(f"{option} {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
+            raise ill_typed(f"{option} {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
         try:
             low, high = (parse_number(part) for part in parts[:2])
             count = int(parts[2])
         except ValueError as error:  # a UsageError too
-            raise UsageError(f"{option} {words}: {error}") from None
+            raise no_number(f"{option} {words}: {error}") from None
         if name.strip() in grid:
-            raise UsageError(f"{option} {words}: give each name once")
+            raise at_odds(f"{option} {words}: give each name once")
         grid[name.strip()] = (low, high, count)
     return grid
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UsageError, incomplete
 from ..layer import LAYER, read_header, read_layer
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .commands import Running, allowed, raise_failure
@@ -84,7 +84,7 @@ def compile_sources(
     layer = {name: sources.pop(name, own[name]) for name in LAYER}
     _check(sources, name)
     if HEADERS[0] not in sources:
-        raise UsageError(f"the sources of {name!r} lack {HEADERS[0]}; there are {', '.join(sources)}")
+        raise incomplete(f"the sources of {name!r} lack {HEADERS[0]}; there are {', '.join(sources)}")
     headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
     sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
@@ -148,11 +148,11 @@ def _check(sources: Mapping[str, str], name: str) -> None:
     """Names become file and module names, so they must be plain."""
     for file in sources:
         if not re.fullmatch(r"\w[\w.-]*", file):
-            raise UsageError(f"the source name {file!r} is not a plain file name")
+            raise UsageError(f"the source name {file!r} is not a plain file name", code="EG-NAME-FORM")
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
-        raise UsageError(f"the model name {name!r} is not a C identifier")
+        raise UsageError(f"the model name {name!r} is not a C identifier", code="EG-NAME-FORM")
     if not any(file.endswith(".c") for file in sources):
-        raise UsageError(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
+        raise incomplete(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
 
 
 def _plan(

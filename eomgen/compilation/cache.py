@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import ToolchainError
+from ..errors import ToolchainError, bad_cache
 from ..files.build_folder import MANIFEST, digest, read_entry, read_manifest, sealed
 from ..files.kept import Kept
 from ..files.locks import hold, locked
@@ -54,7 +54,7 @@ def cache_directory() -> Path:
         return found.absolute()
     except (RuntimeError, OSError) as error:
         origin = f"EOMGEN_CACHE_DIR={chosen!r}: " if chosen else ""
-        raise ToolchainError(
+        raise bad_cache(
             f"{origin}the cache directory is not known: {error}. Set EOMGEN_CACHE_DIR to a directory of your own"
         ) from error
 
@@ -172,7 +172,7 @@ class Cache:
             raise  # its message names files in here
         except OSError as error:
             shutil.rmtree(directory, ignore_errors=True)
-            raise ToolchainError(f"cannot build in the cache directory {self.root}: {error}") from error
+            raise bad_cache(f"cannot build in the cache directory {self.root}: {error}") from error
         except BaseException:
             shutil.rmtree(directory, ignore_errors=True)
             raise
@@ -186,7 +186,7 @@ class Cache:
             self.sweep()
             return self._make_attempt(key[:16])
         except OSError as error:
-            raise ToolchainError(
+            raise bad_cache(
                 f"the cache directory {self.root} cannot be written: {error}. "
                 "Set EOMGEN_CACHE_DIR to a directory that can"
             ) from error
@@ -243,7 +243,7 @@ class Cache:
                     self._remove(target)  # damaged, and nobody mends it meanwhile
                 else:
                     return _describe(target, manifest)
-        raise ToolchainError(f"the damaged cache entry {target} cannot be replaced; remove it by hand")
+        raise bad_cache(f"the damaged cache entry {target} cannot be replaced; remove it by hand")
 
     def entries(self) -> list[CacheEntry]:
         """Every readable entry, the most recently used first."""
@@ -333,7 +333,7 @@ class Cache:
                 os.rename(entry, away / entry.name)
             shutil.rmtree(away, ignore_errors=True)
         except OSError as error:
-            raise ToolchainError(f"the cache entry {entry} cannot be removed: {error}") from error
+            raise bad_cache(f"the cache entry {entry} cannot be removed: {error}") from error
 
 
 def _describe(directory: Path, manifest: Mapping[str, Any]) -> CacheEntry:

@@ -145,7 +145,7 @@ def _given() -> float | None:
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds < float("inf"):
-        raise ToolchainError(f"{SECONDS} must be a positive number of seconds, not {text!r}")
+        raise ToolchainError(f"{SECONDS} must be a positive number of seconds, not {text!r}", code="EG-NUMBER")
     return seconds
 
 
@@ -160,7 +160,9 @@ def _start(command: Sequence[str], directory: Path | None, environment: dict[str
             return started.result()
         except (OSError, ValueError) as error:  # ValueError: a NUL in a word
             words = shlex.join(command)
-            raise ToolchainError(f"the command {words} cannot be started: {error}", words) from error
+            raise ToolchainError(
+                f"the command {words} cannot be started: {error}", words, code="EG-COMPILER-MISSING"
+            ) from error
         except BaseException:
             if started.exception() is None:
                 _kill(started.result())

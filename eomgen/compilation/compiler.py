@@ -72,7 +72,7 @@ def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
     try:
         wished = [tuple(shlex.split(wish))]
     except ValueError as error:  # a quotation without its end
-        raise ToolchainError(f"{origin} is not a command: {error}: {wish}") from None
+        raise ToolchainError(f"{origin} is not a command: {error}: {wish}", code="EG-COMPILER-MISSING") from None
     tried = []
     for words in wished if wish else _candidates():
         found = _identify(words, search_path)
@@ -80,7 +80,7 @@ def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
             return found
         tried.append(f"{shlex.join(words)}: {found}")
     heading = f"The C compiler named by {origin} does not work." if wish else "No C compiler was found."
-    raise ToolchainError(f"{heading} Tried:\n  " + "\n  ".join(tried) + f"\n{REMEDIES}")
+    raise ToolchainError(f"{heading} Tried:\n  " + "\n  ".join(tried) + f"\n{REMEDIES}", code="EG-COMPILER-MISSING")
 
 
 def _candidates() -> Iterator[tuple[str, ...]]:

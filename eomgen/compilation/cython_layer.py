@@ -202,6 +202,7 @@ def find_python_headers() -> Path:
         raise ToolchainError(
             f"Python's C headers are missing: there is no {directory / 'Python.h'}. Install them (Debian, Ubuntu: "
             f"apt install python{sys.version_info[0]}.{sys.version_info[1]}-dev or python3-dev; Fedora: dnf install "
-            'python3-devel), or use target="c" or target="numpy", which need none'
+            'python3-devel), or use target="c" or target="numpy", which need none',
+            code="EG-COMPILER-MISSING",
         )
     return directory

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..errors import EomgenError, ToolchainError
+from ..errors import EomgenError, bad_cache
 from ..files.build_folder import read_manifest
 from ..files.ownership import require_trusted
 from ..layer import read_header, read_layer
@@ -120,7 +120,7 @@ def _find_or_build(file: Path, share: Share) -> CacheEntry:
     cache = Cache(file.parents[2])
     built = cache.find(file.parent.name)
     if built is None:
-        raise ToolchainError("its cache entry is gone or was changed; compile the model again")
+        raise bad_cache("its cache entry is gone or was changed; compile the model again")
     recipe = read_manifest(file.parent)["recipe"]
     if (entry := cache.find(_key(built.key, recipe["compiler"], share))) is not None:
         return entry  # needs no compiler

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import ToolchainError
+from ..errors import ToolchainError, bad_cache
 from ..files.build_folder import read_manifest
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key
@@ -75,7 +75,7 @@ def _find_or_build(file: Path) -> CacheEntry | None:
     cache = Cache(file.parents[2])
     built = cache.find(file.parent.name)
     if built is None:
-        raise ToolchainError("its cache entry is gone or was changed; compile the model again")
+        raise bad_cache("its cache entry is gone or was changed; compile the model again")
     manifest = read_manifest(file.parent)
     recipe = manifest["recipe"]
     listed = [file.parent / name for name in sorted(manifest["files"]) if name.startswith("sources/")]

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..errors import ToolchainError
+from ..errors import ToolchainError, bad_cache
 from ..files.ownership import require_trusted
 from .build import Artifact
 from .cache import Cache
@@ -55,7 +55,7 @@ def load_core(artifact: Artifact) -> ModuleType:
             raise
         except Exception as error:  # of the loader, or of the first lines of the module
             Cache(artifact.directory.parents[1]).discard(artifact.key)
-            raise ToolchainError(
+            raise bad_cache(
                 f"the compiled model {artifact.path} cannot be loaded: {error}. It was removed from the cache; compile "
                 "the model again, and use another compiler (CC) if this happens again"
             ) from error

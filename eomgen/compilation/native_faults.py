@@ -30,7 +30,14 @@ def blame_source(error: ToolchainError, functions: Iterable[Function]) -> ModelE
         found = re.findall(said, error.output, re.MULTILINE)
         for line, words in dict(reversed(found)).items():  # the first of each line
             problems.append(
-                Problem(f"functions.{function.name}", f"the compiler says: {words}", REMEDY, file, int(line))
+                Problem(
+                    f"functions.{function.name}",
+                    f"the compiler says: {words}",
+                    REMEDY,
+                    file,
+                    int(line),
+                    code="EG-COMPILER-FAILED",
+                )
             )
     unique = {(p.file, p.line, p.message): p for p in reversed(problems)}  # of functions that share a file, the first
     return ModelError(sorted(unique.values(), key=lambda p: (p.file, p.line))) if problems else None

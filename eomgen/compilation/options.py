@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..errors import UsageError
+from ..errors import ill_typed, no_choice
 from ..numeric.counts import as_count, read_count
 from ..texts import shown
 from .compiler import CompilerInfo
@@ -64,14 +64,14 @@ class Options:
                 continue
             if as_count(given) not in allowed:
                 *but, last = allowed
-                raise UsageError(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(given)}")
+                raise no_choice(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(given)}")
             object.__setattr__(self, name, as_count(given))
         if self.jobs is not None:
             object.__setattr__(self, "jobs", read_count("jobs, files compiled at a time,", self.jobs, 1))
         if not isinstance(self.compiler, str | None):
-            raise UsageError(f"compiler must be a text, the command line of a compiler, not {shown(self.compiler)}")
+            raise ill_typed(f"compiler must be a text, the command line of a compiler, not {shown(self.compiler)}")
         if isinstance(self.extra, str):
-            raise UsageError(f"extra must be a sequence of flags, not the text {self.extra!r}")
+            raise ill_typed(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))
 
 

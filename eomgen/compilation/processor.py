@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 
-from ..errors import UsageError
+from ..errors import no_choice
 
 #: Width -> features, by NumPy's names, without which the file of that width is of no use; the widest first.
 NEEDS: dict[int, tuple[str, ...]] = {8: ("AVX512F", "AVX512VL", "AVX512DQ", "FMA3"), 4: ("AVX2", "FMA3"), 2: ()}
@@ -57,7 +57,7 @@ def choose_lanes(sources: Mapping[str, str], wanted: int | None = None) -> tuple
         A width that only other processors have.
     """
     if wanted in (4, 8) and not _is_x86():
-        raise UsageError(f"lanes must be None, 0 or 2 on {platform.machine()}, not {wanted}")
+        raise no_choice(f"lanes must be None, 0 or 2 on {platform.machine()}, not {wanted}")
     width = lane_width() if wanted is None else wanted
     widths = lane_files(sources)
     kept = {file: text for file, text in sources.items() if widths.get(file, width) == width}

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, UsageError, at_odds, bad_data, cannot
 from ..files.path_names import as_path
 from ..files.reading import open_plain
 from ..files.writing import write_whole
@@ -72,7 +72,7 @@ def require_wheel(target: str) -> None:
     able = [name for name, row in TARGETS.items() if row.module]
     if target not in able:
         about = TARGETS[target].about if target in TARGETS else "package of another kind"
-        raise UsageError(
+        raise cannot(
             f"--wheel is for target {' or '.join(able)}; target {target} makes a {about}: generate it without --wheel"
         )
     _require_setuptools()
@@ -146,13 +146,11 @@ def _read(folder: Path) -> tuple[list[str], str]:
             facts = json.load(file)
         files, target = [str(name) for name in facts["files"]], str(facts["target"])
     except (OSError, ValueError, LookupError, TypeError, RecursionError, UsageError):
-        raise UsageError(
-            f"{folder} is not a generated package; make one by `eomgen generate MODEL --out DIR`"
-        ) from None
+        raise bad_data(f"{folder} is not a generated package; make one by `eomgen generate MODEL --out DIR`") from None
     inside = [name for name in files if not Path(name).is_absolute() and ".." not in Path(name).parts]
     missing = [name for name in files if name not in inside or not (folder / name).is_file()]
     if missing:
-        raise UsageError(f"{folder} lacks files that were generated: {', '.join(missing[:5])}; generate it again")
+        raise bad_data(f"{folder} lacks files that were generated: {', '.join(missing[:5])}; generate it again")
     return files, target
 
 
@@ -172,7 +170,7 @@ def _refuse_native() -> None:
     """Refuse instructions of one processor: a wheel is installed on others, where they would end the program."""
     for name in FLAGS:
         if found := [word for word in NATIVE if word in os.environ.get(name, "").split()]:
-            raise UsageError(
+            raise at_odds(
                 f"the environment variable {name} has {found[0]}, which compiles for the processor of this computer "
                 "alone, and a wheel is for others too; leave it out (code for vectors of every width is in the wheel, "
                 "and the widest that the processor has is chosen when it runs)"

@@ -197,15 +197,21 @@ def _cam(e: Entry) -> CamLift | None:
     if turning is None or follower is None:
         return None
     if turning.name == follower.name:
-        e.fault("follower", f"{follower.name!r} is the cam's own coordinate", "name another")
+        e.fault("follower", f"{follower.name!r} is the cam's own coordinate", "name another", "EG-REFERENCE")
         return None
     for key, found in (("cam", turning), ("follower", follower)):
         if found.kind not in ("angle", "length"):
             message = f"the coordinate {found.name!r} is neither an angle nor a length"
-            e.fault(key, message, "name an angle or a length; with rotation: euler_angles a joint has angles")
+            e.fault(
+                key,
+                message,
+                "name an angle or a length; with rotation: euler_angles a joint has angles",
+                "EG-REFERENCE",
+            )
     if e.values.get("periodic") is True and turning.kind == "length":
         message = f"the cam slides ({turning.name!r} is a length), so its profile has no turn to repeat after"
-        e.fault("periodic", message, "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)")
+        remedy = "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)"
+        e.fault("periodic", message, remedy, "EG-REFERENCE")
     if e.at_fault():
         return None
     lift = _profile(e, "lift", turning.kind == "angle")
@@ -215,13 +221,13 @@ def _cam(e: Entry) -> CamLift | None:
 def _cam_contact(e: Entry) -> Constraint | None:
     shape, axis, follower = e.choice("shape"), e.marker("cam"), e.marker("follower")
     if axis is not None and follower is not None and axis.body == follower.body:
-        e.fault("follower", f"{axis.label} and {follower.label} are on the same body", "name another")
+        e.fault("follower", f"{axis.label} and {follower.label} are on the same body", "name another", "EG-REFERENCE")
     if e.at_fault("shape"):
         return None
     if shape != "roller":
         e.refuse("radius", f"a follower of shape {shape} has no radius")
     elif "radius" not in e.values:
-        e.fault("radius", "is missing", "give the radius of the roller")
+        e.missing("radius", "give the radius of the roller")
     if "support" in e.values and shape != "flat_face":
         e.fault("support", "only a flat face takes a support function", "give the contour r(theta) instead")
     if shape == "knife_edge" or "support" in e.values:

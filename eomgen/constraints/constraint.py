@@ -88,5 +88,6 @@ class Constraint(ABC):
 def on_two_bodies(e: Entry, key: str, a: Marker, b: Marker) -> bool:
     """Whether two markers are on different bodies, which is noted where they are not."""
     if a.body == b.body:
-        e.fault(key, f"{a.label} and {b.label} are on the same body", "choose a marker on another body for one of them")
+        remedy = "choose a marker on another body for one of them"
+        e.fault(key, f"{a.label} and {b.label} are on the same body", remedy, "EG-REFERENCE")
     return a.body != b.body

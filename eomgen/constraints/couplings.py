@@ -76,18 +76,22 @@ def _equation(e: Entry) -> Equation | None:
     for name, meant in used.items():
         if meant.level == 2:
             what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)
-            e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED)
+            e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED, "EG-REFERENCE")
         elif meant.kind in _UNUSABLE:
-            e.fault("equation", f"the {meant.kind} {name!r} cannot be used here", f"{ALLOWED}, {_UNUSABLE[meant.kind]}")
+            e.fault(
+                "equation",
+                f"the {meant.kind} {name!r} cannot be used here",
+                f"{ALLOWED}, {_UNUSABLE[meant.kind]}",
+                "EG-REFERENCE",
+            )
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):
-        e.fault(
-            "equation", "the equation contains no coordinate", f"coordinates are: {', '.join(e.known('coordinate'))}"
-        )
+        remedy = f"coordinates are: {', '.join(e.known('coordinate'))}"
+        e.fault("equation", "the equation contains no coordinate", remedy, "EG-EXPRESSION")
     if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
         message = f"the equation is not linear in {', '.join(rates)}"
-        e.fault("equation", message, "a nonholonomic constraint must be linear in the velocities")
+        e.fault("equation", message, "a nonholonomic constraint must be linear in the velocities", "EG-EXPRESSION")
     kind = "length" if any(meant.measure == "length" for meant in moving) else "angle"
     return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
 

@@ -113,7 +113,7 @@ def _driver(e: Entry) -> Driver | None:
         found = e.coordinate("coordinate")
         if found is not None and found.kind == "parameter":
             message = f"{found.name!r} is an Euler parameter, which cannot move on its own"
-            e.fault("coordinate", message, "drive an angle or markers, or use Euler angles")
+            e.fault("coordinate", message, "drive an angle or markers, or use Euler angles", "EG-REFERENCE")
         return None if found is None else CoordinateDriver(e.name, value, e.symbol(found), found.kind)
     if "marker" in e.values:
         marker, on, axis = e.marker("marker"), e.marker("on"), e.axis("axis")
@@ -134,7 +134,7 @@ def _value(e: Entry) -> Expr:
         kind = e.meaning(name).kind
         if kind not in ("", "time", "parameter", "input"):
             remedy = "a driver's value can contain t, parameters and inputs; a coupling relates coordinates"
-            e.fault("value", f"the {kind} {name!r} cannot be used here", remedy)
+            e.fault("value", f"the {kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")
     called = {graph.nodes[i][0] for i in reachable(graph, [value.id])} & graph.calls.keys()
     for function, orders in (graph.calls[operation] for operation in sorted(called)):
         table_kind = e.table_kind(function.name)
@@ -142,7 +142,7 @@ def _value(e: Entry) -> Expr:
             derived = f"of the derivative of table {function.name!r}"
             what = derived if any(orders) else f"of {table_kind} table {function.name!r}"
             remedy = "use a table of kind cubic, natural or periodic: its curvature is continuous"
-            e.fault("value", f"the acceleration {what} jumps at its points", remedy)
+            e.fault("value", f"the acceleration {what} jumps at its points", remedy, "EG-JUMP")
     return value
 
 

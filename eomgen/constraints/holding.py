@@ -48,7 +48,8 @@ class Hold(Constraint):
 def _hold(e: Entry) -> Constraint | None:
     pair, axes, turning = e.pair(), e.choice("axes"), e.choice("turning")
     if not {"closes", "opens", "closed"} & e.values.keys():
-        e.fault("", "is neither closed nor opened", "give closes, opens or closed; for good a joint holds bodies")
+        remedy = "give closes, opens or closed; for good a joint holds bodies"
+        e.fault("", "is neither closed nor opened", remedy, "EG-MISSING")
     if pair is None or not on_two_bodies(e, "between", *pair):
         return None
     return Hold(e.name, *pair, axes, "" if turning == "none" else turning)

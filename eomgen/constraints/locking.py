@@ -28,7 +28,8 @@ class Lock(Constraint):
 def _lock(e: Entry) -> Constraint | None:
     velocities = e.velocities("joint")
     if not {"closes", "opens", "closed"} & e.values.keys():
-        e.fault("", "is neither closed nor opened", "give closes, opens or closed; for good use a joint of type weld")
+        remedy = "give closes, opens or closed; for good use a joint of type weld"
+        e.fault("", "is neither closed nor opened", remedy, "EG-MISSING")
     return None if velocities is None else Lock(e.name, velocities)
 
 

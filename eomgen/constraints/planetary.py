@@ -96,17 +96,19 @@ def _planetary(e: Entry) -> Planetary | None:
     parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
     for part in ("sun", "ring"):
         if part in parts and part not in sizes:
-            e.fault(key, f"the {part} has a joint but no size", f"give {key} of the {part}")
+            e.fault(key, f"the {part} has a joint but no size", f"give {key} of the {part}", "EG-MISSING")
     main = [parts[part] for part in ("sun", "ring", "carrier") if part in parts]
     for other in main[1:]:
         e.require_one_carrier("", main[0], other)
     outer = {"sun", "ring"} & sizes.keys()
     if not outer or ("planet" not in parts and len(outer) < 2):
-        e.fault(key, "these wheels do not determine a ratio", "give sun and ring, or planet and one more")
+        e.fault(key, "these wheels do not determine a ratio", "give sun and ring, or planet and one more", "EG-MISSING")
     if "planet" in parts and len(sizes) < 2:
-        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(WHEELS)}")
+        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(WHEELS)}", "EG-MISSING")
     if len(parts) < (2 if "planet" in parts else 1) or not main:
-        e.fault("", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet")
+        e.fault(
+            "", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet", "EG-MISSING"
+        )
     if e.at_fault():
         return None
     sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
@@ -124,7 +126,7 @@ def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
     if base == e.carrier(parts["carrier"]):
         return planet - carrier
     message = f"{parts['planet'].name!r} is measured neither from the carrier nor from the frame"
-    e.fault("planet", message, "make the carrier or the frame the predecessor of the planet's joint")
+    e.fault("planet", message, "make the carrier or the frame the predecessor of the planet's joint", "EG-REFERENCE")
     return None
 
 

@@ -31,7 +31,7 @@ def _rolling(e: Entry) -> Constraint | None:
             e.refuse(key, f"only {' and '.join(_NAMES[one] for one in shapes)} have it")
     needed = _NEEDED.get(shape)
     if needed is not None and needed not in e.values:
-        e.fault(needed, "is missing", f"needed where shape is {shape}")
+        e.missing(needed, f"needed where shape is {shape}")
     if wheel is None or plane is None or e.at_fault() or not on_two_bodies(e, "plane", wheel, plane):
         return None
     if shape == "sphere":

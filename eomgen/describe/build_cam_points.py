@@ -28,7 +28,7 @@ class Contacts:
         graph, name = reader.graph, f"{entry.name}_contact"
         if name in reader.bodies:
             message = f"the contact point needs a body named {name!r}, and there is one already"
-            reader.faults.add(entry.path, message, "rename one of them")
+            reader.faults.add(entry.path, message, "rename one of them", "EG-NAME-TAKEN")
             return None
         o = vec.zero(graph)
         point = Marker(index, Frame(reader.identity, o), name)

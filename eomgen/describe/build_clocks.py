@@ -77,7 +77,7 @@ def _times(reader: Reader, timing: Timing) -> tuple[Expr, Expr]:
     for entry in timing.entries:
         path, given = f"{entry.path}.period", entry.values.get("period")
         if given is None:
-            reader.faults.add(path, "is missing", "give the time from one sampling time to the next, in s")
+            reader.faults.missing(path, "give the time from one sampling time to the next, in s")
         period = reader.stand_in if given is None else reader.expression(path, given)
         if given is not None:
             remedy = "give the time between samples, in s"

@@ -35,20 +35,17 @@ def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str,
         reader.wrong(PATH, given, "table")
         return {}
     if has_others:
-        faults.add(
-            PATH,
-            "the model has bodies, joints or a Lagrangian too",
-            "describe only one: bodies, a Lagrangian, equations",
-        )
+        remedy = "describe only one: bodies, a Lagrangian, equations"
+        faults.add(PATH, "the model has bodies, joints or a Lagrangian too", remedy, "EG-CONFLICT")
     check_keys(PATH, given, EQUATIONS, faults)
     values = dict(given)
     q = values["coordinates"] = _names(reader, values, "coordinates", ())
     v = values["velocities"] = _names(reader, values, "velocities", [f"{name}_dot" for name in q])
     values["multipliers"] = _names(reader, values, "multipliers", ())
     if not q and "coordinates" in given:
-        faults.add(f"{PATH}.coordinates", "there are no coordinates", "name at least one")
+        faults.add(f"{PATH}.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
     if not v and q:
-        faults.add(f"{PATH}.velocities", "there are no velocities", "name at least one")
+        faults.add(f"{PATH}.velocities", "there are no velocities", "name at least one", "EG-MISSING")
     for k, name in enumerate(q):  # the rate of one that no velocity is follows from the velocities
         kind = "coordinate" if f"{name}_dot" in v else "parameter of rotation"
         reader.names.declare(kind, name, f"{PATH}.coordinates[{k}]")
@@ -88,10 +85,10 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     for name, part in parts.items():
         fault = fault_of_name(name, symbol=True)
         if fault:
-            faults.add(f"{PATH}.intermediates.{name}", *fault)
+            faults.add(f"{PATH}.intermediates.{name}", *fault, "EG-NAME-FORM")
         elif name in reader.names.kinds:
             message = f"the name is already used by the {reader.names.kinds[name]}"
-            faults.add(f"{PATH}.intermediates.{name}", message, "rename one")
+            faults.add(f"{PATH}.intermediates.{name}", message, "rename one", "EG-NAME-TAKEN")
         local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
     rates = _rates(reader, values.get("rates"), q, v, local)
     derived = {f"{name}_dot": rate for name, rate in zip(q, rates, strict=True) if f"{name}_dot" not in v}
@@ -108,7 +105,9 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
             reader.wrong(path, given, "expressions")
             return ()
         if size is not None and len(parts) != size and key in values:
-            faults.add(path, f"{len(parts)} expressions for {size} velocities", "give one for each, in order")
+            faults.add(
+                path, f"{len(parts)} expressions for {size} velocities", "give one for each, in order", "EG-SHAPE"
+            )
         return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(parts))
 
     rows: list[tuple[Expr, ...]] = []
@@ -123,17 +122,23 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     if "mass_matrix" in values and {len(rows), *map(len, rows)} != {len(v)}:
         if not faults.under(f"{PATH}.mass_matrix"):
             shape = f"{len(rows)} x {max(map(len, rows), default=0)}"
-            faults.add(f"{PATH}.mass_matrix", f"is {shape} for {len(v)} velocities", f"give {len(v)} rows of {len(v)}")
+            remedy = f"give {len(v)} rows of {len(v)}"
+            faults.add(f"{PATH}.mass_matrix", f"is {shape} for {len(v)} velocities", remedy, "EG-SHAPE")
     elif not faults.under(f"{PATH}.mass_matrix"):
         _check_mass_matrix(reader, rows, v)
     constraints = listed("constraints", None)
     for k, constraint in enumerate(constraints):
         _check_linear(reader, f"{PATH}.constraints[{k}]", constraint, v)
         if constraint.is_zero:
-            faults.add(f"{PATH}.constraints[{k}]", "is 0 for every motion, so it constrains nothing", "leave it out")
+            faults.add(
+                f"{PATH}.constraints[{k}]",
+                "is 0 for every motion, so it constrains nothing",
+                "leave it out",
+                "EG-REDUNDANT",
+            )
     if named and len(named) != len(constraints):
         message = f"{len(named)} names for {len(constraints)} constraints"
-        faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order")
+        faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order", "EG-SHAPE")
     kinetic, potential = (read(f"{PATH}.{key}", values.get(key, 0)) for key in ("kinetic_energy", "potential_energy"))
     forcing = listed("forcing", len(v))
     return GivenEquations(
@@ -148,7 +153,7 @@ def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faul
     for output in outputs:
         for name in sorted(symbols_of([output.expression]) & {f"{energy}()" for energy in ENERGIES}):
             message = f"{name.removesuffix('()')} is not known, because the equations are given without kinetic_energy"
-            faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy")
+            faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy", "EG-MISSING")
 
 
 def _rates(
@@ -158,7 +163,9 @@ def _rates(
     path, faults = f"{PATH}.rates", reader.faults
     if given is None:
         if len(q) != len(v):
-            faults.add(path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate")
+            faults.add(
+                path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate", "EG-SHAPE"
+            )
         symbols = [reader.graph.symbol(name) for name in v[: len(q)]]
         return (*symbols, *(reader.stand_in,) * (len(q) - len(symbols)))
     if not isinstance(given, Mapping):
@@ -167,16 +174,19 @@ def _rates(
     named = {name_of(key): value for key, value in given.items()}
     for name in named:
         if name not in q:
-            faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", nearest(shown(name), q, "coordinates"))
+            remedy = nearest(shown(name), q, "coordinates")
+            faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
     result = []
     own = {f"{name}_dot" for name in q} - set(v)
     for name in q:
         value: Any = named.get(name, f"{name}_dot" if f"{name}_dot" in v else None)
         if value is None:
-            faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}")
+            faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}", "EG-MISSING")
         rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION, local)
         if not symbols_of([rate]).isdisjoint(own):
-            faults.add(f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}")
+            faults.add(
+                f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}", "EG-EXPRESSION"
+            )
         _check_linear(reader, f"{path}.{name}", rate, v)
         result.append(rate)
     return tuple(result)
@@ -187,7 +197,7 @@ def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str])
         return
     slopes = jacobian([expression], [reader.graph.symbol(name) for name in v])
     if not symbols_of(list(slopes.values())).isdisjoint(v):
-        reader.faults.add(path, "is not linear in the velocities", LINEAR)
+        reader.faults.add(path, "is not linear in the velocities", LINEAR, "EG-EXPRESSION")
 
 
 def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequence[str]) -> None:
@@ -196,7 +206,9 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
     used = symbols_of(flat)
     moving = sorted(used & set(v))
     if moving:
-        reader.faults.add(f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters")
+        reader.faults.add(
+            f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters", "EG-EXPRESSION"
+        )
         return
     n = len(rows)
     values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
@@ -207,7 +219,6 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
             gap = abs(numbers[i * n + j] - numbers[j * n + i])
             if gap > TENSOR * size:  # false where an entry is not finite there
                 message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
-                reader.faults.add(
-                    f"{PATH}.mass_matrix", message, "give the symmetric M of M v' = f, where f contains all forces"
-                )
+                remedy = "give the symmetric M of M v' = f, where f contains all forces"
+                reader.faults.add(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
                 return

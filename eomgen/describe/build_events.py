@@ -32,23 +32,20 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         expression = instant(reader, f"{path}.expression", values["expression"])
     direction = values.get("direction", 0)
     if not is_number(direction) or direction not in (-1, 0, 1):
-        reader.faults.add(
-            f"{path}.direction",
-            f"{direction!r} is not 1, -1 or 0",
-            "give 1 for a rising, -1 for a falling value, 0 for both",
-        )
+        remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
+        reader.faults.add(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
         direction = 0
     reset = _reset(reader, f"{path}.reset", {} if values.get("reset") is None else values["reset"])
     restitution = None
     if values.get("restitution") is not None:
         restitution = reader.number(f"{path}.restitution", values["restitution"])
         if restitution is not None and not 0.0 <= restitution <= 1.0:
-            reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1")
+            reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1", code="EG-RANGE")
         if reset:
-            reader.faults.add(f"{path}.reset", "is given beside a restitution", "give one of the two")
+            reader.faults.add(f"{path}.reset", "is given beside a restitution", "give one of the two", "EG-CONFLICT")
         if direction == 1:
             message = "with a restitution only a falling value (a gap that closes) is an impact"
-            reader.faults.add(f"{path}.direction", message, "give -1, or leave it out")
+            reader.faults.add(f"{path}.direction", message, "give -1, or leave it out", "EG-EVENT")
         direction = -1
     doc = reader.text(f"{path}.doc", values.get("doc", ""))
     terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
@@ -64,15 +61,17 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     if values.get("restitution") is None:
         what = "friction" if given is not None else "slip"
         remedy = "give the restitution of the impact, from 0 to 1"
-        reader.faults.add(f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy)
+        reader.faults.add(
+            f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy, "EG-MISSING"
+        )
     if given is None or slip is None:
         missing, there = ("slip", "friction") if slip is None else ("friction", "slip")
         remedy = "slip: the output that is the sliding velocity" if slip is None else "friction: the coefficient"
-        reader.faults.add(f"{path}.{there}", f"is given without {missing}", f"give {remedy}")
+        reader.faults.add(f"{path}.{there}", f"is given without {missing}", f"give {remedy}", "EG-MISSING")
         return None, ()
     friction = reader.number(f"{path}.friction", given)
     if friction is not None and not friction >= 0.0:
-        reader.faults.add(f"{path}.friction", f"{friction:g} is negative", "give 0 or more")
+        reader.faults.add(f"{path}.friction", f"{friction:g} is negative", "give 0 or more", "EG-RANGE")
     names = [slip] if isinstance(slip, str) else items(slip)
     outputs = [*reader.names.of("output")]
     if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
@@ -81,10 +80,10 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     for name in names:
         if name not in outputs:
             remedy = nearest(name, outputs, "outputs")
-            reader.faults.add(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy)
+            reader.faults.add(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy, "EG-NAME-UNKNOWN")
         elif (unit := reader.units.get(f"outputs.{name}")) is not None and unit.size != 1.0:
             reader.faults.add(
-                f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit"
+                f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit", "EG-UNIT"
             )
     return friction, tuple(names)
 
@@ -109,10 +108,14 @@ def check_resets(
             path = f"events.{event.name}.reset.{name}"
             if name in counters:
                 remedy = f"reset {', '.join(counters[name])}, or declare them with another period or offset"
-                reader.faults.add(path, f"{name!r} counts samples, and a sample would be missed or come twice", remedy)
+                reader.faults.add(
+                    path, f"{name!r} counts samples, and a sample would be missed or come twice", remedy, "EG-EVENT"
+                )
             elif name in closed and value.value not in (0.0, 1.0):
                 remedy = "give 1 to close the constraint, 0 to open it"
-                reader.faults.add(path, f"{name!r} is 1 while the constraint is closed and 0 while it is open", remedy)
+                reader.faults.add(
+                    path, f"{name!r} is 1 while the constraint is closed and 0 while it is open", remedy, "EG-EVENT"
+                )
 
 
 def instant(reader: Reader, path: str, value: Any) -> Expr:
@@ -122,7 +125,7 @@ def instant(reader: Reader, path: str, value: Any) -> Expr:
         remedy = (
             "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
         )
-        reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
+        reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy, "EG-REFERENCE")
     return expression
 
 
@@ -138,5 +141,7 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
         else:
             states = bool(reader.description.sections["states"])
             remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
-            reader.faults.add(f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy)
+            reader.faults.add(
+                f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy, "EG-NAME-UNKNOWN"
+            )
     return tuple(result)

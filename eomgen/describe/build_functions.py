@@ -28,7 +28,7 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
     for entry in entries:
         if isinstance(entry.name, str) and entry.name in QUANTITIES:
             message = f"{entry.name!r} is a built-in name for the motion of a marker"
-            reader.faults.add(entry.path, message, "choose another name")
+            reader.faults.add(entry.path, message, "choose another name", "EG-NAME-TAKEN")
         reader.names.declare("function", entry.name, entry.path)
         function = None if reader.faults.under(entry.path) else _build(reader, entry)
         if function is None:
@@ -48,7 +48,7 @@ def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     given = entry.values.get("type")
     if not isinstance(given, str) or given not in FUNCTION:
         message = "is missing" if given is None else f"no function of type {given!r}"
-        faults.add(f"{path}.type", message, nearest(str(given), FUNCTION, "types"))
+        faults.add(f"{path}.type", message, nearest(str(given), FUNCTION, "types"), "EG-CHOICE")
         return None
     check_keys(path, entry.values, function_fields(given), faults)
     if faults.under(path):
@@ -73,9 +73,8 @@ def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) 
         return None
     if surface:
         if kind not in ("cubic", "natural"):
-            faults.add(
-                f"{path}.kind", f"{kind!r} is not available for tables of two arguments", "allowed: cubic, natural"
-            )
+            message = f"{kind!r} is not available for tables of two arguments"
+            faults.add(f"{path}.kind", message, "allowed: cubic, natural", "EG-UNSUPPORTED")
         z = _grid(reader, f"{path}.z", values["z"], len(x), len(y))
         if z is None or faults.under(path):
             return None
@@ -84,17 +83,17 @@ def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) 
         function = Function(name, 2, Surface(x, y, nodes, float(beyond == "linear")))
         return _finite(reader, path, function, nodes)
     if len(y) != len(x):
-        faults.add(f"{path}.y", f"has {len(y)} values for {len(x)} points", "give one for each x")
+        faults.add(f"{path}.y", f"has {len(y)} values for {len(x)} points", "give one for each x", "EG-SHAPE")
     elif kind == "periodic":
         if len(x) < 3:
-            faults.add(
-                f"{path}.x",
-                "has fewer than three points",
-                "a periodic table needs three or more, of which the last repeats the first",
-            )
+            remedy = "a periodic table needs three or more, of which the last repeats the first"
+            faults.add(f"{path}.x", "has fewer than three points", remedy, "EG-SHAPE")
         elif abs(y[-1] - y[0]) > PERIODIC * np.max(np.abs(y)):
             faults.add(
-                f"{path}.y", f"ends with {y[-1]:g} and begins with {y[0]:g}", "make the two values of a period equal"
+                f"{path}.y",
+                f"ends with {y[-1]:g} and begins with {y[0]:g}",
+                "make the two values of a period equal",
+                "EG-CONTRADICTION",
             )
         y[-1] = y[0]
     if faults.under(path):
@@ -109,7 +108,7 @@ def _finite(reader: Reader, path: str, function: Function, numbers: Array) -> Fu
     """The function, unless its slopes are too large for doubles."""
     if np.isfinite(numbers).all():
         return function
-    reader.faults.add(path, "is too steep for double precision", "scale its values or its points")
+    reader.faults.add(path, "is too steep for double precision", "scale its values or its points", "EG-RANGE")
     return None
 
 
@@ -125,15 +124,19 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
     if x is None:
         return None
     if len(x) < 2:
-        reader.faults.add(path, "has fewer than two points", "give two or more")
+        reader.faults.add(path, "has fewer than two points", "give two or more", "EG-SHAPE")
         return None
     steps = np.diff(x)
     if not (steps > 0.0).all():
         k = int(np.argmax(~(steps > 0.0)))
-        reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table must increase")
+        reader.faults.add(
+            f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table must increase", "EG-RANGE"
+        )
         return None
     if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
-        reader.faults.add(path, "has points too close together, or too far apart, for double precision")
+        reader.faults.add(
+            path, "has points too close together, or too far apart, for double precision", code="EG-RANGE"
+        )
         return None
     return x
 
@@ -145,7 +148,7 @@ def _numbers(reader: Reader, path: str, given: Any) -> Array | None:
         reader.wrong(path, given, "numbers")
         return None
     if len(listed) > POINTS:
-        reader.faults.add(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points")
+        reader.faults.add(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points", "EG-TOO-LARGE")
         return None
     read = [
         float(x) if is_number(x) and -1e300 < x < 1e300 else reader.number(f"{path}[{k}]", x)
@@ -162,14 +165,16 @@ def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | 
         reader.wrong(path, given, "grid")
         return None
     if len(rows) != n_x:
-        reader.faults.add(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x")
+        reader.faults.add(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x", "EG-SHAPE")
         return None
     if n_x * n_y > POINTS:
-        reader.faults.add(path, f"has {n_x * n_y} points", f"a table has at most {POINTS}")
+        reader.faults.add(path, f"has {n_x * n_y} points", f"a table has at most {POINTS}", "EG-TOO-LARGE")
         return None
     read = [_numbers(reader, f"{path}[{k}]", row) for k, row in enumerate(rows)]
     for k, row in enumerate(read):
         if row is not None and len(row) != n_y:
-            reader.faults.add(f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y")
+            reader.faults.add(
+                f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y", "EG-SHAPE"
+            )
     found = [row for row in read if row is not None and len(row) == n_y]
     return np.array(found) if len(found) == n_x else None

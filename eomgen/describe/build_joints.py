@@ -77,7 +77,7 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
         if len(names) != count:
             remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
             plural = "" if len(names) == 1 else "s"
-            reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy)
+            reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy, "EG-SHAPE")
         for k, name in enumerate(names):
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
@@ -104,16 +104,13 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
         if "axes" in values:
             if "axis" in values:
-                reader.faults.add(f"{path}.axes", "axis is given too", "leave out one of them")
+                reader.faults.add(f"{path}.axes", "axis is given too", "leave out one of them", "EG-CONFLICT")
             columns = reader.axes(f"{path}.axes", values["axes"])
         if pair is None:
             continue
         if pair[0].body == pair[1].body:
-            reader.faults.add(
-                f"{path}.between",
-                f"{pair[0].label} and {pair[1].label} are on the same body",
-                "connect two bodies, or a body and ground",
-            )
+            message = f"{pair[0].label} and {pair[1].label} are on the same body"
+            reader.faults.add(f"{path}.between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
             continue
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
@@ -146,9 +143,11 @@ def _type(reader: Reader, entry: DescribedEntry) -> str | None:
     if isinstance(given, str) and given in JOINTS:
         return given
     if given is None:
-        reader.faults.add(path, "is missing", f"give one of {', '.join(JOINTS)}")
+        reader.faults.missing(path, f"give one of {', '.join(JOINTS)}")
     else:
-        reader.faults.add(path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"))
+        reader.faults.add(
+            path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"), "EG-CHOICE"
+        )
     return None
 
 
@@ -161,12 +160,14 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             elsewhere = key in others
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
             remedy = IN_PLACE_OF_JOINTS if key in SWITCHING else unknown_key(key, fields)
-            reader.faults.add(f"{entry.path}.{key}", message, remedy)
+            reader.faults.add(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in entry.values and key != "type":
-            reader.faults.add(f"{entry.path}.{key}", "is missing", f"give {KINDS[field.kind]}")
+            reader.faults.missing(f"{entry.path}.{key}", f"give {KINDS[field.kind]}")
     if {"coordinate", "coordinates"} <= entry.values.keys():
-        reader.faults.add(f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them")
+        reader.faults.add(
+            f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT"
+        )
     kind = JOINTS[type_name]
     options: dict[str, Any] = {}
     for option in kind.options:
@@ -176,7 +177,7 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             options[option] = _option(reader, f"{entry.path}.{option}", entry.values[option], fields[option])
     if options.get("rotation") == "euler_parameters" and "sequence" in options:
         remedy = "leave out sequence, or choose rotation: euler_angles"
-        reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy)
+        reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
     return kind(**options)
 
 
@@ -218,7 +219,11 @@ def _shape(reader: Reader, path: str, value: Any, field: Field, own: tuple[str, 
     for name in sorted(symbols_of(point) - allowed):
         if name in reader.names.kinds:
             kind = reader.names.kinds[name]
-            reader.faults.add(path, f"the {kind} {name!r} cannot be used here", f"allowed are parameters and {shown}")
+            reader.faults.add(
+                path, f"the {kind} {name!r} cannot be used here", f"allowed are parameters and {shown}", "EG-REFERENCE"
+            )
     if not symbols_of(point) & set(own) and not reader.faults.under(path):
-        reader.faults.add(path, f"does not depend on {shown}", f"use the joint's own {shown} in the expressions")
+        reader.faults.add(
+            path, f"does not depend on {shown}", f"use the joint's own {shown} in the expressions", "EG-EXPRESSION"
+        )
     return Shape(point, tuple(reader.graph.symbol(name) for name in own))

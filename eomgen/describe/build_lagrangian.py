@@ -28,9 +28,8 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
         reader.wrong("lagrangian", given, "table")
         return {}
     if has_bodies:
-        faults.add(
-            "lagrangian", "the model has bodies or joints too", "describe only one of them: bodies or a Lagrangian"
-        )
+        remedy = "describe only one of them: bodies or a Lagrangian"
+        faults.add("lagrangian", "the model has bodies or joints too", remedy, "EG-CONFLICT")
     check_keys("lagrangian", given, LAGRANGIAN, faults)
     values = dict(given)
     listed = items(values.get("coordinates", ()))
@@ -38,7 +37,7 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
         reader.wrong("lagrangian.coordinates", given["coordinates"], "names")
         listed = []
     elif not listed and "coordinates" in given:
-        faults.add("lagrangian.coordinates", "there are no coordinates", "name at least one")
+        faults.add("lagrangian.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
     values["coordinates"] = [name_of(q) for q in listed]
     for k, name in enumerate(values["coordinates"]):
         reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
@@ -89,6 +88,7 @@ def _require_quadratic(reader: Reader, path: str, expression: Expr, names: list[
             "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), with all products expanded; for "
             "another kind of Lagrangian give the equations of motion: `equations:` of a model file, with mass_matrix "
             "1 and the accelerations as forcing",
+            "EG-EXPRESSION",
         )
 
 
@@ -100,7 +100,7 @@ def _constraint(reader: Reader, path: str, given: Any, names: list[str]) -> Expr
         slopes = jacobian([expression], list(rates.values()))
         if not symbols_of(list(slopes.values())).isdisjoint(rates):
             remedy = "write it as a sum of terms a(q, t)*q_dot and b(q, t), with each velocity to the first power"
-            reader.faults.add(path, "is not linear in the velocities", remedy)
+            reader.faults.add(path, "is not linear in the velocities", remedy, "EG-EXPRESSION")
     return expression
 
 
@@ -110,9 +110,8 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     if isinstance(given, Mapping):
         for name, value in in_order(given, names):
             if name not in result:
-                reader.faults.add(
-                    f"{path}.{name}", f"no coordinate {quoted(name)}", nearest(shown(name), names, "coordinates")
-                )
+                remedy = nearest(shown(name), names, "coordinates")
+                reader.faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result.values())
@@ -120,7 +119,9 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     if listed is None:
         reader.wrong(path, given, "forces")
     elif listed and len(listed) != len(names):
-        reader.faults.add(path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order")
+        reader.faults.add(
+            path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order", "EG-SHAPE"
+        )
     elif listed:
         return tuple(reader.expression(f"{path}[{k}]", value, MOTION) for k, value in enumerate(listed))
     return tuple(result.values())

@@ -74,10 +74,10 @@ def build(description: Description) -> Mechanism:
     name = values.get("name")
     fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
     if fault:
-        faults.add("name", *fault)
+        faults.add("name", *fault, "EG-MISSING" if name is None else "EG-NAME-FORM")
     if values.get("attachments"):
         remedy = "add this model to that one as a component, which gives a marker for each attachment"
-        faults.add("attachments", "attachments stand for markers of another model", remedy)
+        faults.add("attachments", "attachments stand for markers of another model", remedy, "EG-CONFLICT")
     parameters = tuple(read_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
     reader.requirements.declare({p.name: p.value for p in parameters})
@@ -123,7 +123,7 @@ def build(description: Description) -> Mechanism:
     check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
-        faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
+        faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian", "EG-MISSING")
     _check_mass(reader, bodies)
     negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
     check_turns(constraints, reader.requirements)
@@ -190,7 +190,9 @@ def build(description: Description) -> Mechanism:
 def _limits_told(reader: Reader, given: Any) -> bool:
     if given == "stop":
         remedy = "add a force of type stop for each joint; allowed here: note, off"
-        reader.faults.add("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy)
+        reader.faults.add(
+            "limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE"
+        )
         return True
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
@@ -237,7 +239,7 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
     if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
         what = ", ".join(name.removesuffix("()") for name in asked)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
-        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
+        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
 
 def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
@@ -267,12 +269,13 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
         if name in known and known[name].is_rigid and not on:
             told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
-            reader.faults.add(path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies")
+            reader.faults.add(
+                path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED"
+            )
         elif quantity != "power" and not on and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
-            reader.faults.add(
-                path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of single contacts"
-            )
+            message = f"{name!r} does not act along a path"
+            reader.faults.add(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
@@ -291,7 +294,7 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
             _check_place(reader, path, *place)
         else:
             remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
-            reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy)
+            reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
     return result
 
 
@@ -300,10 +303,12 @@ def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
     marker = reader.markers.get(label)
     if marker is None:
         named = [known for known, marker in reader.markers.items() if marker.body != GROUND]
-        reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"))
+        reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"), "EG-NAME-UNKNOWN")
     elif marker.body == GROUND:
         kind = "velocity" if what.startswith("v") else "position"
-        reader.faults.add(path, f"is a {kind} on the ground, which does not move", "name a marker of another body")
+        reader.faults.add(
+            path, f"is a {kind} on the ground, which does not move", "name a marker of another body", "EG-REFERENCE"
+        )
 
 
 def _listed(words: Sequence[str], last: str) -> str:
@@ -325,11 +330,12 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known and name not in rates:
-            reader.faults.add(
-                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
-            )
+            remedy = nearest(shown(name), known, "coordinates")
+            reader.faults.add(f"independent[{k}]", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
         elif name in result:
-            reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
+            reader.faults.add(
+                f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once", "EG-CONFLICT"
+            )
         else:
             result.append(name)
     return tuple(result)
@@ -352,5 +358,5 @@ def _simulation(reader: Reader, given: Any) -> Simulation:
     if (settings.get("method") in FIXED_STEP) != ("step" in settings):
         remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
         told = "only methods RK4 and moreau take steps of one size, and they need their size"
-        reader.faults.add("simulation.step", told, remedy)
+        reader.faults.add("simulation.step", told, remedy, "EG-CONFLICT")
     return Simulation(**settings)

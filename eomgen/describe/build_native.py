@@ -44,6 +44,7 @@ def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
             "is native code, and native code of model files is not allowed in this call",
             f"read {values['source']!r} and, if you trust it, use --allow-native (in Python load(path, "
             "allow_native=True))",
+            "EG-REFUSED",
         )
         return None
     arity = _arity(reader, path, values)
@@ -67,22 +68,23 @@ def _check_signature(reader: Reader, path: str, name: str, arity: int, source: t
     one = "double " + name + "(" + ", ".join(["double"] * arity) + ")"
     if found is None:
         if not re.search(rf"\b{name}\b", text):
-            reader.faults.add(
-                f"{path}.source", f"{file} has no function {name!r}", "it must be a C function double f(double, ...)"
-            )
+            remedy = "it must be a C function double f(double, ...)"
+            reader.faults.add(f"{path}.source", f"{file} has no function {name!r}", remedy, "EG-NAME-UNKNOWN")
     elif found.foreign:
         message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is not double"
-        reader.faults.add(f"{path}.source", message, f"write {one}")
+        reader.faults.add(f"{path}.source", message, f"write {one}", "EG-TYPE")
     elif found.arguments != arity:
         message = f"{name} in {file}:{found.line} takes {found.arguments} arguments, not the {arity} declared"
-        reader.faults.add(f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}")
+        reader.faults.add(
+            f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}", "EG-SHAPE"
+        )
 
 
 def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:
     listed = items(values.get("derivatives"))
     given = values.get("arguments", len(listed) if listed else 1)
     if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= ARGUMENTS:
-        reader.faults.add(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}")
+        reader.faults.add(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}", "EG-SHAPE")
         return None
     return given
 
@@ -99,11 +101,13 @@ def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orde
     for place, _, name in wanted:
         fault = fault_of_name(name, symbol=True)
         if fault:
-            reader.faults.add(place, *fault)
+            reader.faults.add(place, *fault, "EG-NAME-FORM")
     if reader.faults.under(path):
         return None
     if len({name for _, _, name in wanted}) < len(wanted):
-        reader.faults.add(path, "names one C function twice", "name a different C function for each derivative")
+        reader.faults.add(
+            path, "names one C function twice", "name a different C function for each derivative", "EG-CONFLICT"
+        )
     return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
 
 
@@ -116,7 +120,7 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
         return []
     if len(listed) != length:
         what = f"with that many arguments it needs {length}, null where the source has none"
-        reader.faults.add(path, f"has {len(listed)} entries", what)
+        reader.faults.add(path, f"has {len(listed)} entries", what, "EG-SHAPE")
         return []
     return listed
 
@@ -131,15 +135,17 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
         with open_plain(file) as stream:
             data = stream.read(SIZE + 1)
         if len(data) > SIZE:
-            reader.faults.add(path, f"{file} is too large", f"at most {SIZE} bytes")
+            reader.faults.add(path, f"{file} is too large", f"at most {SIZE} bytes", "EG-TOO-LARGE")
             return None
         return file.name, data.decode("utf-8-sig").replace("\r\n", "\n")
     except OSError as error:
-        reader.faults.add(path, f"{file} cannot be read ({error.strerror})", "paths are relative to the model file")
+        reader.faults.add(
+            path, f"{file} cannot be read ({error.strerror})", "paths are relative to the model file", "EG-FILE"
+        )
     except UnicodeDecodeError:
-        reader.faults.add(path, f"{file} is not UTF-8 text", "save it as UTF-8")
+        reader.faults.add(path, f"{file} is not UTF-8 text", "save it as UTF-8", "EG-FILE-DAMAGED")
     except UsageError as error:
-        reader.faults.add(path, str(error))
+        reader.faults.add(path, str(error), code=error.code)
     return None
 
 
@@ -157,7 +163,7 @@ def _twin(
             listed = _listed(reader, f"{entry.path}.python_{key}", getattr(given, key) or None, len(every))
             functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
         if not all(callable(f) for f in functions.values()):
-            reader.faults.add(path, "is not a function", "give callables, or the path of a Python file")
+            reader.faults.add(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
             return None, ""
         return Twin(functions), ""
     source = _read(reader, path, given, entry.folder)
@@ -170,14 +176,11 @@ def _twin(
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
     except Exception as error:  # whatever the file of the user raises
-        reader.faults.add(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}")
+        reader.faults.add(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}", code="EG-FILE")
         return None, ""
     missing = [name for _, name in names if not callable(getattr(module, name, None))]
     if missing:
-        reader.faults.add(
-            path,
-            f"{source[0]} has no function {', '.join(missing)}",
-            "its functions must have the names of the C functions",
-        )
+        remedy = "its functions must have the names of the C functions"
+        reader.faults.add(path, f"{source[0]} has no function {', '.join(missing)}", remedy, "EG-NAME-UNKNOWN")
         return None, ""
     return Twin({orders: getattr(module, name) for orders, name in names}), source[1]

@@ -31,7 +31,7 @@ def read_described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tup
     try:
         unit = read_unit(text)
     except UnitError as error:
-        reader.faults.add(f"{entry.path}.unit", str(error), error.remedy)
+        reader.faults.add(f"{entry.path}.unit", str(error), error.remedy, "EG-UNIT")
         return Unit(NONE), doc
     if text:
         reader.units[entry.path] = unit
@@ -45,7 +45,9 @@ def in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float |
     found = value * unit.size
     if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
         remedy = "check the value and its unit"
-        reader.faults.add(path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy)
+        reader.faults.add(
+            path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy, "EG-UNIT"
+        )
         return None
     return found
 
@@ -76,11 +78,12 @@ def with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
     expression = reader.expression(path, entry.values["signal"], MOTION)
     for name in sorted(symbols_of([expression])):
         if reader.names.kinds.get(name) == "input":
-            reader.faults.add(
-                path, f"the input {name!r} cannot be used here", "allowed are t, coordinates, velocities and parameters"
-            )
+            remedy = "allowed are t, coordinates, velocities and parameters"
+            reader.faults.add(path, f"the input {name!r} cannot be used here", remedy, "EG-REFERENCE")
     if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
-        reader.faults.add(path, "a function of the model cannot be used here", "write out its expression")
+        reader.faults.add(
+            path, "a function of the model cannot be used here", "write out its expression", "EG-REFERENCE"
+        )
     return replace(given, signal=expression)
 
 
@@ -99,7 +102,7 @@ class Outputs:
         for k, entry in enumerate(entries):
             kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
             if entry.name in self._places:
-                reader.faults.add(entry.path, "the name is given to two outputs", "rename one")
+                reader.faults.add(entry.path, "the name is given to two outputs", "rename one", "EG-NAME-TAKEN")
             elif kind not in _REPEATED:
                 reader.names.declare("output", entry.name, entry.path)
             if isinstance(entry.name, str):
@@ -118,7 +121,7 @@ class Outputs:
         if k in self._open:
             round_trip = [*self._open[self._open.index(k) :], k]
             message = f"depends on itself: {' -> '.join(str(self._entries[i].name) for i in round_trip)}"
-            self._reader.faults.add(self._entries[k].path, message, "write one of them without the others")
+            self._reader.faults.add(self._entries[k].path, message, "write one of them without the others", "EG-CIRCLE")
             return Output(str(self._entries[k].name), self._reader.stand_in), self._reader.stand_in
         if k not in self._read:
             self._open.append(k)
@@ -134,14 +137,15 @@ class Outputs:
             expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
         if unit.size != 1.0 and expression.value is not None:
             remedy = "use a parameter with a unit"
-            faults.add(f"{path}.unit", "the expression is a number whose unit is not known", remedy)
+            faults.add(f"{path}.unit", "the expression is a number whose unit is not known", remedy, "EG-UNIT")
         kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
         if kind in _REPEATED:
             if expression != reader.graph.symbol(entry.name):
-                faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
+                message = f"{entry.name!r} is a {kind}"
+                faults.add(path, message, f"an output of that name must be {entry.name} itself", "EG-NAME-TAKEN")
             elif unit.size != 1.0:
                 remedy = f"leave the unit out, or give the output in {unit.text} another name"
-                faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy)
+                faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy, "EG-UNIT")
         given = expression / unit.size if unit.size != 1.0 else expression
         return Output(str(entry.name), given, unit.text, doc, self._of_velocities(entry, expression)), expression
 

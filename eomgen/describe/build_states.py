@@ -43,13 +43,18 @@ def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) ->
     if entries and bare:
         message = "a bare Lagrangian, or equations, have no states beside them"
         reader.faults.add(
-            "states", message, "write them as velocities of from_equations, or describe bodies and joints"
+            "states",
+            message,
+            "write them as velocities of from_equations, or describe bodies and joints",
+            "EG-CONFLICT",
         )
     usable = []
     for entry in entries:
         if isinstance(entry.name, str) and entry.name.endswith("_dot"):
             remedy = "choose a name that does not end in _dot"
-            reader.faults.add(entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy)
+            reader.faults.add(
+                entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy, "EG-NAME-TAKEN"
+            )
         if reader.names.declare("state", entry.name, entry.path):
             usable.append(entry)
     return DeclaredStates(usable, group_by_clock(reader, usable))
@@ -80,15 +85,17 @@ def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
     """The rate of a state, and its new value at sampling times if it is sampled."""
     values, path = entry.values, entry.path
     if "rate" in values and "sampled" in values:
-        reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period")
+        reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period", "EG-CONFLICT")
     if "sampled" in values:
         return reader.graph.zero, reader.expression(f"{path}.sampled", values["sampled"], LAW)
     if "period" in values and "rate" not in values:  # a function of the run renews it
         return reader.graph.zero, reader.graph.symbol(str(entry.name))
     for key in ("period", "offset"):
         if key in values:
-            reader.faults.add(f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate")
+            reader.faults.add(
+                f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate", "EG-CONFLICT"
+            )
     if values.get("rate") is None:
-        reader.faults.add(f"{path}.rate", "is missing", "give the derivative of the state, or sampled and period")
+        reader.faults.missing(f"{path}.rate", "give the derivative of the state, or sampled and period")
         return reader.stand_in, None
     return reader.expression(f"{path}.rate", values["rate"], LAW), None

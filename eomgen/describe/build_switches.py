@@ -72,7 +72,7 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
         if name not in names or name == entry.name:
             remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
             place = path if isinstance(given, str) else f"{path}[{k}]"
-            reader.faults.add(place, f"{name!r} is no other constraint that opens", remedy)
+            reader.faults.add(place, f"{name!r} is no other constraint that opens", remedy, "EG-NAME-UNKNOWN")
     return [str(name) for name in listed]
 
 
@@ -117,7 +117,11 @@ def _falling(reader: Reader, path: str, value: object) -> Expr:
         return found
     remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
     if found.node[0] in ("lt", "le", "eq", "not", "and", "or"):
-        reader.faults.add(path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy)
+        reader.faults.add(
+            path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy, "EG-EXPRESSION"
+        )
     elif symbols_of([found]) <= {*reader.names.of("parameter")}:
-        reader.faults.add(path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy)
+        reader.faults.add(
+            path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy, "EG-EXPRESSION"
+        )
     return found

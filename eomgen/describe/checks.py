@@ -16,10 +16,10 @@ def check_keys(path: str, values: Mapping[str, Any], fields: Fields, faults: Fau
     """Note keys that a table does not know, and required ones that are missing."""
     for key in values:
         if key not in fields:
-            faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields))
+            faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields), "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
-            faults.add(f"{path}.{key}", "is missing", f"give {KINDS[field.kind]}")
+            faults.missing(f"{path}.{key}", f"give {KINDS[field.kind]}")
 
 
 def unknown_key(key: object, fields: Iterable[str]) -> str:
@@ -39,12 +39,16 @@ def check_names(
     for entry in entries:
         fault = fault_of_name(entry.name)
         if fault:
-            faults.add(entry.path, *fault)
+            faults.add(entry.path, *fault, "EG-NAME-FORM")
             continue
         if entry.name in reserved:
-            faults.add(entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}")
+            faults.add(
+                entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}", "EG-NAME-TAKEN"
+            )
         elif entry.name in seen:
-            faults.add(entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one")
+            faults.add(
+                entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one", "EG-NAME-TAKEN"
+            )
         else:
             usable.append(entry)
         seen.add(entry.name)
@@ -67,13 +71,10 @@ def check_connected(bodies: Sequence[Body], joints: Sequence[JointSpec], faults:
     touched = _reached(joints)
     for k, body in enumerate(bodies):
         if k not in touched:
-            faults.add(
-                f"bodies.{body.name}",
-                "no chain of joints connects it to ground",
-                "add a joint; for a body that moves freely use a joint of type free",
-            )
+            remedy = "add a joint; for a body that moves freely use a joint of type free"
+            faults.add(f"bodies.{body.name}", "no chain of joints connects it to ground", remedy, "EG-TOPOLOGY")
         elif k not in reached:
-            faults.add(f"bodies.{body.name}", *UNHELD)
+            faults.add(f"bodies.{body.name}", *UNHELD, code="EG-TOPOLOGY")
 
 
 def _reached(joints: Sequence[JointSpec]) -> set[int]:

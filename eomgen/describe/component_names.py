@@ -93,7 +93,7 @@ class Renaming(Visitor):
         values: Mapping[str, str],
         attached: Mapping[str, Attached],
         closed: bool,
-        fault: Callable[[str, str, str], None],
+        fault: Callable[[str, str, str, str], None],
     ) -> None:
         self.own, self.prefix, self.values, self.attached = own, prefix, values, attached
         self.closed, self.fault = closed, fault
@@ -174,7 +174,8 @@ class Renaming(Visitor):
             return placed_on(found.placed or {}, placed)
         except UsageError as error:
             path = f"{slot.entry.path}.{slot.key}" if slot.entry else slot.key
-            self.fault(path, f"at {attachment!r} it {error}", "declare an attachment at that place in the component")
+            remedy = "declare an attachment at that place in the component"
+            self.fault(path, f"at {attachment!r} it {error}", remedy, "EG-UNSUPPORTED")
             return placed
 
     def _named(self, attachment: str, reference: Mapping[str, Any]) -> str:
@@ -186,4 +187,4 @@ class Renaming(Visitor):
     def _foreign(self, name: str, slot: Slot, remedy: str) -> None:
         if self.closed and slot.entry is not None:
             message = f"{name!r} is not declared in the component, and a component knows only its own names"
-            self.fault(f"{slot.entry.path}.{slot.key}", message, remedy)
+            self.fault(f"{slot.entry.path}.{slot.key}", message, remedy, "EG-NAME-UNKNOWN")

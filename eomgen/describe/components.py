@@ -42,7 +42,7 @@ class Components:
         self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
         self.given: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
         if given is not None and not isinstance(given, Mapping):
-            faults.add("components", f"is not {KINDS['table']}", "write the names of the components as keys")
+            faults.add("components", f"is not {KINDS['table']}", "write the names of the components as keys", "EG-TYPE")
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
 
@@ -54,11 +54,13 @@ class Components:
     def find(self, name: Any, path: str) -> Component | None:
         """The component of a name; None where there is none, or it has faults, which are told."""
         if not isinstance(name, str) or name not in self.given:
-            self.fault(path, f"no component {name!r}", nearest(str(name), self.given, "components"))
+            self.fault(path, f"no component {name!r}", nearest(str(name), self.given, "components"), "EG-NAME-UNKNOWN")
             return None
         if name in self.within:
             chain = ", ".join([*self.within[self.within.index(name) :], name])
-            self.fault(path, f"the component {name!r} adds itself: {chain}", "remove one of these additions")
+            self.fault(
+                path, f"the component {name!r} adds itself: {chain}", "remove one of these additions", "EG-CIRCLE"
+            )
             return None
         if name not in self.read:
             self.within.append(name)
@@ -70,16 +72,17 @@ class Components:
         given, path = self.given[name], f"components.{name}"
         wrong = fault_of_name(name)
         if wrong:
-            self.fault(path, *wrong)
+            self.fault(path, *wrong, "EG-NAME-FORM")
         if not isinstance(given, Mapping):
-            self.fault(path, f"is not {KINDS['table']}", "write its keys, or {file: leg.yaml}")
+            self.fault(path, f"is not {KINDS['table']}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
             return None
         for key in given:
             if key not in COMPONENT:
-                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT))
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT), "EG-NAME-UNKNOWN")
         if "file" in given:
             if len(given) > 1:
-                self.fault(path, "has keys beside file", "give file alone; the file describes the whole component")
+                remedy = "give file alone; the file describes the whole component"
+                self.fault(path, "has keys beside file", remedy, "EG-CONFLICT")
             return self._read_file(name, given["file"], path)
         start = f"{path}."
         lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
@@ -91,18 +94,20 @@ class Components:
 
     def _read_file(self, name: str, file: Any, path: str) -> Component | None:
         if not isinstance(file, str):
-            self.fault(f"{path}.file", f"{file!r} is not {KINDS['file']}", "")
+            self.fault(f"{path}.file", f"{file!r} is not {KINDS['file']}", "", "EG-TYPE")
             return None
         try:
             description = self.open_file(file)
         except FileNotFoundError:
-            self.fault(f"{path}.file", f"there is no file {file}", "give its path from the folder of the model file")
+            self.fault(
+                f"{path}.file", f"there is no file {file}", "give its path from the folder of the model file", "EG-FILE"
+            )
             return None
         except UsageError as error:
-            self.fault(f"{path}.file", str(error), "")
+            self.fault(f"{path}.file", str(error), "", error.code)
             return None
         except OSError as error:
-            self.fault(f"{path}.file", f"{file} cannot be read ({error.strerror})", "")
+            self.fault(f"{path}.file", f"{file} cannot be read ({error.strerror})", "", "EG-FILE")
             return None
         if description is None:
             return None
@@ -112,14 +117,14 @@ class Components:
         for name in component.attachments:
             if name in component.names.bodies or name in (GROUND_NAME, "body"):
                 message = f"the attachment {name!r} has the name of a body"
-                self.fault(f"{component.place}attachments", message, "rename one of them")
+                self.fault(f"{component.place}attachments", message, "rename one of them", "EG-NAME-TAKEN")
         return component
 
     def _attachments(self, given: Mapping[str, Any], start: str) -> tuple[str, ...]:
         listed = given.get("attachments") or []
         listed = [listed] if isinstance(listed, str) else listed
         if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
-            self.fault(f"{start}attachments", f"{listed!r} is not {KINDS['names']}", "such as [foot, top]")
+            self.fault(f"{start}attachments", f"{listed!r} is not {KINDS['names']}", "such as [foot, top]", "EG-TYPE")
             return ()
         return tuple(listed)
 
@@ -129,7 +134,7 @@ class Components:
         if given is None:
             return
         if not isinstance(given, Mapping):
-            self.fault(f"{start}add", f"is not {KINDS['table']}", "write the names of the instances as keys")
+            self.fault(f"{start}add", f"is not {KINDS['table']}", "write the names of the instances as keys", "EG-TYPE")
             return
         for name, keys in given.items():
             self._add_one(name, keys, f"{start}add.{name}", target)
@@ -137,27 +142,28 @@ class Components:
     def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:
         wrong = fault_of_name(name)
         if wrong:
-            self.fault(path, *wrong)
+            self.fault(path, *wrong, "EG-NAME-FORM")
             return
         if not isinstance(keys, Mapping):
-            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and its other keys")
+            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and its other keys", "EG-TYPE")
             return
         for key in keys:
             if key not in ADDED:
-                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED))
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED), "EG-NAME-UNKNOWN")
         if "component" not in keys:
-            self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"))
+            self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
             return
         component = self.find(keys["component"], f"{path}.component")
         rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
         prefix = keys.get("prefix", f"{name}_")
         if prefix != "" and fault_of_name(prefix):
-            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", "use letters, digits and underscores")
+            remedy = "use letters, digits and underscores"
+            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", remedy, "EG-NAME-FORM")
             return
         if component is None or rounds is None:
             return
         if size_of(target) + component.size * len(rounds) > ENTRIES:
-            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances")
+            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances", "EG-TOO-LARGE")
             return
         for k, variables in enumerate(rounds):
             number = str(k + 1) if "for" in keys else ""
@@ -174,7 +180,7 @@ class Components:
         for key in ("parameters", "inputs", "initial", "guess"):
             given = put_in(keys.get(key) or {}, variables)
             if not isinstance(given, Mapping):
-                self.fault(f"{path}.{key}", f"is not {KINDS['table']}", "write names as keys")
+                self.fault(f"{path}.{key}", f"is not {KINDS['table']}", "write names as keys", "EG-TYPE")
                 return None
             tables[key] = given
         at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
@@ -193,9 +199,8 @@ def named_attachments(component: Component, at: Any, path: str, fault: Fault) ->
     if isinstance(at, Mapping) and "body" not in at:
         return at
     if len(component.attachments) > 1:
-        fault(
-            path, f"{component.name} has several attachments", f"give a mapping of {', '.join(component.attachments)}"
-        )
+        remedy = f"give a mapping of {', '.join(component.attachments)}"
+        fault(path, f"{component.name} has several attachments", remedy, "EG-MISSING")
         return None
     return {(component.attachments or (GROUND_NAME,))[0]: at}
 
@@ -203,11 +208,11 @@ def named_attachments(component: Component, at: Any, path: str, fault: Fault) ->
 def claim(target: Description, instance: Instance, path: str, fault: Fault) -> bool:
     """Take the name of an instance into a description; False, and a fault, where it is taken."""
     if instance.name in target.instances:
-        fault(path, f"there is an instance {instance.name!r} already", "rename one of them")
+        fault(path, f"there is an instance {instance.name!r} already", "rename one of them", "EG-NAME-TAKEN")
         return False
     if any(entry.name == instance.name for entry in target.sections["bodies"]):
         message = f"{instance.name!r} is a body too, so {instance.name}.x could mean two things"
-        fault(path, message, "rename one of them")
+        fault(path, message, "rename one of them", "EG-NAME-TAKEN")
         return False
     target.instances[instance.name] = instance.prefix
     return True
@@ -217,7 +222,8 @@ def component_of(description: Description, name: str, place: str, fault: Fault) 
     """A component of the description of a whole model: its bodies, joints and what belongs to them."""
     for key in ("lagrangian", "equations"):
         if description.values.get(key) is not None:
-            fault("", f"{name} has {key}", "a component can contain only bodies, joints and what belongs to them")
+            remedy = "a component can contain only bodies, joints and what belongs to them"
+            fault("", f"{name} has {key}", remedy, "EG-UNSUPPORTED")
     check = description.values.get("check_inertia")
     for entry in description.sections["bodies"]:
         if check is not None and entry.name != GROUND_NAME:

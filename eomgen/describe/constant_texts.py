@@ -5,7 +5,7 @@ A generated package has no parser and is without this file.
 
 from __future__ import annotations
 
-from ..errors import ExpressionError, UsageError
+from ..errors import ExpressionError, no_number
 from ..graph.core import Expr, Graph
 from .expressions import parse
 
@@ -24,7 +24,7 @@ def constant(text: str, what: str) -> float:
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise UsageError(f"{what} must be a number, not {text!r}: {error}") from None
+        raise no_number(f"{what} must be a number, not {text!r}: {error}") from None
     if value is None:
-        raise UsageError(f"{what} must be a number, not {text!r}")
+        raise no_number(f"{what} must be a number, not {text!r}")
     return float(value)

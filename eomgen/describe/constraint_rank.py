@@ -94,5 +94,5 @@ def independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence
                 f"{which} contradicts the others: it has the same velocity terms as they have, but other "
                 "remaining terms"
             )
-            raise ModelError([Problem("equations.constraints", message, f"check the {which}")])
+            raise ModelError([Problem("equations.constraints", message, f"check the {which}", code="EG-REDUNDANT")])
     return [k for k in range(len(motion)) if fresh[h + k]], all(fresh[:h])

@@ -19,7 +19,8 @@ def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value
     own = next((j for j in joints if j.entry.name == given), None)
     home = next((j for j in joints if given in j.coordinates), None)
     if own is not None and home is not None and own is not home:
-        faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", "rename one of them")
+        remedy = "rename one of them"
+        faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
         return None
     if home is not None:
         return Found(str(given), home.joint.coordinates[home.coordinates.index(given)].kind, home.entry.name)
@@ -27,7 +28,8 @@ def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value
         if len(own.coordinates) == 1:
             return Found(own.coordinates[0], own.joint.coordinates[0].kind, own.entry.name)
         names = ", ".join(own.coordinates) or "none"
-        faults.add(path, f"joint {quoted(given)} has {len(own.coordinates)} coordinates", f"name one of them: {names}")
+        message = f"joint {quoted(given)} has {len(own.coordinates)} coordinates"
+        faults.add(path, message, f"name one of them: {names}", "EG-REFERENCE")
         return None
     if isinstance(given, str) and reader.names.kinds.get(given) == "coordinate":
         return Found(given, "angle", None)
@@ -35,5 +37,7 @@ def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value
         return None  # the joint itself is at fault, which is told already
     known = [j.entry.name for j in joints]
     known += [c for c in reader.names.of("coordinate") if c not in known]
-    faults.add(path, f"no joint {quoted(given)}", nearest(shown(given), known, "joints and coordinates"))
+    faults.add(
+        path, f"no joint {quoted(given)}", nearest(shown(given), known, "joints and coordinates"), "EG-NAME-UNKNOWN"
+    )
     return None

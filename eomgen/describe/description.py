@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from ..errors import Problem, UsageError
+from ..errors import Problem, cannot
 from ..graph.shown import NO_TEXT, shortened, shown
 
 GROUND_NAME = "ground"
@@ -139,9 +139,13 @@ class Faults:
         for problem in description.problems:
             self.take(problem)
 
-    def add(self, path: str, message: str, remedy: str = "") -> None:
+    def add(self, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> None:
         """Note a fault at a dotted path."""
-        self.take(Problem(path, message, remedy, *place_of(path, self.lines)))
+        self.take(Problem(path, message, remedy, *place_of(path, self.lines), code))
+
+    def missing(self, path: str, remedy: str) -> None:
+        """Note that something is missing."""
+        self.add(path, "is missing", remedy, "EG-MISSING")
 
     def take(self, problem: Problem) -> None:
         """Note a fault whose file and line are known; one that was noted already counts once."""
@@ -247,7 +251,7 @@ def label_of(reference: Mapping[str, Any]) -> str:
         if key in reference:
             text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label
-        raise UsageError(
+        raise cannot(
             f"the place of an unnamed marker of {shown(reference.get('body'))} cannot be written as a text; name the "
             "marker"
         )

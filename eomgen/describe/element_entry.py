@@ -65,14 +65,14 @@ class ElementEntry:
         given = self.values.get("type")
         if not isinstance(given, str) or given not in types:
             message = "is missing" if given is None else f"no {what} of type {quoted(given)}"
-            self.fault("type", message, nearest(shown(given), types, "types"))
+            self.fault("type", message, nearest(shown(given), types, "types"), "EG-CHOICE")
             return None
         found = types[given]
         if self._misunderstood(found):
             return None
         self.fields = found.fields(what, types)
         if "law" in found.keys and found.keys["law"].kind == "law" and not self.values.keys() & _keys_of_law(found):
-            self.fault("", "has no law", "give law: {stiffness: ...} and what else the law has")
+            self.fault("", "has no law", "give law: {stiffness: ...} and what else the law has", "EG-MISSING")
             return None
         check_keys(self.path, self.values, self.fields, self.reader.faults)
         present = [key for key in found.one_of if key in self.values]
@@ -93,7 +93,7 @@ class ElementEntry:
             given = "joint" if "joint" in self.values and "joint" not in found.keys else key
             named = self.values.get(given)
             if given == "joint" or (isinstance(named, str) and named in names and named not in self.reader.markers):
-                self.fault(given, f"a {found.name} acts at a marker, and {named!r} is not a marker", remedy)
+                self.fault(given, f"a {found.name} acts at a marker, and {named!r} is not a marker", remedy, "EG-TYPE")
                 return True
         return False
 
@@ -101,8 +101,11 @@ class ElementEntry:
     def _at(self, key: str) -> str:
         return f"{self.path}.{key}" if key else self.path
 
-    def fault(self, key: str, message: str, remedy: str = "") -> None:
-        self.reader.faults.add(self._at(key), message, remedy)
+    def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
+        self.reader.faults.add(self._at(key), message, remedy, code)
+
+    def missing(self, key: str, remedy: str) -> None:
+        self.reader.faults.missing(self._at(key), remedy)
 
     def at_fault(self, key: str = "") -> bool:
         return bool(self.reader.faults.under(self._at(key)))
@@ -152,7 +155,7 @@ class ElementEntry:
             return None
         for name in given:
             if name not in names:
-                self.fault(f"{key}.{name}", "unknown key", nearest(str(name), names, "allowed"))
+                self.fault(f"{key}.{name}", "unknown key", nearest(str(name), names, "allowed"), "EG-NAME-UNKNOWN")
         found = {name: self.reader.expression(f"{path}.{name}", given[name]) for name in names if name in given}
         for name, size in found.items():
             self.require(f"{key}.{name}", size, POSITIVE, "give a size greater than 0")
@@ -247,7 +250,7 @@ class ElementEntry:
         if missing:
             if len(missing) == 1:
                 remedy = "give friction and smoothing together, or neither"
-                self.reader.faults.add(f"{path}.{missing[0]}", "is missing", remedy)
+                self.reader.faults.missing(f"{path}.{missing[0]}", remedy)
             return None, None
         friction, smoothing = (self.reader.expression(f"{path}.{key}", value[key]) for key in keys)
         self.reader.requirements.positive(f"{path}.friction", friction, or_zero=True)
@@ -263,7 +266,7 @@ class ElementEntry:
             return None
         if not isinstance(given, str) or given not in own:
             if not self.reader.faults.under(f"bodies.{given}"):
-                self.fault(key, f"no body {quoted(given)}", nearest(shown(given), own, "bodies"))
+                self.fault(key, f"no body {quoted(given)}", nearest(shown(given), own, "bodies"), "EG-NAME-UNKNOWN")
             return None
         return own[given], self.around.bodies[own[given]]
 
@@ -275,9 +278,8 @@ class ElementEntry:
         """A coordinate from the name of its joint, or its own."""
         found = find_coordinate(self.reader, self.around.joints, self._at(key), value)
         if found is not None and kind and found.joint is not None and found.kind != kind:
-            self.fault(
-                key, f"the coordinate {found.name!r} is {_A[found.kind]}", f"name a coordinate that is {_A[kind]}"
-            )
+            remedy = f"name a coordinate that is {_A[kind]}"
+            self.fault(key, f"the coordinate {found.name!r} is {_A[found.kind]}", remedy, "EG-REFERENCE")
             return None
         return found
 
@@ -297,7 +299,7 @@ class ElementEntry:
                  for v in joint.joint.velocities]  # fmt: skip
         kinds = [velocity.kind for velocity in joint.joint.velocities]
         if not rates:
-            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has")
+            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has", "EG-REFERENCE")
         return tuple((label, self.graph.symbol(rate), k) for (label, rate), k in zip(rates, kinds, strict=True))
 
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
@@ -338,7 +340,7 @@ class ElementEntry:
             return
         message = f"{a.name!r} and {b.name!r} are not measured from the same body"
         remedy = "give both joints the body that carries the two axes as predecessor; for a carrier that turns "
-        self.fault(key, message, remedy + "use planetary, or a coupling")
+        self.fault(key, message, remedy + "use planetary, or a coupling", "EG-REFERENCE")
 
     def carrier(self, coordinate: Found) -> int | None:
         spec = self._spec(coordinate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
-from ..errors import UsageError
+from ..errors import ill_typed
 from ..texts import shown
 from .described import Described
 from .description import DescribedEntry
@@ -67,7 +67,7 @@ class Labelled(Protocol):
 def noted(marker: Labelled) -> str:
     """The label of a marker whose motion an expression uses; UsageError if it is none."""
     if not hasattr(marker, "note"):
-        raise UsageError(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {shown(marker)}")
+        raise ill_typed(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {shown(marker)}")
     marker.note()
     return marker.label
 

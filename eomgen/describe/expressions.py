@@ -105,7 +105,9 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         The text is not an allowed expression; the error says what, in which column, and what is allowed.
     """
     if len(text) > LENGTH:
-        raise ExpressionError(f"an expression of {len(text)} characters is too long", 1, f"at most {LENGTH}", text)
+        raise ExpressionError(
+            f"an expression of {len(text)} characters is too long", 1, f"at most {LENGTH}", text, code="EG-TOO-LARGE"
+        )
     if not text.strip():
         raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
@@ -132,7 +134,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         remedy = _UNFINISHED if "never closed" in error.msg else allowed()
         raise ExpressionError(f"not a valid expression ({error.msg})", column, remedy, text) from None
     except (ValueError, MemoryError, RecursionError):
-        raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
+        raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text, code="EG-TOO-LARGE") from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         _refuse_slip(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..errors import UsageError
+from ..errors import at_odds, ill_placed, ill_typed, no_choice
 from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
@@ -287,7 +287,7 @@ class JointHandle:
         """Names of the coordinates, in order."""
         type_name = self._entry.values.get("type")
         if type_name not in JOINTS:
-            raise UsageError(f"joints.{self.name}.type: no joint of type {type_name!r}; types: {', '.join(JOINTS)}")
+            raise no_choice(f"joints.{self.name}.type: no joint of type {type_name!r}; types: {', '.join(JOINTS)}")
         return coordinate_names(type_name, self.name, self._entry.values)[0]
 
     @property
@@ -330,7 +330,7 @@ class JointHandle:
         names = self.coordinate_names
         if len(names) != 1:
             shown = ", ".join(names) or "none"
-            raise UsageError(f"joint {self.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
+            raise ill_placed(f"joint {self.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
         return names[0]
 
 
@@ -342,10 +342,10 @@ class Settings(dict[str, Any]):
         for given in mappings:
             if not isinstance(given, Mapping):
                 told = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(given)} alone"
-                raise UsageError(told)
+                raise ill_typed(told)
         named = [str(name) for given in (*mappings, values) for name in given]
         if twice := sorted({name for name in named if named.count(name) > 1}):
-            raise UsageError(f"{', '.join(twice)}: given twice in one call; give each name once")
+            raise at_odds(f"{', '.join(twice)}: given twice in one call; give each name once")
         for given in mappings:
             self.update(given)
         self.update(values)

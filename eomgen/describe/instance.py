@@ -72,10 +72,10 @@ class Instance:
 def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> None:
     """Add the entries of an instance to a description; what is wrong with it is noted at ``path``."""
 
-    def told(place: str, message: str, remedy: str) -> None:
+    def told(place: str, message: str, remedy: str, code: str) -> None:
         """A fault of the component itself."""
         where = component.description.place(place)
-        faults.take(Problem(f"{component.place}{place}", message, remedy, *where))
+        faults.take(Problem(f"{component.place}{place}", message, remedy, *where, code))
 
     attached = _attachments(target, component, instance, path, faults.add)
     values = _values(component, instance, path, faults.add, told)
@@ -120,22 +120,21 @@ def _attachments(
     found, sound = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}, True
     for name in instance.at:
         if name not in known:
-            fault(
-                f"{path}.at.{name}", f"{component.name} has no attachment {name!r}", nearest(str(name), known, "it has")
-            )
+            message = f"{component.name} has no attachment {name!r}"
+            fault(f"{path}.at.{name}", message, nearest(str(name), known, "it has"), "EG-NAME-UNKNOWN")
             sound = False
     for name in known:
         if name in instance.at:
             attached = _attached(target, instance.at[name])
             if attached is None:
                 remedy = "give a body, body.marker, ground or {body, at, rpy}; the marker must be declared before"
-                fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy)
+                fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy, "EG-TYPE")
                 sound = False
             else:
                 found[name] = attached
         elif name != GROUND_NAME:
             remedy = "give a body, body.marker, ground or {body, at, rpy}"
-            fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy)
+            fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy, "EG-MISSING")
             sound = False
     return found if sound else None
 
@@ -169,7 +168,7 @@ def _values(
         if name not in component.given:
             remedy = nearest(str(name), component.given, "parameters and inputs")
             place = instance.places.get(name, name)
-            fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy)
+            fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
             sound = False
     numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
     for name, entry in component.given.items():
@@ -187,7 +186,7 @@ def _values(
             if _is_converted(entry.values.get("unit")):
                 place = f"{entry.path}.unit"
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
-                told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy)
+                told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
                 sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
             texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))

@@ -38,10 +38,10 @@ def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> In
         return InstanceValue(given)
     for key in given:
         if key not in KEYS:
-            fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), KEYS, "keys"))
+            fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), KEYS, "keys"), "EG-NAME-UNKNOWN")
             return None
     if given.get("value") is None:
-        fault(path, f"{dict(given)!r} has no value", "write {value: 500, unit: mm}, or a number")
+        fault(path, f"{dict(given)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
         return None
     unit, own = given.get("unit"), entry.values.get("unit")
     if unit is None:
@@ -51,13 +51,16 @@ def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> In
             raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
         read = read_unit(unit)
         if isinstance(own, str) and own and read_unit(own).dimension != read.dimension:
-            fault(f"{path}.unit", f"{unit!r} does not measure what {entry.name} is in: {own}", "give a unit like that")
+            message = f"{unit!r} does not measure what {entry.name} is in: {own}"
+            fault(f"{path}.unit", message, "give a unit like that", "EG-UNIT")
             return None
     except UnitError as error:
-        fault(f"{path}.unit", str(error), error.remedy)
+        fault(f"{path}.unit", str(error), error.remedy, "EG-UNIT")
         return None
     if not is_constant(given["value"]) and read.size != 1.0:
         remedy = "leave the unit out: parameters are in SI units, so the expression is too"
-        fault(f"{path}.unit", f"{str(given['value'])!r} is an expression, and {unit} is not an SI unit", remedy)
+        fault(
+            f"{path}.unit", f"{str(given['value'])!r} is an expression, and {unit} is not an SI unit", remedy, "EG-UNIT"
+        )
         return None
     return InstanceValue(given["value"], unit)

@@ -43,20 +43,20 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
         values = [given[key]] if listed is None else listed
         if len(values) != len(coordinates):
             message = f"{len(values)} values for {len(coordinates)} coordinates"
-            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}")
+            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
             continue
         for k, value in enumerate(values):
             place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
             number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
             if number is not None and number < 0 and key in ("velocity", "effort"):
-                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive")
+                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
             elif number is not None:
                 result[k].append((key, number))
     for name, found in zip(coordinates, result, strict=True):
         limits = dict(found)
         if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
             message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
-            reader.faults.add(path, message, "exchange them")
+            reader.faults.add(path, message, "exchange them", "EG-RANGE")
     return tuple(tuple(found) for found in result)
 
 
@@ -64,7 +64,7 @@ def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
     """Coulomb friction of a joint (N m or N), as data."""
     value = reader.number(path, given)
     if value is not None and value < 0:
-        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive")
+        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
     return value or 0.0
 
 
@@ -97,16 +97,13 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
                 factors = reader.vector(f"{place}.{key}", value)
                 if key == "scale" and any(x.is_zero for x in factors):
                     what = "leaves nothing of the mesh"
-                    reader.faults.add(
-                        f"{place}.{key}",
-                        f"a scale of 0 {what}",
-                        "give three numbers other than 0; negative ones mirror",
-                    )
+                    remedy = "give three numbers other than 0; negative ones mirror"
+                    reader.faults.add(f"{place}.{key}", f"a scale of 0 {what}", remedy, "EG-RANGE")
             elif field.kind == "expression":
                 reader.expression(f"{place}.{key}", value)
             else:
                 reader.text(f"{place}.{key}", value)
                 if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
                     reader.faults.add(
-                        f"{place}.{key}", f"{value!r} is no color", 'give six hexadecimal digits: "#1f77b4"'
+                        f"{place}.{key}", f"{value!r} is no color", 'give six hexadecimal digits: "#1f77b4"', "EG-TYPE"
                     )

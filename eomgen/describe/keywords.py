@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
-from ..errors import UsageError
+from ..errors import no_such
 from ..joints import JOINTS
 from .names import nearest
 
@@ -48,5 +48,5 @@ def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> N
     for key in given:
         if key not in allowed:
             if name in JOINTS and key in SWITCHING:
-                raise UsageError(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")
-            raise UsageError(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")
+                raise no_such(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")
+            raise no_such(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")

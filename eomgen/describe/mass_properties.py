@@ -33,21 +33,20 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
     graph, faults = reader.graph, reader.faults
     for pair in EXCLUSIVE:
         if all(key in values for key in pair):
-            faults.add(f"{path}.{pair[1]}", f"is given beside {pair[0]}", "give one of them")
+            faults.add(f"{path}.{pair[1]}", f"is given beside {pair[0]}", "give one of them", "EG-CONFLICT")
     for key in ("about", "axes"):
         if key in values and not ("inertia" in values or "principal" in values):
-            faults.add(f"{path}.{key}", "is given without an inertia", "give inertia or principal too")
+            faults.add(f"{path}.{key}", "is given without an inertia", "give inertia or principal too", "EG-MISSING")
     if "check_inertia" in values:
         check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
     parts = read_parts(reader, path, values)
     own = [key for key in OWN if key in values]
     if "solids" in values and own:
         for key in own:
-            faults.add(
-                f"{path}.{key}", "is given beside solids, which already determine it", "leave it out, or add points"
-            )
+            remedy = "leave it out, or add points"
+            faults.add(f"{path}.{key}", "is given beside solids, which already determine it", remedy, "EG-CONFLICT")
     elif "mass" not in values and (own or not ("solids" in values or "points" in values or faults.under(path))):
-        faults.add(f"{path}.mass", "is missing", f"give {KINDS['expression']}, solids or points")
+        faults.missing(f"{path}.mass", f"give {KINDS['expression']}, solids or points")
     if "solids" in values or not own:
         o = vec.zero(graph)
         whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
@@ -67,21 +66,25 @@ def _own(
     point = _about(reader, path, about)
     if point is not None and point[1] is not None:
         if "axes" in values:
-            reader.faults.add(
-                f"{path}.axes", "is given beside a marker in about, which has axes already", "give about: [x, y, z]"
-            )
+            message = "is given beside a marker in about, which has axes already"
+            reader.faults.add(f"{path}.axes", message, "give about: [x, y, z]", "EG-CONFLICT")
         rotation = point[1]
     plane = _plane(tensor)
     axis = None if plane is None else vec.transpose(rotation)[plane]
     if rotation != reader.identity:  # which mirrors the upper triangle
         if not is_symmetric(tensor):
-            reader.faults.add(f"{path}.inertia", *ASYMMETRIC)
+            reader.faults.add(f"{path}.inertia", *ASYMMETRIC, code="EG-INERTIA")
         tensor = rotate_symmetric(rotation, tensor)
     moment: Vec3 | None = None
     if "first_moment" in values:
         moment = reader.vector(f"{path}.first_moment", values["first_moment"])
         if mass.is_zero and not all(x.is_zero for x in moment):
-            reader.faults.add(f"{path}.first_moment", "a body without mass has no first moment", "give the body a mass")
+            reader.faults.add(
+                f"{path}.first_moment",
+                "a body without mass has no first moment",
+                "give the body a mass",
+                "EG-NO-INERTIA",
+            )
         com = o if mass.is_zero else (moment[0] / mass, moment[1] / mass, moment[2] / mass)
     else:
         com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o
@@ -128,7 +131,8 @@ def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | 
         marker = reader.markers.get(label)
         if marker is None:
             own = [key.partition(".")[2] for key in reader.markers if key.startswith(f"{body}.")]
-            reader.faults.add(place, f"{body!r} has no marker {about!r}", nearest(about, [*POINTS, *own], "allowed"))
+            remedy = nearest(about, [*POINTS, *own], "allowed")
+            reader.faults.add(place, f"{body!r} has no marker {about!r}", remedy, "EG-NAME-UNKNOWN")
             return None
         return marker.frame.position, marker.frame.rotation
     if items(about) is None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..elements.element_type import ElementType
 from ..elements.field import Field
-from ..errors import UsageError
+from ..errors import UsageError, at_odds, ill_typed
 from .described import Described
 from .description import items
 from .element_handles import ConstraintHandle, ForceHandle
@@ -113,7 +113,8 @@ def signature_of(found: ElementType) -> Signature:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise UsageError(
-            f"type {found.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends"
+            f"type {found.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends",
+            code="EG-NAME-TAKEN",
         )
     made = [Parameter("self", Parameter.POSITIONAL_ONLY), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
     way: Any = Parameter.POSITIONAL_OR_KEYWORD
@@ -218,11 +219,11 @@ def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any
 def _law(found: ElementType, name: Any, law: Any, given: Mapping[str, Any]) -> Mapping[str, Any]:
     """The keys of a law that is given as a mapping."""
     if not isinstance(law, Mapping):
-        raise UsageError(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
+        raise ill_typed(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
     check_keywords(f"the law of {found.name}", dict(law), [key for key in found.keys if found.keys[key].kind != "law"])
     twice = sorted(law.keys() & given.keys())
     if twice:
-        raise UsageError(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
+        raise at_odds(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
     return law
 
 
@@ -240,7 +241,7 @@ def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, An
         return {"joint": joint_reference(model, between[0])}
     if joint is None and len(between) == 2:
         return {"between": [marker_reference(model, marker) for marker in between]}
-    raise UsageError("give one joint or two markers first, and then the values by keyword")
+    raise ill_typed("give one joint or two markers first, and then the values by keyword")
 
 
 def _reference(model: Described, kind: str, value: Any) -> Any:
@@ -250,9 +251,7 @@ def _reference(model: Described, kind: str, value: Any) -> Any:
 def _converted(model: Described, found: ElementType, name: Any, key: str, value: Any) -> Any:
     kind = found.keys[key].kind
     if kind == "marker" and isinstance(value, JointHandle) and key in found.remedies:
-        raise UsageError(
-            f"{found.name} {name!r} acts at a marker, and {value!r} is not a marker; {found.remedies[key]}"
-        )
+        raise ill_typed(f"{found.name} {name!r} acts at a marker, and {value!r} is not a marker; {found.remedies[key]}")
     if kind in ("marker", "joint", "body"):
         return _reference(model, kind, value)
     if kind in ("pair", "joints"):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UsageError, at_odds, ill_typed
 from .components import claim, component_of, named_attachments
 from .described import Described
 from .description import Description, Faults, items
@@ -125,14 +125,16 @@ class ComponentMethods(Described):
         """
         part = _component(component)
         if prefix and fault_of_name(prefix):
-            raise UsageError(f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores")
+            raise UsageError(
+                f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores", code="EG-NAME-FORM"
+            )
         groups = {"parameters": parameters or {}, "inputs": inputs or {}, "": values}
         for what, group in groups.items():
             if not isinstance(group, Mapping):
-                raise UsageError(f"add {part.name}: {what} must be a mapping of names to values, not {group!r}")
+                raise ill_typed(f"add {part.name}: {what} must be a mapping of names to values, not {group!r}")
         given = [name for group in groups.values() for name in group]
         if twice := sorted({name for name in given if given.count(name) > 1}):
-            raise UsageError(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
+            raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
         numbers = {n: _plain(value) for group in groups.values() for n, value in group.items() if value is not None}
         description = self._description
         made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
@@ -147,7 +149,7 @@ class ComponentMethods(Described):
             add_instance(made, part, instance, "add", faults)
         if faults:
             told = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
-            raise UsageError(f"add {part.name}: {told}")
+            raise UsageError(f"add {part.name}: {told}", code=faults.problems[0].code)
         description.lines, description.origins, description.instances = made.lines, made.origins, made.instances
         for section, entries in made.sections.items():
             known = description.sections[section]
@@ -177,11 +179,11 @@ def _component(given: Any) -> Component:
 
         description = plain_description(given.description)
     else:
-        raise UsageError(f"{given!r} is not a component; give a Model, or the name of a model file")
+        raise ill_typed(f"{given!r} is not a component; give a Model, or the name of a model file")
     name = str(description.values.get("name", "component"))
     part = component_of(description, name, f"components.{name}.", faults.add)
     for problem in (*description.problems, *faults.problems):
-        raise UsageError(f"add {name}: {problem}")
+        raise UsageError(f"add {name}: {problem}", code=problem.code)
     return part
 
 

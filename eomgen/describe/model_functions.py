@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import ill_typed, incomplete
 from .build_native import PythonTwin
 from .described import Described
 from .description import items
@@ -101,11 +101,11 @@ class FunctionMethods(Described):
             items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)
         ]
         if None in further:
-            raise UsageError(f"native {name}: python_derivatives must be lists of functions")
+            raise ill_typed(f"native {name}: python_derivatives must be lists of functions")
         if twin is not None and not isinstance(twin, str):
             twin = PythonTwin(twin, *further)
         elif any(further):
-            raise UsageError(
+            raise incomplete(
                 "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
             )
         given = {

@@ -56,22 +56,22 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     kind = values.get("type")
     if not isinstance(kind, str) or kind not in SOLID:
         if kind is None:
-            faults.add(f"{path}.type", "is missing", f"give one of {', '.join(SOLID)}")
+            faults.missing(f"{path}.type", f"give one of {', '.join(SOLID)}")
         else:
-            faults.add(f"{path}.type", f"no solid of type {kind!r}", nearest(str(kind), SOLID, "types"))
+            faults.add(f"{path}.type", f"no solid of type {kind!r}", nearest(str(kind), SOLID, "types"), "EG-CHOICE")
         return None
     fields = solid_fields(kind)
     for key in values:
         if key not in fields:
             message = f"a {kind} has no {key!r}" if key in SOLID_KEYS else "unknown key"
-            faults.add(f"{path}.{key}", message, unknown_key(key, fields))
+            faults.add(f"{path}.{key}", message, unknown_key(key, fields), "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
-            faults.add(f"{path}.{key}", "is missing", f"give {KINDS[field.kind]}: {field.doc}")
+            faults.missing(f"{path}.{key}", f"give {KINDS[field.kind]}: {field.doc}")
     density = "line_density" if "line_density" in fields else "density"
     if ("mass" in values) == (density in values):
         wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
-        faults.add(path, wrong, "give one of them")
+        faults.add(path, wrong, "give one of them", "EG-CONFLICT")
     given = {
         key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values
     }
@@ -135,7 +135,9 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
     try:
         found = measure_mesh(_locate(reader, file))
     except UsageError as error:
-        reader.faults.add(place, str(error), "a mesh must be a closed surface of triangles that face outwards")
+        reader.faults.add(
+            place, str(error), "a mesh must be a closed surface of triangles that face outwards", "EG-FILE-DAMAGED"
+        )
         return None
     one = graph.one if scale is None else scale
     x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)

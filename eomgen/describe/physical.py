@@ -64,7 +64,7 @@ def check_bodies(
                 found += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
         for place, message, told in found:
             if body.check == "error":
-                faults.add(place, message, told)
+                faults.add(place, message, told, "EG-INERTIA")
             else:
                 if told not in (EXCESS, ASYMMETRIC[1]):
                     negative[body.name] = None

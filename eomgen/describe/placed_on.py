@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, off_range
 from ..numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
 from .description import items
 from .names import function_words
@@ -47,7 +47,7 @@ def _direction(axis: Any) -> Numbers:
     x, y, z = (number_of(part, {}) for part in axis)
     columns = axis_columns((x, y, z))
     if columns is None:
-        raise UsageError("has an axis without length")
+        raise off_range("has an axis without length")
     return columns[2]
 
 
@@ -74,14 +74,14 @@ def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
     try:
         (a, turn), (b, own) = (_read(with_rpy(placed, {})) for placed in (outer, inner))
     except KeyError:
-        raise UsageError("is placed on a frame whose matrix depends on parameters") from None
+        raise cannot("is placed on a frame whose matrix depends on parameters") from None
     if turn is None:
         at = [total((1.0, 1.0), pair) for pair in zip(a, b, strict=True)]
         return {"at": at} if own is None else {"at": at, "rpy": own}
     if own is None and all(not isinstance(x, str) and x == 0 for x in b):
         return {"at": a, "rpy": turn}
     if not all(map(is_constant, [*turn, *(own or ())])):
-        raise UsageError("is placed on a frame that is turned by angles which depend on parameters")
+        raise cannot("is placed on a frame that is turned by angles which depend on parameters")
     rotation = from_roll_pitch_yaw([number_of(x, {}) for x in turn])
     at = [total([1.0, *row], [x, *b]) for row, x in zip(rotation.tolist(), a, strict=True)]
     if own is not None:
@@ -92,6 +92,6 @@ def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
 def _read(placed: Placed) -> tuple[list[Any], list[Any] | None]:
     at, turn = (items(placed.get(key, (0, 0, 0))) for key in ("at", "rpy"))
     if at is None or turn is None or len(at) != 3 or len(turn) != 3:
-        raise UsageError("has a place that is not given as at: [x, y, z] with rpy: [roll, pitch, yaw]")
+        raise cannot("has a place that is not given as at: [x, y, z] with rpy: [roll, pitch, yaw]")
     turned = any(isinstance(x, str) or x != 0 for x in turn)
     return at, turn if turned else None

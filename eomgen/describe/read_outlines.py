@@ -34,7 +34,7 @@ def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: 
     elif all(x.value is not None for x in corners):
         depth = reader.graph.constant(half_gap(numbers))
     else:
-        reader.faults.add(f"{path}.depth", "is missing", "points with parameters do not tell it; give a length")
+        reader.faults.missing(f"{path}.depth", "points with parameters do not tell it; give a length")
         depth = reader.stand_in
     return (depth, *(x for point in points for x in point))
 
@@ -43,7 +43,9 @@ def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple
     """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
     teeth = teeth_of_sprocket(given)
     if teeth is None:
-        reader.faults.add(f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more")
+        reader.faults.add(
+            f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
+        )
         return ()
     keys = ("pitch", "seat", "tip_radius")
     sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import ill_placed
 from .described import Described
 from .handles import JointHandle, MarkerHandle
 
@@ -15,7 +15,7 @@ def marker_reference(model: Described, value: Any) -> Any:
         _own(model, value)
         return value.reference
     if isinstance(value, JointHandle):
-        raise UsageError(f"{value!r} is a joint; a body or a marker is expected")
+        raise ill_placed(f"{value!r} is a joint; a body or a marker is expected")
     return value
 
 
@@ -25,10 +25,10 @@ def joint_reference(model: Described, value: Any) -> Any:
         _own(model, value)
         return value.name
     if isinstance(value, MarkerHandle):
-        raise UsageError(f"{value!r} is a body or marker; a joint or a coordinate is expected")
+        raise ill_placed(f"{value!r} is a body or marker; a joint or a coordinate is expected")
     return value
 
 
 def _own(model: Described, handle: MarkerHandle | JointHandle) -> None:
     if handle.model is not model:
-        raise UsageError(f"{handle!r} belongs to the model {handle.model.name!r}, not to {model.name!r}")
+        raise ill_placed(f"{handle!r} belongs to the model {handle.model.name!r}, not to {model.name!r}")

@@ -11,7 +11,7 @@ from .description import items
 from .names import fault_of_name
 from .rewritten_texts import in_brackets, rewritten
 
-Fault = Callable[[str, str, str], None]
+Fault = Callable[[str, str, str, str], None]
 Round = dict[str, Any]
 
 ROUNDS = 1000  #: most instances of one entry
@@ -21,32 +21,29 @@ _REMEDY = "give a list of numbers or expressions, a count n for 1 to n, or {from
 def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
     """The values of all variables in each round; None where something is wrong, which is told."""
     if not isinstance(given, Mapping) or not given:
-        fault(path, f"{given!r} is not a mapping of variables to their values", _REMEDY)
+        fault(path, f"{given!r} is not a mapping of variables to their values", _REMEDY, "EG-TYPE")
         return None
     columns: dict[str, list[Any]] = {}
     for name, values in given.items():
         place = f"{path}.{name}"
         wrong = fault_of_name(name, symbol=True)
         if wrong:
-            fault(place, *wrong)
+            fault(place, *wrong, "EG-NAME-FORM")
             return None
         listed = _listed(values)
         if listed is None:
-            fault(place, f"{values!r} is not a list of values", _REMEDY)
+            fault(place, f"{values!r} is not a list of values", _REMEDY, "EG-TYPE")
             return None
         if not 1 <= len(listed) <= ROUNDS:
             wrong_count = f"has more than {ROUNDS} values" if listed else "has no values"
-            fault(place, wrong_count, f"1 to {ROUNDS}")
+            fault(place, wrong_count, f"1 to {ROUNDS}", "EG-SHAPE")
             return None
         columns[name] = listed
     counts = {name: len(values) for name, values in columns.items()}
     if len(set(counts.values())) > 1:
         shown = ", ".join(f"{name} has {count}" for name, count in counts.items())
-        fault(
-            path,
-            f"lists of different lengths: {shown}",
-            "all lists must have the same length: the variables take their values side by side",
-        )
+        remedy = "all lists must have the same length: the variables take their values side by side"
+        fault(path, f"lists of different lengths: {shown}", remedy, "EG-SHAPE")
         return None
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 

@@ -66,7 +66,7 @@ class Requirements:
         values = self.known(expressions, dict(zip(local, POINTS[rule](), strict=True)) if local else {})
         flaws = [] if values is None else RULES[rule](values, *data)
         for flaw in flaws:
-            self.faults.add(path + flaw.key, flaw.message + where, flaw.remedy)
+            self.faults.add(path + flaw.key, flaw.message + where, flaw.remedy, "EG-RANGE")
         if not flaws:
             self.keep(path, rule, expressions, data, local)
         return bool(flaws)

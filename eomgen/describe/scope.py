@@ -74,7 +74,7 @@ class Namespace:
         levels = _RATES_OF.get(kind, (kind,))
         fault = fault_of_name(name, symbol=True)
         if fault or not isinstance(name, str):
-            self.faults.add(path, *(fault or ("", "")))
+            self.faults.add(path, *(fault or ("", "")), code="EG-NAME-FORM")
             self._refuse(levels[0], name, path)
             return False
         names = [name + suffix for suffix in RATES[: len(levels)]]
@@ -92,6 +92,7 @@ class Namespace:
                 f"the name {clash!r} is already used by the {other}{own}",
                 "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with the "
                 "_dot and _ddot of coordinates; rename one",
+                "EG-NAME-TAKEN",
             )
             return False
         return True
@@ -146,7 +147,7 @@ class Scope:
                 message = (
                     f"{name!r} is a variable of the element and also the {kind} at {self.names.places.get(name, '?')}"
                 )
-                self.names.faults.add(self.path, message, f"rename the {kind}")
+                self.names.faults.add(self.path, message, f"rename the {kind}", "EG-NAME-TAKEN")
             return self.local[name]
         quantity: MarkerQuantity | ElementQuantity | None = None
         if "(" in name:
@@ -155,7 +156,7 @@ class Scope:
                 if quantity is not None:
                     return self.locate(quantity)
             except ExpressionError as error:
-                self.names.faults.add(self.path, error.message, error.remedy)
+                self.names.faults.add(self.path, error.message, error.remedy, error.code)
                 return self.graph.symbol(name)
         kind = self.names.kinds.get(name)
         if kind == "output" and name in (*ENERGIES, *TOTALS) and self.path == f"{self.names.places[name]}.expression":
@@ -171,7 +172,7 @@ class Scope:
             known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level)]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
             remedy = joined(CONSTANTS.get(name.lower(), ""), remedy)
-            self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
+            self.names.faults.add(self.path, f"unknown name {name!r}", remedy, "EG-NAME-UNKNOWN")
         elif LEVELS[kind] > self.level:
             self._refuse(name, kind)
         elif kind == "output":
@@ -183,11 +184,11 @@ class Scope:
         found = self.output(output)
         for name, what in late_names(self.names, symbols_of([found])) if self.level < OUTPUT else ():
             message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
-            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}")
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([found])
         for name in sorted(energies) if self.level < OUTPUT else ():
             message = f"the output {output!r} depends on {name.removesuffix('()')!r}, which cannot be used here"
-            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}")
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         return found
 
     def locate(self, found: MarkerQuantity | ElementQuantity) -> Expr:
@@ -234,4 +235,4 @@ class Scope:
 
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"
-        self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy)
+        self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")

@@ -84,7 +84,7 @@ def _refusal(forces: Collection[Any], why: str) -> ModelError:
     names = ", ".join(sorted(str(sympy_name(force)) for force in forces))
     message = f"the forces {names} of the auxiliary speeds do not follow from their equations: {why}"
     remedy = "name those that are known in inputs= or specified=, or form the equations without u_auxiliary"
-    return ModelError([Problem("equations", message, remedy)])
+    return ModelError([Problem("equations", message, remedy, code="EG-UNDETERMINED")])
 
 
 def _unknown_forces(forms: Forms, given: Collection[str], constants: Collection[str]) -> list[Any]:

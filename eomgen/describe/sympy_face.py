@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ExpressionError, ModelError, Problem, UsageError
+from ..errors import ExpressionError, ModelError, Problem, ill_typed
 from ..graph.shown import parts_of, quoted, shortened
 from ..texts import shown
 from .description import items
@@ -20,7 +20,7 @@ Resolve = Callable[[str], "Expr"]
 def require_name(what: str, name: Any) -> str:
     """The name that was given for something; UsageError if it is no text."""
     if not isinstance(name, str):
-        raise UsageError(f"{what}: a name is a text, such as 'A', not {shown(name)}")
+        raise ill_typed(f"{what}: a name is a text, such as 'A', not {shown(name)}")
     return name
 
 
@@ -35,7 +35,7 @@ def named(what: str, given: Any) -> dict[Any, Any]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise UsageError(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(given)}")
+        raise ill_typed(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(given)}")
     return {require_name(what, name_of(key)): value for key, value in given.items()}
 
 
@@ -60,7 +60,7 @@ def names_of(path: str, given: Any, what: str) -> list[str]:
     listed = one_or_several(given)
     remedy = "give symbols q or functions q(t) of the time t"
     wrong = [
-        Problem(f"{path}[{k}]", f"{shortened(q)} is not {what}", remedy)
+        Problem(f"{path}[{k}]", f"{shortened(q)} is not {what}", remedy, code="EG-TYPE")
         for k, q in enumerate(listed)
         if not isinstance(q, str) and sympy_name(q) is None
     ]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import ill_typed, incomplete
 from .sympy_face import name_of
 
 KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
@@ -48,17 +48,17 @@ def read_forms(method: Any) -> Forms:
 
     if isinstance(method, System):
         if method.eom_method is None:
-            raise UsageError("the System has no equations yet; call form_eoms() on it first")
+            raise incomplete("the System has no equations yet; call form_eoms() on it first")
         return read_forms(method.eom_method)
     if isinstance(method, JointsMethod):
         if method.method is None:
-            raise UsageError("the JointsMethod has no equations yet; call form_eoms() on it first")
+            raise incomplete("the JointsMethod has no equations yet; call form_eoms() on it first")
         return read_forms(method.method)
     if isinstance(method, KanesMethod):
         return _read_kane(method)
     if isinstance(method, LagrangesMethod):
         return _read_lagrange(method)
-    raise UsageError(f"from_sympy takes SymPy's {KNOWN} with its equations formed, not {type(method).__name__}")
+    raise ill_typed(f"from_sympy takes SymPy's {KNOWN} with its equations formed, not {type(method).__name__}")
 
 
 def _read_lagrange(method: Any) -> Forms:
@@ -66,7 +66,7 @@ def _read_lagrange(method: Any) -> Forms:
     from sympy import Matrix, S
 
     if method.eom is None:
-        raise UsageError("the LagrangesMethod has no equations yet; call form_lagranges_equations() on it first")
+        raise incomplete("the LagrangesMethod has no equations yet; call form_lagranges_equations() on it first")
     q = list(method.q)
     v = list(method._qdots)
     n, holonomic = len(q), list(method._hol_coneqs)
@@ -98,7 +98,7 @@ def _read_kane(method: Any) -> Forms:
     from sympy import S, Symbol
 
     if method._fr is None or method._frstar is None:
-        raise UsageError("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
+        raise incomplete("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
     q, v = list(method.q), list(method.u)
     whole, parts = method, dict[Any, Any]()
     if len(method._udep) or not method._k_kqdot_implicit.is_diagonal():

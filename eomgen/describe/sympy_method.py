@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..errors import ModelError, Problem, UsageError
+from ..errors import ModelError, Problem, ill_typed
 from .description import Description
 from .names import nearest
 from .printed_names import give_latex
@@ -56,7 +56,9 @@ def describe_method(
     for key in given_parameters:
         if key not in constants:
             near = nearest(str(key), constants, "constants")
-            problems.append(Problem(f"parameters.{key}", f"the equations have no constant {key!r}", near))
+            problems.append(
+                Problem(f"parameters.{key}", f"the equations have no constant {key!r}", near, code="EG-NAME-UNKNOWN")
+            )
     if problems:
         raise ModelError(problems)
 
@@ -119,9 +121,13 @@ class _Known:
         for k, x in enumerate([*forms.q, *forms.v]):
             name = name_of(x)
             if not isinstance(name, str):
-                self.problems.append(Problem("equations", f"{x} is not a function of the time t", "use dynamicsymbols"))
+                self.problems.append(
+                    Problem("equations", f"{x} is not a function of the time t", "use dynamicsymbols", code="EG-TYPE")
+                )
             elif name in self.names:
-                self.problems.append(Problem("equations", f"the name {name!r} is given twice", "rename one"))
+                self.problems.append(
+                    Problem("equations", f"the name {name!r} is given twice", "rename one", code="EG-NAME-TAKEN")
+                )
             self.names[str(name) if isinstance(name, str) else f"?{k}"] = x
         motion = [f"{name_of(x)}{suffix}" for x in forms.q for suffix in RATES]
         self.motion = {*motion, *(f"{name_of(x)}_dot" for x in forms.v), *self.names}
@@ -150,16 +156,18 @@ class _Known:
             if symbol in self.names or symbol in functions:
                 what = "a coordinate or speed" if symbol in self.names else "a function of time"
                 message = f"{symbol!r} is both a constant and {what}"
-                self.problems.append(Problem(f"equations.{symbol}", message, "rename one"))
+                self.problems.append(Problem(f"equations.{symbol}", message, "rename one", code="EG-NAME-TAKEN"))
             elif len(different) > 1:
                 message = f"{len(different)} different symbols are called {symbol!r}"
                 remedy = "make one symbol and use it everywhere (assumptions such as positive=True make another)"
-                self.problems.append(Problem(f"equations.{symbol}", message, remedy))
+                self.problems.append(Problem(f"equations.{symbol}", message, remedy, code="EG-NAME-TAKEN"))
         driven = [name for name in symbols if name in inputs]
         for name in inputs:
             if name not in functions and name not in symbols:
                 near = nearest(str(name), [*functions, *symbols], "known")
-                self.problems.append(Problem(f"inputs.{name}", f"the equations do not contain {name!r}", near))
+                self.problems.append(
+                    Problem(f"inputs.{name}", f"the equations do not contain {name!r}", near, code="EG-NAME-UNKNOWN")
+                )
         constants = [name for name in symbols if name not in self.names and name not in driven]
         return sorted(set(constants) - functions), sorted({*functions, *driven})
 
@@ -168,7 +176,7 @@ def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]
     """Replace functions of time by expressions, their derivatives by those of the expressions."""
     for key in specified:
         if not is_sympy(key) or function_name(key) is None:
-            raise UsageError(f"specified takes functions of time f(t), not {key!r}")
+            raise ill_typed(f"specified takes functions of time f(t), not {key!r}")
 
     vars(forms).update(put(vars(forms), specified))
     outputs.update(put(outputs, specified))

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from functools import partialmethod
 from typing import Any
 
-from ..errors import ExpressionError, UsageError
+from ..errors import ExpressionError, cannot
 from ..graph.core import Expr, Graph
 from ..graph.functions import Function
 from ..operations import OPERATIONS
@@ -47,9 +47,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 
         def _print_Heaviside(self, e: Any) -> str:
             if 2 * e.args[1] != 1:
-                raise UsageError(
-                    f"{shortened(e)} cannot be written as a text: only heaviside with the value 1/2 at 0 can"
-                )
+                raise cannot(f"{shortened(e)} cannot be written as a text: only heaviside with the value 1/2 at 0 can")
             return f"heaviside({self._print(e.args[0])})"
 
         def _print_Exp1(self, e: Any) -> str:
@@ -70,9 +68,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
         def _print_Piecewise(self, e: Any) -> str:
             *pieces, last = e.args
             if last.cond != True:  # noqa: E712 - SymPy's own true
-                raise UsageError(
-                    f"{shortened(e)} leaves cases without a value; end the Piecewise with (expression, True)"
-                )
+                raise cannot(f"{shortened(e)} leaves cases without a value; end the Piecewise with (expression, True)")
             text = self._print(last.expr)
             for piece in reversed(pieces):
                 text = f"where({self._print(piece.cond)}, {self._print(piece.expr)}, {text})"
@@ -99,9 +95,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             wanted = dict(e.variable_count)
             orders = [wanted.get(x, 0) for x in e.expr.args]
             if sum(orders) != sum(wanted.values()) or any(set(wanted) & x.free_symbols - {x} for x in e.expr.args):
-                raise UsageError(
-                    f"{shortened(e)} cannot be written as a text: write out the chain rule of its derivative"
-                )
+                raise cannot(f"{shortened(e)} cannot be written as a text: write out the chain rule of its derivative")
             call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
             return f"diff({', '.join([call, *map(str, orders)])})"
 
@@ -111,9 +105,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     try:
         text = str(Printer().doprint(expression))
     except RecursionError:
-        raise UsageError(f"{shortened(expression)} is nested too deeply to be written as a text") from None
+        raise cannot(f"{shortened(expression)} is nested too deeply to be written as a text") from None
     except ValueError:  # Python writes whole numbers of some thousand digits and no longer ones
-        raise UsageError(
+        raise cannot(
             f"{shortened(expression)} contains a number with too many digits to be written as a text"
         ) from None
     graph = Graph()
@@ -133,5 +127,5 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     try:
         parse(text, graph, resolve, locate)
     except ExpressionError as error:
-        raise UsageError(f"{shortened(expression)} cannot be written as a text: {shortened(error)}") from None
+        raise cannot(f"{shortened(expression)} cannot be written as a text: {shortened(error)}") from None
     return text

@@ -81,7 +81,10 @@ class Reader:
         names = [str(entry.name) for entry in self.description.sections["forces"]]
         if quantity.element not in names:
             raise ExpressionError(
-                f"no force element {quantity.element!r}", 0, nearest(quantity.element, names, "elements")
+                f"no force element {quantity.element!r}",
+                0,
+                nearest(quantity.element, names, "elements"),
+                code="EG-NAME-UNKNOWN",
             )
         for label in (quantity.on, quantity.axes):
             if label:
@@ -94,7 +97,7 @@ class Reader:
         names = [str(entry.name) for place in places for entry in self.description.sections[place]]
         if quantity.owner not in names:
             message = f"no {'joint' if quantity.part else 'constraint or joint'} {quantity.owner!r}"
-            raise ExpressionError(message, 0, nearest(quantity.owner, names, "known"))
+            raise ExpressionError(message, 0, nearest(quantity.owner, names, "known"), code="EG-NAME-UNKNOWN")
         if quantity.axes:
             self.moving(quantity.axes)
 
@@ -106,9 +109,9 @@ class Reader:
     def wrong(self, path: str, value: object, kind: str) -> None:
         """Note that a value is not of a kind."""
         if value is None:
-            self.faults.add(path, "has no value", f"give {KINDS[kind]}")
+            self.faults.add(path, "has no value", f"give {KINDS[kind]}", "EG-MISSING")
         else:
-            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}")
+            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}", code="EG-TYPE")
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -140,10 +143,10 @@ class Reader:
                 return self.graph.constant(float(value))
         except ExpressionError as error:
             if not self.names.explains(error):
-                self.faults.add(path, error.place(), error.remedy)
+                self.faults.add(path, error.place(), error.remedy, error.code)
             return self.stand_in
         except OverflowError:
-            self.faults.add(path, f"{quoted(value)} is not a finite number")
+            self.faults.add(path, f"{quoted(value)} is not a finite number", code="EG-NUMBER")
             return self.stand_in
         self.wrong(path, value, "expression")
         return self.stand_in
@@ -171,7 +174,7 @@ class Reader:
             return ""
         half = lone_surrogate(value)
         if half:
-            self.faults.add(path, f"contains {half}, which is half of a character pair", WHOLE)
+            self.faults.add(path, f"contains {half}, which is half of a character pair", WHOLE, "EG-TYPE")
             return ""
         return join_surrogates(value)
 
@@ -182,11 +185,8 @@ class Reader:
             return None
         name = usable_name(value)
         if name is None:
-            self.faults.add(
-                path,
-                f"{value!r:.200} is empty, or contains a character that file names cannot have",
-                "give another name",
-            )
+            message = f"{value!r:.200} is empty, or contains a character that file names cannot have"
+            self.faults.add(path, message, "give another name", "EG-FILE")
         return name
 
     def flag(self, path: str, value: Any) -> bool:
@@ -209,7 +209,7 @@ class Reader:
             return value
         shown = list(field.choices)
         remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
-        self.faults.add(path, f"{quoted(value)} is not known", remedy)
+        self.faults.add(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
         return str(field.default)
 
     # -- vectors and matrices -------------------------------------------------------------------------------------
@@ -228,7 +228,9 @@ class Reader:
         if isinstance(value, Mapping):
             for key in value:
                 if key not in INERTIA:
-                    self.faults.add(f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"))
+                    self.faults.add(
+                        f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"), "EG-NAME-UNKNOWN"
+                    )
             given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
             xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
@@ -250,7 +252,9 @@ class Reader:
         at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
         given = [key for key in ("rpy", "axes", "matrix") if key in values]
         if len(given) > 1:
-            self.faults.add(f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix")
+            self.faults.add(
+                f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT"
+            )
         if not given:
             return Frame(self.identity, at)
         if given[0] == "rpy":
@@ -267,9 +271,8 @@ class Reader:
         if self.faults.under(path):
             return self.identity
         if abs(sum(x * y for x, y in zip(a, b, strict=True))) > PERPENDICULAR:
-            self.faults.add(
-                path, f"the directions of {first} and {second} are not at right angles", "correct one of them"
-            )
+            remedy = "correct one of them"
+            self.faults.add(path, f"the directions of {first} and {second} are not at right angles", remedy, "EG-RANGE")
             return self.identity
         columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
         return turn_matrix(self.graph, columns)
@@ -290,7 +293,7 @@ class Reader:
         if found is None and label in self.description.motions:
             found = self.marker(label, self.description.motions[label])
         if found is None:
-            raise ExpressionError(*self.unknown_marker(label))
+            raise ExpressionError(*self.unknown_marker(label), code="EG-NAME-UNKNOWN")
         return found
 
     def unknown_marker(self, label: str) -> tuple[str, int, str]:
@@ -310,7 +313,7 @@ class Reader:
             body = value.partition(".")[0]
             if found is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
                 message, _, remedy = self.unknown_marker(value)
-                self.faults.add(path, message, remedy)
+                self.faults.add(path, message, remedy, "EG-NAME-UNKNOWN")
             return found
         if not isinstance(value, Mapping):
             self.wrong(path, value, "marker")
@@ -320,7 +323,12 @@ class Reader:
             return None
         body = value["body"]
         if not isinstance(body, str) or body not in self.bodies:
-            self.faults.add(f"{path}.body", f"no body {quoted(body)}", nearest(shown(body), self.bodies, "bodies"))
+            self.faults.add(
+                f"{path}.body",
+                f"no body {quoted(body)}",
+                nearest(shown(body), self.bodies, "bodies"),
+                "EG-NAME-UNKNOWN",
+            )
             return None
         return Marker(self.bodies[body], self.frame(path, value), label_of(value))
 
@@ -350,7 +358,7 @@ class Reader:
         if self.faults.under(path):
             return TURNS["z"]
         if abs(sum(a * b for a, b in zip(x, y, strict=True))) > PERPENDICULAR:
-            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {KINDS['axes']}")
+            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {KINDS['axes']}", "EG-RANGE")
             return TURNS["z"]
         return axes_columns(x, y)
 
@@ -359,17 +367,17 @@ class Reader:
         if isinstance(value, str):
             if value in TURNS:
                 return TURNS[value]
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}", "EG-TYPE")
             return TURNS["z"]
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}", "EG-TYPE")
             return TURNS["z"]
         x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
         if x is None or y is None or z is None:
             return TURNS["z"]
         columns = axis_columns((x, y, z))
         if columns is None:
-            self.faults.add(path, "the axis has no length", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, "the axis has no length", f"allowed: {KINDS['axis']}", "EG-RANGE")
             return TURNS["z"]
         return columns

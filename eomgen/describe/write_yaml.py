@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..texts import comment_text, yaml_quoted
 from .description import SECTIONS, Description, is_zero, items
 from .dotted_names import undotted
@@ -98,7 +98,7 @@ def _value(value: Any, functions: Names) -> str:
             return _sympy(value, functions)
         from ..graph.shown import shortened
 
-        raise UsageError(f"{shortened(value)} cannot be written to a model file")
+        raise cannot(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):
         return _sympy(value, functions)
     if isinstance(value, str):

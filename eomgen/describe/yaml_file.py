@@ -64,19 +64,23 @@ def _text_of(name: str) -> str:
     with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:
-        raise ModelError([Problem("file", "is too large", f"at most {SIZE} bytes", name, 1)])
+        raise ModelError([Problem("file", "is too large", f"at most {SIZE} bytes", name, 1, code="EG-TOO-LARGE")])
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise ModelError([Problem("file", "is not UTF-8 text", "save it as UTF-8", name, line)]) from None
+        raise ModelError(
+            [Problem("file", "is not UTF-8 text", "save it as UTF-8", name, line, code="EG-FILE-DAMAGED")]
+        ) from None
 
 
 def _describe(text: str, file: str, origin: _Origin) -> Description:
     document = Document(text, file)
     tree = document.value
     if not isinstance(tree, Mapping):
-        raise ModelError([Problem("file", "is not a mapping", f"allowed keys: {', '.join(MODEL)}", file, 1)])
+        raise ModelError(
+            [Problem("file", "is not a mapping", f"allowed keys: {', '.join(MODEL)}", file, 1, code="EG-FILE-DAMAGED")]
+        )
     description = Description(lines=dict(document.lines), problems=document.problems)
     faults = Faults(description)
 
@@ -90,14 +94,14 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
                 if isinstance(given[key], Mapping):
                     target.values[key] = given[key]
                 elif given[key] is not None:
-                    faults.add(f"{start}{key}", f"is not {KINDS['table']}", "write names as keys")
+                    faults.add(f"{start}{key}", f"is not {KINDS['table']}", "write names as keys", "EG-TYPE")
 
     def open_file(name: str) -> Description | None:
         return _open_part(name, file, origin, faults)
 
     for key, value in tree.items():
         if key not in MODEL:
-            faults.add(key, "unknown key", nearest(key, MODEL, "allowed"))
+            faults.add(key, "unknown key", nearest(key, MODEL, "allowed"), "EG-NAME-UNKNOWN")
         elif (
             key not in SECTIONS
             and key not in PARTS
@@ -124,7 +128,7 @@ def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Descrip
     real = beside(file, name)
     if real in within:
         chain = ", ".join(os.path.basename(one) for one in (*within[within.index(real) :], real))
-        raise UsageError(f"the file {name} adds itself: {chain}")
+        raise UsageError(f"the file {name} adds itself: {chain}", code="EG-CIRCLE")
     try:
         found = _describe(_text_of(path), path, _Origin(origin.trusted, os.path.dirname(path), within))
     except ModelError as error:
@@ -145,7 +149,7 @@ def _add_contacts(description: Description, faults: Faults, value: Any, origin: 
     if value is None:
         return
     if not isinstance(value, Mapping):
-        faults.add("contacts", f"is not {KINDS['table']}", "write the names of the contacts as keys")
+        faults.add("contacts", f"is not {KINDS['table']}", "write the names of the contacts as keys", "EG-TYPE")
         return
     for path, place in list(description.lines.items()):
         if path.startswith("contacts."):
@@ -153,7 +157,7 @@ def _add_contacts(description: Description, faults: Faults, value: Any, origin: 
     forces: dict[str, Any] = {}
     for name, given in value.items():
         if isinstance(given, Mapping) and "type" in given:
-            faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out")
+            faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out", "EG-CONFLICT")
         forces[name] = {"type": "contacts", **given} if isinstance(given, Mapping) else given
     _add_section(description, faults, "", "forces", forces, origin)
 
@@ -164,11 +168,11 @@ def _spread_law(description: Description, faults: Faults, path: str, values: dic
     if values.get("type") != "contacts" or "law" not in values:
         return values
     if not isinstance(law, Mapping):
-        faults.add(f"{path}.law", f"is not {KINDS['law']}", "give stiffness and what else the law has")
+        faults.add(f"{path}.law", f"is not {KINDS['law']}", "give stiffness and what else the law has", "EG-TYPE")
         return values
     for key in law:
         if key in values:
-            faults.add(f"{path}.{key}", "is given in law and beside it", "give it once")
+            faults.add(f"{path}.{key}", "is given in law and beside it", "give it once", "EG-CONFLICT")
         if f"{path}.law.{key}" in description.lines:
             description.lines[f"{path}.{key}"] = description.lines[f"{path}.law.{key}"]
     return {key: x for key, x in values.items() if key != "law"} | dict(law)
@@ -181,7 +185,9 @@ def _add_section(
     if value is None:
         return
     if not isinstance(value, Mapping):
-        faults.add(f"{start}{section}", f"is not {KINDS['table']}", f"write the names of the {section} as keys")
+        faults.add(
+            f"{start}{section}", f"is not {KINDS['table']}", f"write the names of the {section} as keys", "EG-TYPE"
+        )
         return
     for name, given in value.items():
         values, place = given, f"{section}.{name}"
@@ -194,7 +200,9 @@ def _add_section(
                     description.lines[f"{place}.{key}"] = description.lines[place]
                 values = {key: given}
             else:
-                faults.add(f"{start}{place}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}")
+                faults.add(
+                    f"{start}{place}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}", "EG-TYPE"
+                )
                 values = {}
         if section == "forces":
             values = _spread_law(description, faults, place, values)

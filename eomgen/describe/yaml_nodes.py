@@ -15,6 +15,7 @@ from ..texts import WHOLE, join_surrogates, lone_surrogate, visible
 SIZE = 1_000_000  #: bytes of a file
 DEPTH = 12  #: nesting
 NODES = 100_000  #: scalars, sequences and mappings
+DAMAGED = "EG-FILE-DAMAGED"
 
 _INT = re.compile(r"[-+]?[0-9]+\Z", re.ASCII)
 _BASED = re.compile(r"0o[0-7]+\Z|0x[0-9a-fA-F]+\Z", re.ASCII)
@@ -61,20 +62,20 @@ class Document:
         self.count = 0
         self.value = self._read(text)
 
-    def _stop(self, line: int, message: str, remedy: str = "", path: str = "") -> ModelError:
+    def _stop(self, line: int, message: str, remedy: str = "", path: str = "", code: str = DAMAGED) -> ModelError:
         """An error after which reading on makes no sense."""
-        problem = Problem(path or "file", message, remedy, self.file, line)
+        problem = Problem(path or "file", message, remedy, self.file, line, code)
         return ModelError([*self.problems, problem])
 
     def _note(self, path: str, line: int, message: str, remedy: str) -> None:
-        self.problems.append(Problem(path, message, remedy, self.file, line))
+        self.problems.append(Problem(path, message, remedy, self.file, line, DAMAGED))
 
     def _read(self, text: str) -> Any:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
         if len(text) > SIZE:
-            raise self._stop(1, f"the file has {len(text)} characters", f"at most {SIZE}")
+            raise self._stop(1, f"the file has {len(text)} characters", f"at most {SIZE}", code="EG-TOO-LARGE")
         reader = YAML(typ="safe", pure=True)
         try:
             self._events = iter(reader.parse(text))
@@ -108,9 +109,9 @@ class Document:
         kind, line = type(event).__name__, event.start_mark.line + 1
         self.count += 1
         if self.count > NODES:
-            raise self._stop(line, "the file has too many values", f"at most {NODES}", path)
+            raise self._stop(line, "the file has too many values", f"at most {NODES}", path, "EG-TOO-LARGE")
         if depth > DEPTH:
-            raise self._stop(line, "nested too deeply", f"at most {DEPTH} levels", path)
+            raise self._stop(line, "nested too deeply", f"at most {DEPTH} levels", path, "EG-TOO-LARGE")
         if kind == "AliasEvent":
             self._note(
                 path or "file", line, f"the alias *{event.anchor}", "aliases are not supported: write the value itself"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, UsageError, ill_typed
 from .arrays_on_device import Array, DeviceArray
 from .nvrtc import INSTALL, best_architecture, compile_device_text
 
@@ -43,7 +43,9 @@ class CudaDevice:
             self.device = core.Device(number)
             self.device.set_current()
         except Exception as error:  # of several libraries, by what is missing
-            raise UsageError(f"GPU {number} cannot be used: {error}; is NVIDIA's driver installed?") from error
+            raise UsageError(
+                f"GPU {number} cannot be used: {error}; is NVIDIA's driver installed?", code="EG-COMPILER-MISSING"
+            ) from error
         self.stream = self.device.default_stream
         capability = self.device.compute_capability
         self.architecture = best_architecture((capability.major, capability.minor))
@@ -150,8 +152,8 @@ def require_plain(shape: Sequence[int], dtype: Any, strides: Sequence[int] | Non
         It holds other numbers than float64, or not in C order.
     """
     if dtype != np.float64:
-        raise UsageError(f"an array on the GPU must hold float64 (double), not {dtype}")
+        raise ill_typed(f"an array on the GPU must hold float64 (double), not {dtype}")
     plain = [prod(shape[k + 1 :]) for k in range(len(shape))]
     steps = plain if strides is None or not prod(shape) else strides
     if any(n > 1 and step != wanted for n, step, wanted in zip(shape, steps, plain, strict=True)):
-        raise UsageError("an array on the GPU must lie in C order, without gaps; make a contiguous copy")
+        raise ill_typed("an array on the GPU must lie in C order, without gaps; make a contiguous copy")

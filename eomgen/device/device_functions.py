@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped, ill_typed, incomplete, no_such
 from ..targets import TIMED_ON_DEVICE
 from .arrays_on_device import Array, Device, DeviceArray
 
@@ -70,11 +70,11 @@ class DeviceFunctions:
             try:
                 found = np.asarray(given, dtype=float)
             except (TypeError, ValueError):
-                raise UsageError(f"{label} must be an array of numbers, not {type(given).__name__}") from None
+                raise ill_typed(f"{label} must be an array of numbers, not {type(given).__name__}") from None
         shape = tuple(found.shape)
         if len(shape) not in (1, 2) or shape[0] != length or (len(shape) == 2 and count not in (None, 1, shape[1])):
             wanted = f"({length},) or ({length}, {'k' if count in (None, 1) else count})"
-            raise UsageError(f"{label} must have shape {wanted}, not {shape}")
+            raise ill_shaped(f"{label} must have shape {wanted}, not {shape}")
         on_device = found if isinstance(found, DeviceArray) else self.device.put(found)
         return on_device, shape[1] if len(shape) == 2 else None
 
@@ -126,13 +126,13 @@ class BatchCall:
             found.append((array, each))
             count, batch = (count, batch) if each is None else (each, True)
         if any((1 if each is None else each) != count for _, each in found):
-            raise UsageError(f"{' and '.join(port for port, _ in self.ports)} must have the same number of columns")
+            raise ill_shaped(f"{' and '.join(port for port, _ in self.ports)} must have the same number of columns")
         t, each_t = self._times(values["t"], count)
         given_u = module.kept("u", module.u) if values["u"] is None else values["u"]
         u, each_u = module.columns("u", given_u, module.n_u, count)
         c, each_c = module.constants(values["p"], count)
         if not batch and (each_t or each_u is not None or each_c):
-            raise UsageError(f"{self.ports[0][0]} is one state, so t, p and u must be too")
+            raise ill_shaped(f"{self.ports[0][0]} is one state, so t, p and u must be too")
         result = device.empty((prod(self.shape), count), np.float64)
         codes = device.empty((count,), np.int32)
         launch = module.kernel(f"{self.name}_batch", self.name)
@@ -151,11 +151,11 @@ class BatchCall:
         unknown = [name for name in named if name not in self.labels]
         twice = [name for name in self.labels[: len(given)] if name in named]
         if unknown or twice or len(given) > len(self.labels):
-            raise UsageError(f"{self.name} takes {', '.join(self.labels)} and status, each once")
+            raise no_such(f"{self.name} takes {', '.join(self.labels)} and status, each once")
         values = {"t": 0.0, "p": None, "u": None, **dict(zip(self.labels, given, strict=False)), **named}
         missing = [name for name in self.labels if name not in values]
         if missing:
-            raise UsageError(f"{self.name} needs {', '.join(missing)}")
+            raise incomplete(f"{self.name} needs {', '.join(missing)}")
         return values
 
     def _times(self, given: Any, count: int) -> tuple[DeviceArray, bool]:
@@ -164,5 +164,5 @@ class BatchCall:
             array = np.asarray(given, dtype=float)
             there = self.module.kept("t", array) if array.ndim == 0 else self.module.device.put(array)
         if there.shape not in ((), (1,), (count,)):
-            raise UsageError(f"t must be a number or of shape ({count},), not {there.shape}")
+            raise ill_shaped(f"t must be a number or of shape ({count},), not {there.shape}")
         return there, there.shape == (count,) and count > 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import cannot, ill_shaped, no_choice
 from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
@@ -74,19 +74,19 @@ def carry_out(
 ) -> DeviceRuns:
     """Run every column of x0; see :meth:`~.device_module.DeviceModule.simulate_many`."""
     if module.facts["no_runs"]:
-        raise UsageError(f"simulate_many of {module.name!r} on a device: {module.facts['no_runs']}")
+        raise cannot(f"simulate_many of {module.name!r} on a device: {module.facts['no_runs']}")
     like = cast("BoundModel", module)  # metadata and n_dof are all that is read
     declared, device, n = declare(like), module.device, module.n_x
     start, end = find_span(span, float(declared["end"]))
     if module.metadata.get("clocks") and (start != 0.0 or end < 0.0):
-        raise UsageError(
+        raise cannot(
             f"runs on a device of a model with sampled states begin at 0 s and go forward, not from {start:.6g} s to "
             f"{end:.6g} s; use simulate_many of the module"
         )
     method, step = own_step(like, declared["method"] if method is None else method, step)
     methods = [name.upper() for name in module.facts["methods"]]
     if method not in methods:
-        raise UsageError(f"no method {method!r} on a device; there are {', '.join(methods)}")
+        raise no_choice(f"no method {method!r} on a device; there are {', '.join(methods)}")
     step = check_method(method, step)
     own = {name: declared[name] for name in ("rtol", "atol", "max_step") if name in declared}
     chosen = own | {k: v for k, v in options.items() if v is not None}
@@ -94,7 +94,7 @@ def carry_out(
         chosen |= {"max_step": step, "first_step": step}
     chosen = check_tolerances(n, abs(end - start), chosen)
     if not isinstance(chosen["rtol"], float):
-        raise UsageError(f"rtol must be one number on a device, not of shape {np.shape(chosen['rtol'])}")
+        raise ill_shaped(f"rtol must be one number on a device, not of shape {np.shape(chosen['rtol'])}")
     times = np.empty(0) if t_eval is None else ordered_times(t_eval, start, end, n)
     most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", keep_events, 1)
     states, count = module.columns("x0", x0, n)
@@ -116,7 +116,7 @@ def carry_out(
     results = ("times", "samples", "x", "t", "status", "counts", "failure", "failure_time")
     launch = module.kernel(f"{method.lower()}_runs", "runs", method)
     if not count:
-        raise UsageError("x0 holds no states; give one column for each run")
+        raise ill_shaped("x0 holds no states; give one column for each run")
     nodes, atol = device.put(np.array([start, end])), device.put(np.broadcast_to(chosen["atol"], (n,)) * 1.0)
     launch(
         count, nodes, np.int32(2), states, parameters, np.int64(each_p is not None), inputs,

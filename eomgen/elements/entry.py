@@ -63,8 +63,11 @@ class Entry(Protocol):
     stand_in: Expr  #: in place of an expression that is at fault
 
     # -- faults ---------------------------------------------------------------------------------------------------
-    def fault(self, key: str, message: str, remedy: str = "") -> None:
+    def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
         """Note a fault of one key, or of the entry as a whole (``""``)."""
+
+    def missing(self, key: str, remedy: str) -> None:
+        """Note that a key is missing."""
 
     def at_fault(self, key: str = "") -> bool:
         """Whether a fault of the key, or any, has been noted."""

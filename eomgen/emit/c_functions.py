@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import incomplete
 from ..graph.functions import Function
 from ..graph.pair_calls import pair_call
 from ..graph.traverse import reachable
@@ -118,7 +118,7 @@ def _table(program: str, function: Function, used: Sequence[Orders]) -> dict[str
             "slope": repr(float(table.slope)),
             "calls": calls,
         }
-    raise UsageError(f"function {function.name!r} has neither a table nor C code")
+    raise incomplete(f"function {function.name!r} has neither a table nor C code")
 
 
 def _knots(axis: str, knots: np.ndarray) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import UsageError
+from ..errors import incomplete
 from ..graph.functions import Function
 from ..numeric.user_functions import Curve, Surface, Twin
 from ..program import Program
@@ -86,7 +86,7 @@ def twin_files(program: Program) -> dict[str, str]:
             continue
         f.require_evaluator()
         if not f.native.twin_text:
-            raise UsageError(
+            raise incomplete(
                 f"function {f.name!r}: a package of target numpy needs this function in Python too, in a file; give "
                 f"python= the path of a file that defines {', '.join(name for _, name in f.native.names)}"
             )

@@ -8,7 +8,7 @@ from dataclasses import replace
 from textwrap import fill
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UsageError, cannot, no_choice
 from ..layer import read_layer
 from ..program import Program
 from ..runtime.layout import Layout
@@ -75,11 +75,11 @@ def emit_package(
     """
     row = find_target(target)
     if row.whole:
-        raise UsageError(f"target {target!r} makes one file, not a package; use generate")
+        raise cannot(f"target {target!r} makes one file, not a package; use generate")
     if precision not in PRECISIONS:
-        raise UsageError(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
+        raise no_choice(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
     if precision != "double" and not row.precisions:
-        raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
+        raise cannot(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
     program = replace(program, metadata={**program.metadata, **made})
     context = _context(program) | {"precision": precision}

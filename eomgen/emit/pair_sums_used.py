@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..graph.pair_calls import PairFunction, pair_call
 from ..graph.traverse import reachable
 from ..program import Program
@@ -78,7 +78,7 @@ def refuse_sums(program: Program, target: str) -> None:
     """
     names = sorted({function.element for function, *_ in used_sums(program)})
     if names:
-        raise UsageError(
+        raise cannot(
             f"{target} has no contacts between groups of shapes (here {', '.join(names)}); use target c, cython or "
             "numpy, or describe each pair by point_plane, sphere_plane or sphere_sphere"
         )

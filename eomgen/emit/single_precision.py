@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from math import log
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.in_c import KINDS
 from ..limits.rounding import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..operations import FUNCTION, OPERATIONS
@@ -63,13 +63,13 @@ def refuse_double(program: Program) -> None:
     refuse_sums(program, "precision='float'")
     laws = program.metadata.get("reaction_laws", [])
     if laws:
-        raise UsageError(
+        raise cannot(
             f"precision='float': the forces of {', '.join(laws)} depend on reactions, which are solved for to more "
             "digits than single precision has; use precision='double'"
         )
     native = sorted({f.name for f, _ in used_calls(program).values() if f.native is not None})
     if native:
-        raise UsageError(
+        raise cannot(
             f"precision='float': the C source of the native function {', '.join(native)} is written in double "
             "precision; use precision='double'"
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..graph.functions import Function
 from ..kernel_table import NAMED
 from ..limits.constraints import ACCEPTED, DIFFERENTIATED
@@ -173,7 +173,7 @@ def _require_traceable(program: Program, library: str) -> None:
     if program.given_rates and program.has_loops:
         problems.append("equations with given rates q' = N v and constraints are projected by pivoting")
     if problems:
-        raise UsageError(f"target {library!r}: {'; '.join(problems)}")
+        raise cannot(f"target {library!r}: {'; '.join(problems)}")
 
 
 def _numbers(values: Any) -> str:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_file
 from ..files.reading import open_plain
 from ..files.writing import refuse_link
 
@@ -44,7 +44,7 @@ def write_package(sources: Mapping[str, str], folder: Path) -> Path:
     earlier = _earlier_files(folder)
     for name in sources:
         if earlier is not None and name not in earlier and os.path.lexists(folder / name):
-            raise UsageError(f"{folder / name} exists and was not written by eomgen; move it, or choose another --out")
+            raise bad_file(f"{folder / name} exists and was not written by eomgen; move it, or choose another --out")
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
         stage = Path(private) / folder.name
@@ -88,7 +88,7 @@ def _earlier_files(folder: Path) -> set[str] | None:
             raise ValueError
     except (OSError, ValueError, RecursionError, UsageError):
         message = f"{folder} exists and is not a generated package; choose another --out or remove it"
-        raise UsageError(message) from None
+        raise bad_file(message) from None
     files = listed.get("files")
     return {name for name in files if isinstance(name, str)} if isinstance(files, list) else None
 

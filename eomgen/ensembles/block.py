@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EomgenError, MissingDependencyError, UsageError
+from ..errors import EomgenError, MissingDependencyError, UsageError, cannot
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.signals import Forcing
@@ -207,7 +207,7 @@ def find_events(module: BoundModel, plan: Plan) -> Events:
     events = Events(module.layout, plan.events)
     for event in (*events.functions, *(event for event in events.model if event.action == WAIT)):
         what = "is an impact" if event.action == WAIT else "is a function"
-        raise UsageError(
+        raise cannot(
             f"event {event.name} of simulate_many {what}, which needs Python; "
             "give an expression as text, a reset, or run simulate for each case"
         )

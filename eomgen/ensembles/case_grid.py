@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.workspace_grid import read_axis
-from ..errors import UsageError
+from ..errors import at_odds, incomplete
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names, require_mapping, without_dots
 from ..runtime.room import require_room
@@ -39,15 +39,15 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     require_mapping("grid", grid)
     grid = without_dots(grid, module.layout.instances)
     if not grid:
-        raise UsageError("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
+        raise incomplete("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
     layout = module.layout
     states = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y)
     check_names("parameter, input, coordinate or rate", grid, (*module.p_names, *module.u_names, *states))
     for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
         if given is not None and not isinstance(given, Mapping):
-            raise UsageError(f"{what} must be given by name beside a grid")
+            raise incomplete(f"{what} must be given by name beside a grid")
         if twice := sorted({*grid} & {*without_dots(given or {}, layout.instances)}):
-            raise UsageError(f"grid: {', '.join(twice)} is given in {what} too; give it once")
+            raise at_odds(f"grid: {', '.join(twice)} is given in {what} too; give it once")
     axes = grid_axes(grid)
     count = math.prod(map(len, axes.values()))
     require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")

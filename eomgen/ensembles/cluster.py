@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_file, ill_typed
 from ..numeric.counts import as_count
 from ..runtime.near_names import require
 from .block import LOST, MEANING, Plan, RunBlock, find_events
@@ -58,11 +58,11 @@ def open_client(cluster: Any) -> Iterator[Any]:
         try:
             client = distributed.Client(cluster)
         except (OSError, ValueError) as error:
-            raise UsageError(f"cluster {cluster}: no scheduler answers at this address ({error})") from None
+            raise bad_file(f"cluster {cluster}: no scheduler answers at this address ({error})") from None
         with client:
             yield client
     else:
-        raise UsageError(
+        raise ill_typed(
             "cluster must be True, a number of local workers, the address of a scheduler or a dask Client, "
             f"not {cluster!r}"
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import bad_file, cannot, off_range
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..notation.notation import Notation
@@ -129,7 +129,7 @@ class Ensemble:
         if self._statistics:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
-            raise UsageError(
+            raise cannot(
                 f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}; "
                 "run it with reduce='states'"
             )
@@ -151,7 +151,7 @@ class Ensemble:
         if name not in self.event_names:
             raise unknown("event", name, self.event_names)
         if self._notes is None:
-            raise UsageError("this ensemble kept no events; give reduce='states' or 'events'")
+            raise cannot("this ensemble kept no events; give reduce='states' or 'events'")
         mine = self._notes[0] == self.event_names.index(name)
         most = int(mine.sum(axis=0).max(initial=0))
         order = np.argsort(~mine, axis=0, kind="stable")[:most]
@@ -163,7 +163,7 @@ class Ensemble:
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise UsageError("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
+            raise cannot("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
         else:
             parts = summarise(self._outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
@@ -175,7 +175,7 @@ class Ensemble:
     def case(self, k: int) -> dict[str, Any]:
         """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs, events."""
         if not -self.count <= k < self.count:
-            raise UsageError(f"there are runs 0 to {self.count - 1}, not {k}")
+            raise off_range(f"there are runs 0 to {self.count - 1}, not {k}")
         cases, column = self._cases, self._cases.column(k)
         if cases.states is not None:
             initial: Any = cases.states[:, k]
@@ -219,7 +219,7 @@ class Ensemble:
         columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps} | self.varied()
         if samples:
             if self.samples is None:
-                raise UsageError("this ensemble kept no samples; give t_eval (on the command line --samples)")
+                raise cannot("this ensemble kept no samples; give t_eval (on the command line --samples)")
             times = len(self.t)
             columns = {"run": np.arange(self.count), **columns}
             columns = {name: np.repeat(row, times) for name, row in columns.items()}
@@ -281,7 +281,7 @@ class Ensemble:
         target = as_path("path", path)
         if target.suffix not in ("", ".npz"):
             remedy = "to_pandas() gives a table, which has to_csv(...)"
-            raise UsageError(f"an ensemble is saved as .npz, not as {target.suffix}: {target}; {remedy}")
+            raise bad_file(f"an ensemble is saved as .npz, not as {target.suffix}: {target}; {remedy}")
         target = target.with_suffix(".npz")
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)

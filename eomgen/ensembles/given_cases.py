@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import AssemblyError, EomgenError, UsageError
+from ..errors import AssemblyError, EomgenError, UsageError, ill_shaped, no_number
 from ..marker_places import place_of_marker
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
@@ -294,14 +294,14 @@ def _read_bound(what: str, module: BoundModel, given: Any, lengths: dict[str, in
 def _require_one_length(lengths: Mapping[str, int]) -> None:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
-        raise UsageError(f"every (k,) and (n, k) array must have the same number of runs k, not {told}")
+        raise ill_shaped(f"every (k,) and (n, k) array must have the same number of runs k, not {told}")
 
 
 def _columns(what: str, given: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
     array = _floats(what, given)
     if array.ndim not in (1, 2) or array.shape[0] != len(names):
         told = ", ".join(names) or "none"
-        raise UsageError(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{told}], not {array.shape}")
+        raise ill_shaped(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{told}], not {array.shape}")
     if array.ndim == 2:
         lengths[what] = array.shape[1]
     return array
@@ -310,7 +310,7 @@ def _columns(what: str, given: Any, names: tuple[str, ...], lengths: dict[str, i
 def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
     array = _floats(what, given)
     if array.ndim > 1:
-        raise UsageError(f"{what} must be a number or have shape (k,), not {array.shape}")
+        raise ill_shaped(f"{what} must be a number or have shape (k,), not {array.shape}")
     if array.ndim:
         lengths[what] = len(array)
     return array if array.ndim else float(array)
@@ -320,5 +320,5 @@ def _floats(what: str, given: Any) -> Array:
     array = np.array(read_numbers(what, given))
     if not np.isfinite(array).all():
         first = np.argwhere(~np.isfinite(array))[0].tolist()
-        raise UsageError(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
+        raise no_number(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
     return array

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import MissingDependencyError, ToolchainError, UsageError
+from ..errors import MissingDependencyError, ToolchainError, cannot
 from ..files.build_folder import MANIFEST, read_entry
 from ..numeric.scales import Array
 from ..runtime.late import eager
@@ -72,7 +72,7 @@ def describe(module: BoundModel) -> Handle:
     core: Any = eager(module.core)
     file = str(getattr(core, "__file__", "") or "")
     if not file or not Path(file).is_file():
-        raise UsageError(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
+        raise cannot(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     if hasattr(core, "take_lanes"):
         core.take_lanes()  # here, once, so that workers find them beside the module
     getattr(core, "ensemble", None)  # likewise
@@ -93,7 +93,9 @@ def _recipe(file: Path) -> str:
     try:
         facts, files = read_entry(file.parent)
     except (OSError, ValueError) as error:
-        raise ToolchainError(f"the compiled code of the module is damaged: {error}; compile the model again") from None
+        raise ToolchainError(
+            f"the compiled code of the module is damaged: {error}; compile the model again", code="EG-FILE-DAMAGED"
+        ) from None
     folder = "sources/"
     sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
     if not sources:
@@ -110,7 +112,9 @@ def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...]
         try:
             return import_module(name)
         except ImportError as error:
-            raise ToolchainError(f"this worker has no module {name}: install its package there") from error
+            raise ToolchainError(
+                f"this worker has no module {name}: install its package there", code="EG-PACKAGE-MISSING"
+            ) from error
     try:
         compilation = import_module("eomgen.compilation")
     except ImportError as error:

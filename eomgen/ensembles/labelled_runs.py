@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..runtime.near_names import require
 from ..runtime.storage import attributes, free
 
@@ -48,7 +48,7 @@ def _runs(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables over the runs, and times where some were kept; coordinates of the runs."""
     if ensemble.x is None:
         kept = f"this ensemble kept only the results of its reduction ({', '.join(ensemble.reduced)})"
-        raise UsageError(f"{kept}; run it with reduce='states' or 'statistics'")
+        raise cannot(f"{kept}; run it with reduce='states' or 'statistics'")
     varied = ensemble.varied()
     # an initial value of the grid is called as in `varied`, so that it does not hide the column of its name
     labels = {name: name if name in ensemble.parameters_and_inputs else f"initial_{name}" for name in ensemble.grid}

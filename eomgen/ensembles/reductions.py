@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_typed, no_choice
 from ..numeric.scales import Array
 from ..texts import shown
 from .block import EVENT, Plan, RunBlock, inputs_at
@@ -101,7 +101,7 @@ class Custom:
         """As the function says."""
         made = self.function(block)
         if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
-            raise UsageError(f"the function of reduce must return a mapping of names to arrays, not {made!r}")
+            raise ill_typed(f"the function of reduce must return a mapping of names to arrays, not {made!r}")
         return {f"made_{name}": np.asarray(value) for name, value in made.items()}
 
     def join(self, parts: Sequence[Arrays]) -> Arrays:
@@ -118,14 +118,14 @@ def choose_reduction(reduce: Any) -> Reduction:
     if callable(reduce):
         return Custom(reduce)
     if reduce is not None and not isinstance(reduce, str):
-        raise UsageError(f"{WANTED}, not {shown(reduce)}")
+        raise ill_typed(f"{WANTED}, not {shown(reduce)}")
     if reduce in (None, "states"):
         return KeptStates()
     if reduce == "events":
         return KeptStates(["notes"])
     if reduce == "statistics":
         return Statistics()
-    raise UsageError(f"{WANTED}, not {reduce!r}")
+    raise no_choice(f"{WANTED}, not {reduce!r}")
 
 
 def with_outputs(module: BoundModel, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import bad_data, ill_typed, no_choice, untrue
 from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..runtime.near_names import check_names, without_dots
@@ -179,7 +179,7 @@ def simulate_many(
     except (KeyError, ValueError, TypeError, IndexError) as error:
         if store_of is None:
             raise
-        raise UsageError(f"the blocks in store {store} do not belong together: {error}; name another folder") from error
+        raise bad_data(f"the blocks in store {store} do not belong together: {error}; name another folder") from error
 
 
 def _run(
@@ -219,7 +219,7 @@ def _plan(
     method, step = own_step(module, declared["method"] if method is None else method, step)
     refuse_moreau(method, "simulate_many")
     if not isinstance(method, str):
-        raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
+        raise no_choice(f"method of simulate_many must be the name of a method, not {method!r}")
     forcing = Forcing(module.layout, tables)
     forcing.require_finite()
     can_run(module, method, forcing)  # refuses what no other method stands in for
@@ -248,7 +248,7 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
     }  # fmt: skip
     for name, value in inputs.items():
         if callable(value) and name not in tables:
-            raise UsageError(
+            raise ill_typed(
                 f"input {name} of simulate_many must be a number, (k,) numbers or a table (times, values), "
                 "a Signal or an expression as text, not a function"
             )
@@ -257,7 +257,7 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
     still = fill_rates(layout, inputs, lambda name, rate, value: 0.0)
     for name, rate in rate_pairs(layout):
         if name in rest and rate in rest and np.any(np.asarray(rest[rate], dtype=float) != 0.0):
-            raise UsageError(f"input {rate} is not the rate of {name}, which is a number in each run; give {rate} as 0")
+            raise untrue(f"input {rate} is not the rate of {name}, which is a number in each run; give {rate} as 0")
     held = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
     return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_data, bad_file
 from ..files.path_names import as_path
 from ..files.reading import open_plain
 from ..files.writing import remove_parts, write_whole
@@ -44,7 +44,7 @@ class Store:
             return
         remove_parts(manifest)  # of a call that was killed before the manifest was there
         if self.folder.is_dir() and any(self.folder.iterdir()):
-            raise UsageError(f"store {self.folder} is not empty and does not contain an ensemble; name another folder")
+            raise bad_file(f"store {self.folder} is not empty and does not contain an ensemble; name another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
         write_whole(manifest, json.dumps(wanted, indent=1).encode())
 
@@ -57,7 +57,7 @@ class Store:
         found = found if isinstance(found, dict) else {}
         differing = sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name))
         if differing:
-            raise UsageError(
+            raise bad_data(
                 f"store {self.folder} belongs to another ensemble: {', '.join(differing)} differ; "
                 "name another folder or remove this one"
             )
@@ -92,7 +92,7 @@ class Store:
 
     def damaged(self, index: int, why: object) -> UsageError:
         """The error for a block that cannot be taken."""
-        return UsageError(f"{self._path(index)} cannot be read: {why}; remove it to run its block again")
+        return bad_data(f"{self._path(index)} cannot be read: {why}; remove it to run its block again")
 
 
 def stored_length(folder: str | Path) -> int | None:

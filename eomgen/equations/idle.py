@@ -52,12 +52,12 @@ class IdleMotion:
         turning = self._turning(kinematics)
         if not turning:
             message = f"the motion of {together} has {self.what} behind it"
-            return mechanism.problem(path, message, "give the bodies it moves a mass or an inertia")
+            return mechanism.problem(path, message, "give the bodies it moves a mass or an inertia", "EG-NO-INERTIA")
         bodies = "; ".join(f"{name!r} about ({', '.join(f'{x:.3g}' for x in axis)})" for name, axis in turning)
         message = f"the motion of {together} has {self.what} behind it: it turns {bodies} in body axes"
         name = turning[0][0]
         remedy = f"give {name!r} an inertia about that axis, or a joint that does not turn it about that axis"
-        return mechanism.problem(path, message, remedy)
+        return mechanism.problem(path, message, remedy, "EG-NO-INERTIA")
 
     def _turning(self, kinematics: Kinematics) -> list[tuple[str, Sequence[float]]]:
         """Bodies that turn, and their axes in body axes."""

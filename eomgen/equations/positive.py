@@ -122,7 +122,12 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
                 idle = IdleMotion(q, motion * scales, what, numbers)
             worst = float(sizes[0]), np.abs(motion), idle
     if worst is None:
-        raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
+        raise EvaluationError(
+            "the mass matrix is not finite at the initial configuration",
+            0.0,
+            mobility.q_reference,
+            code="EG-NOT-FINITE",
+        )
     size, motion, idle = worst
     if idle is not None:
         return [idle.problem(kinematics)]
@@ -134,5 +139,5 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
             what = "negative inertia" if size < -LEAST else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
-            problems.append(m.problem(path, message, REMEDY))
+            problems.append(m.problem(path, message, REMEDY, "EG-NO-INERTIA"))
     return problems

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import EomgenError, MissingDependencyError, UsageError
+from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..files.writing import write_whole
 from ..graph.pair_calls import opaque_names
 from .document import DrawnPicture, Folded, Piece, Section
@@ -92,7 +92,7 @@ class Explanation:
         elif path.suffix == ".pdf":
             self._save_pdf(path)
         else:
-            raise UsageError(f"{path.name!r} must end in one of {', '.join(SUFFIXES)}")
+            raise bad_file(f"{path.name!r} must end in one of {', '.join(SUFFIXES)}")
         return path
 
     def _save_tex(self, path: Path) -> None:
@@ -146,7 +146,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     from .shown_values import moving_state, told_state
 
     if level not in LEVELS:
-        raise UsageError(f"no level {level!r}; there are {', '.join(LEVELS)}")
+        raise no_such(f"no level {level!r}; there are {', '.join(LEVELS)}")
     full = level == "full"
     author = Author(equations, full)
     module, reason = _module(author)

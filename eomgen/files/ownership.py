@@ -18,7 +18,7 @@ import shlex
 import stat
 from contextlib import suppress
 
-from ..errors import ToolchainError
+from ..errors import bad_cache
 
 LINKS = 40  #: symbolic links followed in one path, as Linux does
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -103,7 +103,7 @@ def _require_own(path: str, status: os.stat_result, *, above: bool) -> None:
     """Refuse one part of a path; `above` says that more follows below it."""
     owner, me = status.st_uid, os.geteuid()
     if owner not in (me, 0) and not (above and _unmapped(owner)):
-        raise ToolchainError(
+        raise bad_cache(
             f"{_describe(path, status)} belongs to another user than {_name(me)}, and what a cache holds is loaded as "
             "code; set EOMGEN_CACHE_DIR to a folder of your own, in one that only you or root can write"
         )
@@ -113,7 +113,7 @@ def _require_own(path: str, status: os.stat_result, *, above: bool) -> None:
         return
     if above and not status.st_mode & stat.S_IWOTH and _private_group(path, status.st_gid, me):
         return
-    raise ToolchainError(
+    raise bad_cache(
         f"{_describe(path, status)} can be written by other users; run: chmod go-w {shlex.quote(path)}, or set "
         "EOMGEN_CACHE_DIR to a folder that nobody else can write: what a cache holds is loaded as code"
     )

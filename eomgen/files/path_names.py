@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import bad_file, ill_typed
 from ..texts import shown
 
 
@@ -30,7 +30,7 @@ def as_name(what: str, given: Any) -> str:
     """
     name = usable_name(given)
     if name is None:
-        raise UsageError(f"{what} must be the name of a file or folder, as text or Path, not {shown(given)}")
+        raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {shown(given)}")
     return name
 
 
@@ -55,7 +55,7 @@ def beside(file: str, name: str) -> str:
     folder = os.path.realpath(os.path.dirname(os.path.abspath(file)))
     path = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath((folder, path)) != folder:
-        raise UsageError(
+        raise bad_file(
             f"{name} lies outside the folder of the model file; a model file can name only files in its own folder"
         )
     return path

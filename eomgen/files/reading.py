@@ -9,7 +9,7 @@ import os
 import stat
 from typing import BinaryIO
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_file
 from .path_names import as_name
 
 #: What a name may stand for that is not a plain file.
@@ -67,4 +67,4 @@ def _kind(mode: int) -> str:
 def _require_plain(name: str, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode):
         what = _kind(status.st_mode)
-        raise UsageError(f"{name} is not a plain file but {what}; name a plain file, or copy its content into one")
+        raise bad_file(f"{name} is not a plain file but {what}; name a plain file, or copy its content into one")

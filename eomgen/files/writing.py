@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import UsageError
+from ..errors import bad_file
 from .path_names import as_path
 
 TOKEN = 8  #: random digits at the end of a part's name
@@ -46,7 +46,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """
     target = as_path("path", path)
     if not target.name:
-        raise UsageError(f"{target} is a folder; name a file in it")
+        raise bad_file(f"{target} is a folder; name a file in it")
     refuse_link(target)
     part = target.with_name(f".{target.name[:PREFIX]}.{secrets.token_hex(TOKEN // 2)}")
     try:
@@ -129,7 +129,7 @@ def refuse_link(path: Path) -> None:
     found = _status(path)
     if found is not None and not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
         return
-    raise UsageError(
+    raise bad_file(
         f"{path} is a symbolic link to {os.readlink(path)}, and eomgen does not write through links; name that "
         "file itself, or remove the link"
     )

@@ -82,7 +82,7 @@ def _point_gravity(e: Entry) -> PointGravity | None:
         return None
     index, body = found
     if center is not None and center.body == index:
-        e.fault("center", f"lies on {body.name!r} itself", "give a marker of ground or of another body")
+        e.fault("center", f"lies on {body.name!r} itself", "give a marker of ground or of another body", "EG-REFERENCE")
     marker = Marker(index, Frame(vec.identity(e.graph), body.com), f"{body.name} at its centre of mass")
     inertia = body.inertia if extent == "maccullagh" else None
     return None if center is None else PointGravity(e.name, center, marker, mu, body.mass, inertia)

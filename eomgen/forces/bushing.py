@@ -134,7 +134,9 @@ def _bushing(e: Entry) -> Bushing | None:
         if difference.is_zero:
             continue
         if difference.value is not None:
-            e.fault(f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal")
+            e.fault(
+                f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal", "EG-RANGE"
+            )
         else:
             e.require(
                 f"stiffness[{j}][{i}]",

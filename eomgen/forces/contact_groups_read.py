@@ -59,7 +59,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         if pairs > MOST_PAIRS:
             told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
-            e.fault("", told, remedy)
+            e.fault("", told, remedy, "EG-TOO-LARGE")
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
 
 
@@ -124,7 +124,8 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
                     e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
                 e.refuse("settling", "belongs to the cells of a bed")
             return
-    e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")
+    message = "has soil, but no ground"
+    e.fault("", message, "give half_plane or a profile as one group, plates or wheels as the other", "EG-MISSING")
 
 
 def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lateral: bool) -> tuple[str, ...]:

@@ -113,7 +113,7 @@ def _creep(e: Entry) -> Creep | None:
         if law == "linear":
             e.refuse(key, "the linear law does not saturate")
         elif key not in e.values:
-            e.fault(key, "is missing", f"the law {law} needs the normal force and the coefficient of friction")
+            e.missing(key, f"the law {law} needs the normal force and the coefficient of friction")
     along, across, turning, spin = (e.law(key) for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
     for key, value in (("longitudinal", along), ("lateral", across)):
         e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")

@@ -58,12 +58,11 @@ def _joint_friction(e: Entry) -> Force | None:
         return read_reaction_friction(e, path, viscous)
     for key in BY_REACTION:
         if key in e.values:
-            e.fault(key, "is given without coefficient", f"give coefficient, or leave {key} out")
+            e.fault(key, "is given without coefficient", f"give coefficient, or leave {key} out", "EG-MISSING")
     dry = read_friction(e, "coulomb", "static", "viscous", alone=True)
     if dry is None and "viscous" not in e.values and not e.at_fault():
-        e.fault(
-            "", "has no friction law", "give viscous, coulomb with smoothing, coefficient with smoothing, or several"
-        )
+        remedy = "give viscous, coulomb with smoothing, coefficient with smoothing, or several"
+        e.fault("", "has no friction law", remedy, "EG-MISSING")
     if path is None:
         return None
     return (

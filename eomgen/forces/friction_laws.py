@@ -177,7 +177,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     if dynamic not in e.values:
         for key in (static, "friction_law", *_PLAIN, *(() if alone else (viscous,))):
             if key in e.values:
-                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out")
+                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out", "EG-MISSING")
         return None
     level = e.law(dynamic)
     kind = e.choice("friction_law")
@@ -196,7 +196,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     for key in _PLAIN[2:]:
         e.refuse(key, f"has no meaning in friction_law: {kind}")
     if "smoothing" not in e.values:
-        e.fault("smoothing", "is missing", "give the velocity (greater than 0) below which friction is smoothed")
+        e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
     pair = _onset(e, level, static)
     return None if pair is None else Friction(level, e.positive("smoothing"), drag, *pair)
@@ -206,7 +206,7 @@ def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None
     """Static friction and Stribeck velocity, or neither; None where only one is given, which is noted."""
     if (static in e.values) != ("stribeck" in e.values):
         missing = "stribeck" if static in e.values else static
-        e.fault(missing, "is missing", f"give {static} and stribeck together, or neither")
+        e.missing(missing, f"give {static} and stribeck together, or neither")
         return None
     onset = e.given(static)
     if onset is not None:
@@ -224,7 +224,7 @@ def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcP
     for key in ("stribeck", "smoothing", *_PLAIN[3:]):
         e.refuse(key, "has no meaning in friction_law: brown_mcphee, which has transition")
     if "transition" not in e.values:
-        e.fault("transition", "is missing", "give the velocity (greater than 0) near which friction is largest")
+        e.missing("transition", "give the velocity (greater than 0) near which friction is largest")
         return None
     onset = e.given(static)
     if onset is None:
@@ -238,7 +238,7 @@ def _lugre(e: Entry, level: Expr, viscous: Expr, static: str) -> LuGre | None:
         e.refuse(key, "has no meaning in friction_law: lugre")
     for key in _PLAIN[3:]:
         if key not in e.values:
-            e.fault(key, "is missing", "friction_law: lugre needs bristle_stiffness and bristle_damping")
+            e.missing(key, "friction_law: lugre needs bristle_stiffness and bristle_damping")
     pair = _onset(e, level, static)
     if pair is None or e.at_fault():
         return None

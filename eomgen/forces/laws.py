@@ -69,7 +69,7 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
     def read(e: Entry) -> GeneralElement | None:
         where = path(e)
         if "law" not in e.values and "potential" not in e.values:
-            e.fault("", "has no force law", "give law, potential or both")
+            e.fault("", "has no force law", "give law, potential or both", "EG-MISSING")
         on = e.coordinate("joint") if "joint" in e.values and where is not None else None
         word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
         value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))

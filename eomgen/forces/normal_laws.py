@@ -301,7 +301,7 @@ def read_normal_law(e: Entry) -> NormalLaw:
 def _require_stiffness(e: Entry) -> None:
     """Note that the stiffness is missing, of a type that may have moduli instead."""
     if "stiffness" not in e.values and not e.fields["stiffness"].required:
-        e.fault("stiffness", "is missing", "give it, or moduli and poisson with normal_law: hertz")
+        e.missing("stiffness", "give it, or moduli and poisson with normal_law: hertz")
 
 
 def _linear(e: Entry) -> DampedLinear:
@@ -322,7 +322,7 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
     moduli, ratios = e.several("moduli", 2), e.several("poisson", 2)
     for key in ELASTIC:
         if key not in e.values:
-            e.fault(key, "is missing", "give moduli and poisson together, two numbers each")
+            e.missing(key, "give moduli and poisson together, two numbers each")
     for key, found, right, rule in (
         ("moduli", moduli, POSITIVE, "must be greater than 0"),
         ("poisson", ratios, Allowed(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
@@ -350,12 +350,11 @@ def _dissipation(e: Entry) -> Expr:
         return value
     if restitution is None and velocity is None:
         if "formula" in e.values:
-            e.fault("formula", "is given without restitution", "give restitution and velocity, or leave formula out")
+            remedy = "give restitution and velocity, or leave formula out"
+            e.fault("formula", "is given without restitution", remedy, "EG-MISSING")
         return e.graph.zero
     if restitution is None or velocity is None:
-        e.fault(
-            "velocity" if velocity is None else "restitution", "is missing", "give restitution and velocity together"
-        )
+        e.missing("velocity" if velocity is None else "restitution", "give restitution and velocity together")
         return e.stand_in
     e.require("restitution", restitution, Allowed(0.0, 1.0, above=True), "must be greater than 0 and at most 1")
     e.require("velocity", velocity, POSITIVE, "must be greater than 0")

@@ -124,10 +124,11 @@ def read_coordinate(e: Entry, angle: bool = False) -> JointCoordinate | None:
         return None
     if found.kind == "parameter":
         remedy = "give the torque as a vector on the body: body: <body>, value: [x, y, z]"
-        e.fault("joint", f"{found.name!r} is an Euler parameter, which takes no torque", remedy)
+        e.fault("joint", f"{found.name!r} is an Euler parameter, which takes no torque", remedy, "EG-REFERENCE")
         return None
     if angle and found.kind != "angle":
-        e.fault("joint", f"the coordinate {found.name!r} is a {found.kind}", "a torsional element needs an angle")
+        message = f"the coordinate {found.name!r} is a {found.kind}"
+        e.fault("joint", message, "a torsional element needs an angle", "EG-REFERENCE")
         return None
     return JointCoordinate(found.name)
 

@@ -77,7 +77,7 @@ BY_REACTION: Fields = {
 def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) -> Force | None:
     """Friction by the reaction, with a part that does not depend on it if coulomb is given too."""
     if "coulomb" not in e.values and "static" in e.values:
-        e.fault("static", "is given without coulomb", "give static_coefficient, or coulomb too")
+        e.fault("static", "is given without coulomb", "give static_coefficient, or coulomb too", "EG-MISSING")
         return None
     if (kind := e.choice("friction_law")) != "coulomb":
         e.fault("friction_law", f"{kind} has no coefficient", "leave friction_law out, or give coulomb")
@@ -85,7 +85,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     for key in ("transition", "bristle_stiffness", "bristle_damping"):
         e.refuse(key, "has no meaning beside coefficient")
     if "smoothing" not in e.values:
-        e.fault("smoothing", "is missing", "give the velocity (greater than 0) below which friction is smoothed")
+        e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
     coefficient, onset, preload, breakaway = (
         e.given(key) for key in ("coefficient", "static_coefficient", "coulomb", "static")
@@ -96,17 +96,23 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
             e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
-        e.fault("stribeck", message, "give stribeck together with static_coefficient or static, or none of them")
+        remedy = "give stribeck together with static_coefficient or static, or none of them"
+        e.fault("stribeck", message, remedy, "EG-MISSING")
         return None
     found = e.coordinate("joint") if path is not None else None
     if found is None or path is None or coefficient is None:
         return None
     if found.joint is None:
-        e.fault("joint", f"{found.name!r} is no coordinate of a joint, so it carries no reaction", "give coulomb")
+        e.fault(
+            "joint",
+            f"{found.name!r} is no coordinate of a joint, so it carries no reaction",
+            "give coulomb",
+            "EG-REFERENCE",
+        )
         return None
     turns = found.kind == "angle"
     if turns and "radius" not in e.values:
-        e.fault("radius", f"is missing, and {found.name!r} is an angle", "give the radius of the pin (m)")
+        e.fault("radius", f"is missing, and {found.name!r} is an angle", "give the radius of the pin (m)", "EG-MISSING")
         return None
     for key in ("radius", "thrust_radius"):
         if key in e.values and not turns:

@@ -276,7 +276,8 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
         if published is None:
             why = f"is missing of soil: {name}"
             where_from = "K is 0.01 m in firm sand, 0.025 m in loose sand, 0.006 m in firm clay (Wong, 2008)"
-            e.fault(key, why, where_from if key == "shear_modulus" else "give it, or the name of a published soil")
+            remedy = where_from if key == "shear_modulus" else "give it, or the name of a published soil"
+            e.fault(key, why, remedy, "EG-MISSING")
             return e.stand_in
         return e.graph.constant(published)
 

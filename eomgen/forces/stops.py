@@ -76,7 +76,7 @@ def _stop(e: Entry) -> JointStop | None:
     path, law = read_coordinate(e), read_normal_law(e)
     lower, upper = e.given("lower"), e.given("upper")
     if lower is None and upper is None:
-        e.fault("", "has no limit", "give lower, upper or both")
+        e.fault("", "has no limit", "give lower, upper or both", "EG-MISSING")
     if lower is not None and upper is not None:
         e.require("upper", upper - lower, POSITIVE, "this is upper - lower; lower must be less than upper")
     return None if path is None else JointStop(e.name, path, lower, upper, law)

@@ -244,7 +244,7 @@ def _law(e: Entry) -> TyreLaw | None:
         e.refuse("shifts", "belongs to law: magic_formula")
         for key in ("slip_stiffness", "friction"):
             if key not in e.values:
-                e.fault(key, "is missing", "law: brush needs slip_stiffness and friction")
+                e.missing(key, "law: brush needs slip_stiffness and friction")
         if e.at_fault():
             return None
         half = e.positive("half_length") if "half_length" in e.values else None

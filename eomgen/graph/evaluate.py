@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped, incomplete
 from ..operations import OPERATIONS
 from .core import Expr
 from .substitute import symbols_of
@@ -58,7 +58,7 @@ class Evaluator:
             else:
                 rest.append(i)
         if unknown:
-            raise UsageError(f"no value for {', '.join(sorted(unknown))}")
+            raise incomplete(f"no value for {', '.join(sorted(unknown))}")
         first = len(self.names) + len(self._constants)
         self._steps: list[tuple[str, int, int, int]] = []  # operation and operand slots, -1 where there is none
         self._functions: dict[str, tuple[Callable[..., Any], Callable[..., Any]]]
@@ -121,12 +121,12 @@ class Evaluator:
             used = self._used
             absent = [n for k, n in enumerate(self.names) if k in used and n not in values]
             if absent:
-                raise UsageError(f"no value for {', '.join(sorted(absent))}")
+                raise incomplete(f"no value for {', '.join(sorted(absent))}")
             data = [values.get(n, 0.0) if k in used else 0.0 for k, n in enumerate(self.names)]
         else:
             data = values.tolist() if isinstance(values, np.ndarray) and values.ndim == 1 else list(values)
             if len(data) != len(self.names):
-                raise UsageError(f"{len(self.names)} values expected, not {len(data)}")
+                raise ill_shaped(f"{len(self.names)} values expected, not {len(data)}")
         arrays = False
         for k, x in enumerate(data):
             if type(x) is float:

@@ -89,7 +89,7 @@ class Function:
                 "give the Python version under python; it is not needed for target cython or c if masses, constraints "
                 "and initial values do not call the function"
             )
-            raise ModelError([Problem(f"functions.{self.name}", message, remedy, *self.place)])
+            raise ModelError([Problem(f"functions.{self.name}", message, remedy, *self.place, code="EG-MISSING")])
         return self.evaluator
 
 

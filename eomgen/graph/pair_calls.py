@@ -14,7 +14,7 @@ from functools import cached_property
 from operator import itemgetter
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..numeric.outline_pieces import nearest
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
 from ..numeric.polygon_edges import facing
@@ -307,9 +307,9 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
     if call.part == "given":
         return None
     if call.part in ("meeting", "spots"):
-        raise UsageError(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
+        raise cannot(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
     if call.part == "slope":
-        raise UsageError(
+        raise cannot(
             f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "
             "point_plane, sphere_plane or sphere_sphere, or do without second-order sensitivities"
         )

@@ -37,7 +37,7 @@ ORDER = 8  #: of a derivative that SymPy carries out; each may double its length
 ARGUMENT = 1e6  #: of a function that SymPy evaluates
 
 
-class LoweringError(EomgenError):
+class LoweringError(EomgenError, code="EG-EXPRESSION"):
     """A SymPy expression has no meaning as a real function of known quantities.
 
     Attributes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..operations import OPERATIONS
 from .core import Expr
 from .traverse import reachable
@@ -46,7 +46,7 @@ def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, i
                 a, b, c = (*(found[k] for k in given), 0, 0)[:3]
                 code.append((kind, a, b, c))
             else:
-                raise UsageError("functions of the model cannot be used in an input over time")
+                raise cannot("functions of the model cannot be used in an input over time")
             found[i] = len(code) - 1
         out.append(found[expression.id])
     return code, numbers, out

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
-from ..errors import UsageError
+from ..errors import cannot, ill_shaped, off_range
 from ..limits.identification import IDENTIFIED, LINEAR, MEASURED, ROUNDS
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -139,23 +139,23 @@ def fit_base(
     """
     module = base.module
     if module.layout.n_c:
-        raise UsageError(
+        raise cannot(
             f"model {module.name!r} has loops or other constraints, whose forces are in tau too; fit() of base "
             "parameters takes trees, mod.fit(data, parameters) takes all"
         )
     measured = np.asarray(read_numbers("tau", tau), dtype=float)
     own = base.regressor(q, v, a)
     if measured.ndim != 2 or own.ndim != 3 or measured.shape != own.shape[::2]:
-        raise UsageError(f"tau must have shape ({module.n_v}, k) with k samples, as v has, not {measured.shape}")
+        raise ill_shaped(f"tau must have shape ({module.n_v}, k) with k samples, as v has, not {measured.shape}")
     rest, further = _not_inertial(base, (q, v, a), read_names("also", also), u)
     names = (*base.names, *further)
     data = _Data(np.concatenate([own, *(column[:, None] for column in further.values())], axis=1), measured - rest)
     if data.count <= len(names):
-        raise UsageError(f"{data.count} finite values of tau cannot tell {len(names)} parameters")
+        raise ill_shaped(f"{data.count} finite values of tau cannot tell {len(names)} parameters")
     if sigma is not None:
         spread = np.asarray(read_numbers("sigma", sigma), dtype=float) * np.ones(module.n_v)
         if not (spread > 0.0).all():
-            raise UsageError("sigma must be positive, a standard deviation for each generalized force")
+            raise off_range("sigma must be positive, a standard deviation for each generalized force")
     else:
         spread = data.sizes()
         for _ in range(ROUNDS):
@@ -238,18 +238,18 @@ def _not_inertial(
         columns[name] = (second - first) / size
         allowed = LINEAR * max(whole, float(np.nanmax(np.abs(third), initial=0.0)))
         if np.nanmax(np.abs(third - 2.0 * second + first), initial=0.0) > allowed:
-            raise UsageError(f"forces are not linear in {name}; mod.fit(data, parameters) finds such parameters")
+            raise cannot(f"forces are not linear in {name}; mod.fit(data, parameters) finds such parameters")
         if np.nanmax(np.abs(second - first), initial=0.0) <= allowed:
-            raise UsageError(
+            raise cannot(
                 f"{name} changes no force beside those of inertia and gravity, which the base parameters hold already"
             )
         if np.nanmax(np.abs(regressor(module, *motion, p=values | {name: 2.0 * size}) - regressor(module, *motion))):
-            raise UsageError(f"{name} changes the geometry; mod.fit(data, parameters) finds such parameters")
+            raise cannot(f"{name} changes the geometry; mod.fit(data, parameters) finds such parameters")
         rest = rest - values[name] * columns[name]
     doubled = {name: 2.0 * (values[name] or 1.0) for name in also}
     every = np.asarray(inertial_remainder(module, *motion, p=values | doubled, u=u))
     total = sum((doubled[name] * column for name, column in columns.items()), rest)
     largest = max(whole, float(np.nanmax(np.abs(every), initial=0.0)))
     if np.nanmax(np.abs(every - total), initial=0.0) > LINEAR * largest:
-        raise UsageError(f"forces are not linear in {', '.join(also)} together; find one of each product only")
+        raise cannot(f"forces are not linear in {', '.join(also)} together; find one of each product only")
     return rest, columns

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
-from ..errors import ProjectionError, UsageError
+from ..errors import ProjectionError, off_range
 from ..limits.identification import EFFECT, ROUNDED_COEFFICIENT
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -182,7 +182,7 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     """
     refuse_states(module.layout, "base_parameters")
     if not 0.0 <= read_number("least", least) < 1.0:
-        raise UsageError(f"least must be 0 or positive and less than 1, not {least:g}")
+        raise off_range(f"least must be 0 or positive and less than 1, not {least:g}")
     module = module if p is None else module.bind(p)
     standard = standard_names(module)
     count = ROWS * len(standard) // max(1, module.n_dof) + SPARE

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_typed, incomplete, off_range
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_numbers
@@ -52,7 +52,7 @@ def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -
     several = isinstance(data, list | tuple)
     given = list(data) if several else [data]
     if not given:
-        raise UsageError("data is an empty list; give at least one experiment")
+        raise incomplete("data is an empty list; give at least one experiment")
     problems: list[str] = []
     starts, driven = (
         _one_each(what, x, len(given), several, problems) for what, x in (("initial", initial), ("inputs", inputs))
@@ -64,7 +64,7 @@ def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -
         if read is not None:
             found.append(Experiment(*read, starts[k], driven[k]))
     if problems:
-        raise UsageError("; ".join(problems))
+        raise ill_typed("; ".join(problems))
     return found
 
 
@@ -186,9 +186,9 @@ def read_sigma(given: Any, names: Sequence[str]) -> dict[str, float] | None:
             raise unknown("measured column", name, names)
     missing = [name for name in names if name not in table]
     if missing:
-        raise UsageError(f"sigma lacks {', '.join(missing)}; give a standard deviation for every measured column")
+        raise incomplete(f"sigma lacks {', '.join(missing)}; give a standard deviation for every measured column")
     found = {name: float(read_numbers(f"sigma of {name}", table[name])) for name in names}
     for name, value in found.items():
         if not value > 0.0:
-            raise UsageError(f"sigma of {name} must be greater than 0, not {value:g}")
+            raise off_range(f"sigma of {name} must be greater than 0, not {value:g}")
     return found

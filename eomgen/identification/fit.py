@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ParameterError, SimulationError, UsageError
+from ..errors import (
+    ParameterError,
+    SimulationError,
+    at_odds,
+    ill_shaped,
+    ill_typed,
+    incomplete,
+    no_choice,
+    off_range,
+)
 from ..limits.identification import MEASURED, ROUNDS
 from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
@@ -92,7 +101,7 @@ def fit(
     least_squares: Any = require("scipy.optimize", "scipy", "fit").least_squares
     check_names("option of fit", options, ("loss", "f_scale", "ftol", "xtol", "gtol", "max_nfev"), ("derivatives",))
     if derivatives not in DERIVATIVES:
-        raise UsageError(f"derivatives must be {' or '.join(DERIVATIVES)}, not {derivatives!r}")
+        raise no_choice(f"derivatives must be {' or '.join(DERIVATIVES)}, not {derivatives!r}")
     experiments = read_experiments(module, data, initial, inputs)
     problem = _Problem(module, experiments, parameters, {"method": method, "rtol": rtol, "atol": atol})
     problem.tell_fixed()
@@ -101,7 +110,7 @@ def fit(
     known = read_sigma(sigma, columns)
     count = sum(int(np.isfinite(values).sum()) for one in experiments for values in one.columns.values())
     if count <= len(problem.names):
-        raise UsageError(f"there are {count} measured values, and {len(problem.names)} unknowns; give more data")
+        raise ill_shaped(f"there are {count} measured values, and {len(problem.names)} unknowns; give more data")
     values: Array = problem.start
     found: Any = None
     problem.sigma = known or {name: problem.spread(name) for name in columns}
@@ -135,7 +144,7 @@ class _Problem:
             if name not in allowed:
                 raise unknown("parameter, input, coordinate or rate", name, allowed)
         if len(set(self.names)) < len(self.names) or not self.names:
-            raise UsageError("parameters must name what is to be found, each once")
+            raise incomplete("parameters must name what is to be found, each once")
         self.initial_names = tuple(name for name in self.names if name in self.states)
         self.sigma: dict[str, float] = {}
         self._check_starts()
@@ -144,12 +153,12 @@ class _Problem:
     def _check_starts(self) -> None:
         for one in self.experiments:
             if self.initial_names and not (one.initial is None or isinstance(one.initial, Mapping)):
-                raise UsageError("initial must be given by name where initial values are to be found")
+                raise incomplete("initial must be given by name where initial values are to be found")
             if one.inputs is not None:
                 require_mapping("inputs", one.inputs)
             for name in self.names:
                 if one.inputs and name in one.inputs:
-                    raise UsageError(f"input {name} is given, and cannot be found too; leave it out of one of them")
+                    raise at_odds(f"input {name} is given, and cannot be found too; leave it out of one of them")
 
     def tell_fixed(self) -> None:
         """Warn, once for all runs, of initial values that are not given and cannot follow from the parameters."""
@@ -172,7 +181,7 @@ class _Problem:
         x = module.x0(given, t=float(self.experiments[0].t[0]))
         if name in module.x_names:
             return float(x[module.x_names.index(name)])
-        raise UsageError(f"give a value to start from for {name}: parameters={{{name!r}: ...}}")
+        raise incomplete(f"give a value to start from for {name}: parameters={{{name!r}: ...}}")
 
     def arguments(self, values: Array, one: Experiment) -> dict[str, Any]:
         """What ``simulate`` takes for an experiment."""
@@ -213,7 +222,7 @@ class _Problem:
                 there = np.isfinite(measured)
                 if not complete:
                     if told:
-                        raise SimulationError("the run ends at an event before the last measured time")
+                        raise SimulationError("the run ends at an event before the last measured time", code="EG-EVENT")
                     parts.append(np.full(int(there.sum()), np.inf))
                 else:
                     parts.append((run[name][there] - measured[there]) / self.sigma[name])
@@ -270,11 +279,11 @@ def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, 
         try:
             low[k], high[k] = (float(x) for x in pair)
         except (TypeError, ValueError):
-            raise UsageError(f"bounds of {name} must be (low, high), not {pair!r}") from None
+            raise ill_typed(f"bounds of {name} must be (low, high), not {pair!r}") from None
         if not low[k] < high[k]:
-            raise UsageError(f"bounds of {name}: {low[k]:g} is not less than {high[k]:g}")
+            raise off_range(f"bounds of {name}: {low[k]:g} is not less than {high[k]:g}")
         if not low[k] <= problem.start[k] <= high[k]:
-            raise UsageError(
+            raise off_range(
                 f"{name} starts at {problem.start[k]:g}, outside its bounds {low[k]:g} .. {high[k]:g}; "
                 f"give a value to start from: parameters={{{name!r}: ...}}"
             )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import cannot, ill_shaped
 from ..numeric.scales import Array
 from ..runtime.kernels import into
 from ..runtime.refusals import refuse_states
@@ -37,7 +37,7 @@ def standard_names(module: BoundModel) -> tuple[str, ...]:
         A model without bodies.
     """
     if not module.n_bodies:
-        raise UsageError(f"model {module.name!r} has no bodies, hence no inertial parameters")
+        raise cannot(f"model {module.name!r} has no bodies, hence no inertial parameters")
     return tuple(f"{which}({body})" for body in module.body_names for which in STANDARD)
 
 
@@ -155,7 +155,7 @@ def _motion(
     if [x.shape[:1] for x in arrays] != [(n,) for n in sizes] or len(shapes) != 1 or arrays[0].ndim != 2:
         given = ", ".join(str(np.shape(x)) for x in (q, v, a))
         wanted = ", ".join(f"({n},)" for n in sizes)
-        raise UsageError(f"q, v, a must have shapes {wanted}, or (..., k) for k states, not {given}")
+        raise ill_shaped(f"q, v, a must have shapes {wanted}, or (..., k) for k states, not {given}")
     return names, (arrays[0], arrays[1], arrays[2]), single
 
 

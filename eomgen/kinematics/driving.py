@@ -122,6 +122,7 @@ def _explain(
         return AssemblyError(
             f"{', '.join(names)} has no finite value at t = 0: {TO_BE_FINITE}",
             [labels[i] for i in lost],
+            code="EG-NOT-FINITE",
         )
     kept, spare = _needed(functions, drivers, q)
     if spare:
@@ -138,7 +139,7 @@ def _explain(
             pass
         else:
             held = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
-            return AssemblyError(held, error.rows)
+            return AssemblyError(held, error.rows, code="EG-CONTRADICTION")
     C = functions.position(q)[0]
     gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
     rows = [functions.kinematics.constraints.labels[i] for i in drivers]
@@ -148,7 +149,7 @@ def _explain(
         f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
         "reach, or a guess nearer to them"
     )
-    return AssemblyError(words, [*rows, *error.rows])
+    return AssemblyError(words, [*rows, *error.rows], code="EG-CONTRADICTION")
 
 
 def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
@@ -184,6 +185,7 @@ def _contradiction(
                     "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
                     f"and this is off by {gap}",
                     "drive a coordinate, or two markers that move relative to each other",
+                    "EG-REDUNDANT",
                 )
             )
             continue
@@ -192,7 +194,7 @@ def _contradiction(
             f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
         )
         remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
-        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy))
+        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy, "EG-CONTRADICTION"))
     return ModelError(problems)
 
 

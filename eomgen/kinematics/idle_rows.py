@@ -41,8 +41,8 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
     what = f"{', '.join(bad)}: the constraint is not finite at the initial configuration {place}"
     if all(label.partition(".")[0] in discs for label in bad):
-        raise AssemblyError(f"{what}: {LYING}; tilt the disc in initial or guess", bad)
-    raise AssemblyError(f"{what}; give another configuration in initial or guess", bad)
+        raise AssemblyError(f"{what}: {LYING}; tilt the disc in initial or guess", bad, code="EG-NOT-FINITE")
+    raise AssemblyError(f"{what}; give another configuration in initial or guess", bad, code="EG-NOT-FINITE")
 
 
 def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
@@ -73,7 +73,9 @@ def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
     )
     remedy = "write each component as a constraint: x1 - x2 and y1 - y2 for (x1 - x2)**2 + (y1 - y2)**2"
     labels = (k.constraints.labels[i] for i in np.flatnonzero(least))
-    raise ModelError([k.mechanism.problem(place_of(k.mechanism, x), f"{x} {what}", remedy) for x in labels])
+    raise ModelError(
+        [k.mechanism.problem(place_of(k.mechanism, x), f"{x} {what}", remedy, "EG-REDUNDANT") for x in labels]
+    )
 
 
 def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
@@ -107,6 +109,8 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
             if used:
                 what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
                 remedy = "declare values with which it acts (they determine the degrees of freedom), or remove it"
-            problems.append(kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy))
+            problems.append(
+                kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy, "EG-REDUNDANT")
+            )
     if problems:
         raise ModelError(problems)

@@ -312,28 +312,28 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
         if isinstance(path, Turn) and not path.is_exact(motion):
             message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
             remedy = "turn the markers (rpy) until z is the axis of the joint between them, or give joint="
-            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
         for name in sorted(used & mechanism.quantities.keys()):
             if motion.may_wrap(mechanism.quantities[name]):
                 message = f"the z axes of the two markers of {name} do not stay in line, so the angle is not defined"
                 remedy = "turn the markers (rpy) until z is the axis of the joint between them, or use a coordinate"
-                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
         if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)
         for name in wrapping:
             if name in used:
                 message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
                 remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
-                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
     for constraint in mechanism.constraints:
         if not constraint.is_defined(motion):
             message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
             remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
-            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
         for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
             message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
             remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
-            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
     if problems:
         raise ModelError(problems)
 

@@ -150,17 +150,27 @@ def _check_places(functions: ConstraintFunctions, q: Array, places: Sequence[str
     if len(places) > (n := len(names) - rank) or len({*places}) < len(places):
         message = f"{', '.join(places)}: the positions have {n} degree{'s' * (n != 1)} of freedom"
         raise ModelError(
-            [mechanism.problem("independent", message, f"choose {n} different ones of {', '.join(names)}")]
+            [
+                mechanism.problem(
+                    "independent", message, f"choose {n} different ones of {', '.join(names)}", "EG-PARTITION"
+                )
+            ]
         )
     if SparseRows(np.vstack([J, held])).rank < rank + len(places):
         message = f"{', '.join(places)} cannot vary independently of each other at the initial configuration"
-        raise ModelError([mechanism.problem("independent", message, f"choose others of {', '.join(names)}")])
+        raise ModelError(
+            [mechanism.problem("independent", message, f"choose others of {', '.join(names)}", "EG-PARTITION")]
+        )
 
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
     if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
-        problems.append(kinematics.mechanism.problem("independent", f"{', '.join(twice)}: named twice", "name it once"))
+        problems.append(
+            kinematics.mechanism.problem(
+                "independent", f"{', '.join(twice)}: named twice", "name it once", "EG-PARTITION"
+            )
+        )
     coordinates = kinematics.names if kinematics.given_rates else kinematics.loop_coordinates.names
     known = (*dict.fromkeys((*kinematics.velocity_labels, *coordinates)),)
     for name in wanted:
@@ -169,16 +179,18 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
-            problems.append(kinematics.mechanism.problem("independent", message, remedy))
+            problems.append(kinematics.mechanism.problem("independent", message, remedy, "EG-PARTITION"))
             continue
         if name in known:
             message = f"{name!r} follows from the other chosen coordinates, which belong to the same loop"
             problems.append(
-                kinematics.mechanism.problem("independent", message, "choose fewer coordinates of one loop")
+                kinematics.mechanism.problem(
+                    "independent", message, "choose fewer coordinates of one loop", "EG-PARTITION"
+                )
             )
         else:
             what, remedy = f"no coordinate {name!r}", joined(hint(name, known), f"allowed: {', '.join(known)}", by=" ")
-            problems.append(kinematics.mechanism.problem("independent", what, remedy))
+            problems.append(kinematics.mechanism.problem("independent", what, remedy, "EG-NAME-UNKNOWN"))
     if problems:
         raise ModelError(problems)
 
@@ -245,7 +257,11 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
         message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
         raise ModelError(
-            [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
+            [
+                kinematics.mechanism.problem(
+                    "independent", message, f"choose {n_dof} of {', '.join(names)}", "EG-PARTITION"
+                )
+            ]
         )
     chosen = _choose(kinematics, judged, r, wanted)
     quality = judged[0].conditioning(chosen)
@@ -255,7 +271,9 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         means = "move the mechanism on their own" if len(wanted) == n_dof else "vary independently of each other"
         message = f"{', '.join(wanted)} cannot {means} at the initial configuration"
         better = [names[j] for j in choose_independent(judged, r)]
-        raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
+        raise ModelError(
+            [kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can", "EG-PARTITION")]
+        )
     rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
     kept = tuple(int(i) for i in rows)
     return Mobility(

@@ -222,7 +222,9 @@ class MarkerMotion:
         if name in self._open:
             way = " -> ".join([*self._open[self._open.index(name) :], name])
             remedy = "let one of the laws depend on positions and velocities instead"
-            raise ModelError([mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy)])
+            raise ModelError(
+                [mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy, "EG-CIRCLE")]
+            )
         force = next(force for force in mechanism.forces if force.name == element)
         if exerted is not None:
             found = self._exerted(mechanism, force, exerted)
@@ -247,10 +249,12 @@ class MarkerMotion:
                 "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
                 "or give a normal law with a stiffness"
             )
-            raise ModelError([mechanism.problem(quantity.path, told, remedy)])
+            raise ModelError([mechanism.problem(quantity.path, told, remedy, "EG-UNSUPPORTED")])
         if isinstance(found, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"
-            raise ModelError([mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy)])
+            raise ModelError(
+                [mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy, "EG-UNSUPPORTED")]
+            )
         return found
 
     def _quantity(self, quantity: Quantity) -> Expr:

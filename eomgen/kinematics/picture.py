@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, bad_file
 from ..files.path_names import as_path
 from ..files.writing import save_figure
 
@@ -76,7 +76,7 @@ def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any
     if file is not None:
         known = ax.figure.canvas.get_supported_filetypes()
         if as_path("file", file).suffix[1:].lower() not in known:
-            raise UsageError(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
+            raise bad_file(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
     _fill(report, ax)
     if file is not None:
         save_figure(ax.figure, file)

@@ -149,11 +149,11 @@ def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[
         if spec.joint.role == "tree" and k not in tree:
             message = f"a {spec.joint.type_name} joint cannot close a loop, and all joints of its loop are of that kind"
             remedy = "use another type for one joint of the loop"
-            problems.append(mechanism.problem(f"joints.{spec.name}", message, remedy))
+            problems.append(mechanism.problem(f"joints.{spec.name}", message, remedy, "EG-TOPOLOGY"))
     held = {branch.body for branch in branches}
     for k, body in enumerate(mechanism.bodies):
         if k not in held:
-            problems.append(mechanism.problem(f"bodies.{body.name}", *UNHELD))
+            problems.append(mechanism.problem(f"bodies.{body.name}", *UNHELD, code="EG-TOPOLOGY"))
     if problems:
         raise ModelError(problems)
 

@@ -27,7 +27,9 @@ def find_undefined(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
         place = f"forces.{force.name}"
         if isinstance(path, Line) and _meet(motion, path.start, path.end):
             what = "both ends are always at the same point"
-            problems.append(mechanism.problem(place, what, "a line needs two different points; move one of them"))
+            problems.append(
+                mechanism.problem(place, what, "a line needs two different points; move one of them", "EG-UNDEFINED")
+            )
         if isinstance(path, Route):
             problems += _undefined_on_route(mechanism, motion, place, path)
     for constraint in mechanism.constraints:
@@ -36,7 +38,7 @@ def find_undefined(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
             remedy = (
                 "turn the marker of the wheel or of the plane (rpy), or use a joint that lets the disc stand upright"
             )
-            problems.append(mechanism.problem(f"constraints.{constraint.name}", what, remedy))
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", what, remedy, "EG-UNDEFINED"))
     return problems
 
 
@@ -50,7 +52,7 @@ def _undefined_on_route(mechanism: Mechanism, motion: MarkerMotion, place: str, 
     for k, (one, other) in enumerate(pairwise(stops)):
         if isinstance(one, Marker) and isinstance(other, Marker) and _meet(motion, one, other):
             what = f"the neighbouring points {one.label} and {other.label} of the path always coincide"
-            problems.append(mechanism.problem(place, what, "leave one of them out"))
+            problems.append(mechanism.problem(place, what, "leave one of them out", "EG-UNDEFINED"))
         for cylinder, end in ((one, other), (other, one)):
             if isinstance(cylinder, WrapCylinder) and isinstance(end, Marker):
                 x, y, _ = motion.relative(cylinder.marker, end).position
@@ -59,7 +61,7 @@ def _undefined_on_route(mechanism: Mechanism, motion: MarkerMotion, place: str, 
                     index = k if cylinder is other else k - 1
                     what = f"{end.label} lies inside the cylinder around {cylinder.marker.label}"
                     remedy = "a path must start and end outside; give a smaller radius, or move the point"
-                    problems.append(mechanism.problem(f"{place}.via[{index}]", what, remedy))
+                    problems.append(mechanism.problem(f"{place}.via[{index}]", what, remedy, "EG-UNDEFINED"))
     return problems
 
 
@@ -96,7 +98,7 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints, for_a_ti
         else:
             continue
         remedy = "write a coordinate into it, or remove it"
-        problems.append(mechanism.problem(place_of(mechanism, label), what, remedy))
+        problems.append(mechanism.problem(place_of(mechanism, label), what, remedy, "EG-CONTRADICTION"))
     if problems:
         raise ModelError(problems)
 

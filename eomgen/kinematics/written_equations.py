@@ -47,7 +47,9 @@ def refuse_unusable(mechanism: Mechanism, motion: MarkerMotion, rows: Sequence[R
             row, named = by_name[equation.name], symbols_of([equation.expression])
             own = _Written(equation, row, named, symbols_of([row.expression]), sorted(named & asked))
             if found := _of_states(mechanism, own) or (own.elements and _of_laws(mechanism, motion, own)):
-                problems.append(mechanism.problem(f"constraints.{equation.name}.equation", *found))
+                problems.append(
+                    mechanism.problem(f"constraints.{equation.name}.equation", *found, code="EG-EXPRESSION")
+                )
     if problems:
         raise ModelError(problems)
 

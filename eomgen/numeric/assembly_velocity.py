@@ -87,4 +87,7 @@ def assemble_velocity(
         values = equations.values[(slice(None), *k)]
         given |= dict(zip(equations.names, values, strict=True))
         row_scales, all_labels = np.concatenate([row_scales, equations.scales]), [*all_labels, *equations.names]
-    raise AssemblyError(describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]))
+    raise AssemblyError(
+        describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]),
+        code="EG-CONTRADICTION",
+    )

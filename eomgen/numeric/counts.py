@@ -5,7 +5,7 @@ from __future__ import annotations
 from operator import index
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import off_range
 from ..texts import shown
 
 MOST = 10**15  #: all whole numbers up to here are doubles, and their products with sizes of models no infinities
@@ -22,7 +22,7 @@ def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -
     if found is None or found < least or found > (MOST if most is None else most):
         endless = most is None and (found is None or found < least)
         limits = f"of at least {least}" if endless else f"from {least} to {MOST if most is None else most}"
-        raise UsageError(f"{what} must be a whole number {limits}, not {shown(given)}")
+        raise off_range(f"{what} must be a whole number {limits}, not {shown(given)}")
     return found
 
 

@@ -139,7 +139,8 @@ def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, floa
             shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
             raise AssemblyError(
                 f"the Euler parameters {shown} have length {length:.6g}, not 1 (those not given are 0): "
-                f"give {four[0]} = cos(angle/2) and {four[1]} .. {four[3]} = axis * sin(angle/2)"
+                f"give {four[0]} = cos(angle/2) and {four[1]} .. {four[3]} = axis * sin(angle/2)",
+                code="EG-CONTRADICTION",
             )
         result.update(zip(four, (e / length).tolist(), strict=True))
     return result

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UnavailableError, UsageError, ill_placed, no_such
 from ..graph.count import count
 from ..graph.pair_calls import has_pair_sums
 from ..graph.substitute import symbols_of
@@ -76,7 +76,10 @@ def build_program(
     terms.check_shapes()
     name = str(metadata["name"])
     if not (name.isidentifier() and name.isascii()) or name == "eomgen":
-        raise UsageError(f"{name!r} cannot name a generated module; use letters, digits and _, but not the name eomgen")
+        raise UsageError(
+            f"{name!r} cannot name a generated module; use letters, digits and _, but not the name eomgen",
+            code="EG-NAME-FORM",
+        )
     limits = limits or Limits()
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
@@ -205,7 +208,7 @@ def _select(kernels: Sequence[str] | None) -> list[Kernel]:
     for name in kernels or ():
         if name not in known:
             near = joined(hint(name, known), f"there are {', '.join(known)}")
-            raise UsageError(f"no kernel is named {name!r}; {near}")
+            raise no_such(f"no kernel is named {name!r}; {near}")
     return [k for k in KERNELS if kernels is None or k.name in kernels]
 
 
@@ -215,4 +218,4 @@ def _check_symbols(terms: SystemTerms, blocks: Iterable[Block]) -> None:
         known = {terms.t, *terms.p, *terms.u, *block.inputs}
         unknown = sorted(symbols_of((*block.outputs, *block.checks)) - known)
         if unknown:
-            raise UsageError(f"{block.name} depends on {', '.join(unknown)}, which it is not given")
+            raise ill_placed(f"{block.name} depends on {', '.join(unknown)}, which it is not given")

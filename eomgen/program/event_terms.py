@@ -80,7 +80,8 @@ def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
             if name not in places:
                 raise UsageError(
                     f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "
-                    f"reset {', '.join(places)}"
+                    f"reset {', '.join(places)}",
+                    code="EG-EVENT",
                 )
             found.append((i, places[name], value))
     return found

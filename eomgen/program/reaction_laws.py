@@ -246,4 +246,4 @@ def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users)
     quantities = kinematics.mechanism.reaction_quantities
     path = next(q.path for q in quantities.values() if not q.part and q.of == name)
     remedy = f"there are: {', '.join(own or labels) or 'none'}; joints have equations where they close a loop"
-    raise ModelError([users.mechanism.problem(path, message, remedy)])
+    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])

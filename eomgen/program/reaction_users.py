@@ -46,14 +46,14 @@ class Users(NamedTuple):
     def together(self, message: str, remedy: str) -> Problem:
         """A problem of all laws, or of the first expression that speaks of reactions."""
         place = f"forces.{' and '.join(self.forces)}" if self.forces else self.paths[0]
-        return self.mechanism.problem(place, message, remedy)
+        return self.mechanism.problem(place, message, remedy, "EG-UNSUPPORTED")
 
 
 def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
     """A law whose choices make so many pieces that it is not judged whether it has one solution."""
     message = f"its law of a reaction has more than {MANY} pieces, made by abs, max, min, conditions and their products"
     remedy = "write it as a sum of terms with fewer of them, which are judged one by one, or as a smooth function"
-    return mechanism.problem(f"forces.{force}", message, remedy)
+    return mechanism.problem(f"forces.{force}", message, remedy, "EG-TOO-LARGE")
 
 
 def refuse_joints(kinematics: Kinematics) -> None:
@@ -74,10 +74,12 @@ def refuse_joints(kinematics: Kinematics) -> None:
         if straight != [[turns, not turns]] or free[0] or free[1]:
             message = f"joint {spec.name!r} is {spec.joint.type_name}, which has no force across one fixed axis"
             remedy = "coefficient is known of revolute, prismatic and cylindrical joints; give coulomb instead"
-            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNSUPPORTED"))
         elif force.thrust_radius is not None and free[2]:
             message = f"thrust_radius is given, and joint {spec.name!r} slides along its axis, so it carries no thrust"
-            problems.append(mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out"))
+            problems.append(
+                mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out", "EG-UNSUPPORTED")
+            )
     if problems:
         raise ModelError(problems)
 
@@ -125,4 +127,4 @@ def refuse_redundant(mobility: Mobility, users: Users) -> None:
     message = "depends on the reaction of a joint, and reactions are not unique: "
     message += f"{', '.join(mobility.redundant)} follow from the other constraints"
     remedy = "release only these rows by joints with more freedom, or take a law without reactions"
-    raise ModelError([users.mechanism.problem(path, message, remedy) for path in users.paths])
+    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-UNDETERMINED") for path in users.paths])

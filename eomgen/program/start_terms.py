@@ -34,7 +34,9 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     }
     if bad := [(key, name) for key, of in found.items() for name, x in of.items() if not isfinite(x)]:
         what = "is no number at the declared parameters"
-        raise ModelError([m.problem(f"{key.partition('_')[0]}.{name}", what, TO_BE_FINITE) for key, name in bad])
+        raise ModelError(
+            [m.problem(f"{key.partition('_')[0]}.{name}", what, TO_BE_FINITE, "EG-NOT-FINITE") for key, name in bad]
+        )
     places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
     late = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in given.items()}
     fixed = {n: x for terms in late.values() for n, x in terms.items() if not _is_of_operations(x)}

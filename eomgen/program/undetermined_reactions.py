@@ -65,12 +65,12 @@ def refuse_undetermined(
         if _depends(substitute([graph.symbol(name)], symbols), values, open_):
             part = f"reaction({quantity.of}).{quantity.part}" if quantity.part else f"multiplier({quantity.of})"
             message = f"{part} is undetermined: rigid bodies do not determine how the joints of a loop share this load"
-            problems.append(mechanism.problem(quantity.path, message, _REMEDY))
+            problems.append(mechanism.problem(quantity.path, message, _REMEDY, "EG-UNDETERMINED"))
     for force in mechanism.forces:
         if force.by_reaction and _depends(users.laws.get(force.name, ()), values, open_):
             message = f"the load of joint {getattr(force, 'joint', '')!r} is undetermined: rigid bodies do not "
             message += "determine how the joints of a loop share it"
-            problems.append(mechanism.problem(f"forces.{force.name}", message, _REMEDY))
+            problems.append(mechanism.problem(f"forces.{force.name}", message, _REMEDY, "EG-UNDETERMINED"))
     if problems:
         raise ModelError(problems)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UnavailableError, at_odds
 from ..runtime.near_names import find_lacking
 from .readable import Readable
 from .writes_quantities import Derived
@@ -113,7 +113,7 @@ class Displayed(Readable):
         read = {} if values is None else self._read(values, "parameter")
         more = self._read(named, "parameter")
         if both := sorted({*read} & {*more}):
-            raise UsageError(f"parameter {both[0]!r} is given twice; give it one value")
+            raise at_odds(f"parameter {both[0]!r} is given twice; give it one value")
         return ReadingView(self, self._symbol, (*self._put_in, read | more))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from ..describe.expressions import parse
 from ..describe.rewritten_texts import rewritten
 from ..describe.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
-from ..errors import ExpressionError, UsageError
+from ..errors import ExpressionError, UsageError, at_odds, ill_typed
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
 from ..graph.shown import quoted
@@ -35,9 +35,9 @@ def read_value(graph: Graph, name: str, value: Any) -> Expr:
             return lower_sympy(graph, value, graph.symbol)
         return graph.constant(float(value))
     except ExpressionError as error:
-        raise UsageError(f"{name}: {error}") from None
+        raise UsageError(f"{name}: {error}", code="EG-EXPRESSION") from None
     except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"{name} must be a number, a text or a SymPy expression, not {quoted(value)}") from None
+        raise ill_typed(f"{name} must be a number, a text or a SymPy expression, not {quoted(value)}") from None
 
 
 def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[
         An unknown name, one that is given twice, or a value that is no expression.
     """
     if not isinstance(given, Mapping):
-        raise UsageError(f"values are given by name, as a mapping does, not {quoted(given)}")
+        raise ill_typed(f"values are given by name, as a mapping does, not {quoted(given)}")
     values: dict[str, Any] = {}
     for key, value in given.items():
         name = name_of(key)
@@ -66,7 +66,7 @@ def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[
         if name not in allowed:
             raise unknown(what, name, allowed)
         if name in values:
-            raise UsageError(f"{what} {name!r} is given twice; give it one value")
+            raise at_odds(f"{what} {name!r} is given twice; give it one value")
         values[name] = _without_dots(value, plain)
         read_value(Graph(), name, values[name])
     return values

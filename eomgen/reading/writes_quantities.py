@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
-from ..errors import NonFiniteError, UsageError
+from ..errors import NonFiniteError, at_odds, incomplete
 from ..graph.copies import copied
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
@@ -250,14 +250,14 @@ class WritesQuantities(ABC):
         if name in BY_NAME:
             if part is None:
                 there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
-                raise UsageError(f"{name!r} are written one by one; give the name of one as part: {there}")
+                raise incomplete(f"{name!r} are written one by one; give the name of one as part: {there}")
             whole = value[part]
             return self._named[f"{name}.{part if part in tuple(value) else self._plain(part)}"], whole
         if part is None:
             named = self._named[name]  # those of the mass matrix and the force are chosen together
             return needed(named, value) if name in ("mass_matrix", "force") else named, value
         if not isinstance(value, NamedSum):
-            raise UsageError(f"{name!r} has no parts; leave {part!r} out")
+            raise at_odds(f"{name!r} has no parts; leave {part!r} out")
         return needed(self._named[name], value[part]), value[part]
 
     @property

@@ -57,17 +57,17 @@ class Folder:
         path, remedy = f"{element.tag}.file", "give its path from the model's folder"
         if not name or len(name) > NAME:
             message = "names no file" if not name else f"{name[:20]!r}... is too long for the name of a file"
-            return element.problem(path, message, f"at most {NAME:,} characters" if name else remedy)
+            return element.problem(path, message, f"at most {NAME:,} characters" if name else remedy, "EG-FILE")
         for base in bases:
             steps = [plain(step) for step in (*base[1:], name)]
             place = os.path.realpath(os.path.join(base[0], *steps))
             if not self.holds(place) or (os.name == "posix" and any(map(_ELSEWHERE.match, steps))):
                 message = f"{name!r} is outside the folder {self.path}, so it is not read"
                 remedy = "name a folder that holds all files of the model: assets=..., or --assets"
-                return element.problem(path, message, remedy)
+                return element.problem(path, message, remedy, "EG-FILE")
             if os.path.isfile(place):
                 return place
-        return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy)
+        return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy, "EG-FILE")
 
     def read(self, element: XmlElement, path: str, most: int) -> bytes:
         """The bytes of a file that :meth:`find` found.
@@ -87,4 +87,4 @@ class Folder:
         return data
 
     def _refusal(self, element: XmlElement, path: str, message: str, remedy: str = "") -> ModelError:
-        return ModelError([element.problem(f"{element.tag}.file", f"{path} {message}", remedy)])
+        return ModelError([element.problem(f"{element.tag}.file", f"{path} {message}", remedy, "EG-FILE")])

@@ -90,7 +90,7 @@ class _Writer:
         ):
             if count > most:
                 message = f"has {count:,} {what}"
-                robot.problem("robot", message, f"at most {most:,}; {remedy}", (robot.file, 1))
+                robot.problem("robot", message, f"at most {most:,}; {remedy}", (robot.file, 1), code="EG-TOO-LARGE")
         if robot.problems:
             raise ModelError(robot.problems)
 
@@ -337,7 +337,13 @@ class _Writer:
             size += len(law) * len(drive.parts)
             if size > LAWS:
                 message = "the laws of the drives are too long"
-                problem = Problem(f"actuator.{name}", message, f"at most {LAWS:,} characters in all", *drive.place)
+                problem = Problem(
+                    f"actuator.{name}",
+                    message,
+                    f"at most {LAWS:,} characters in all",
+                    *drive.place,
+                    code="EG-TOO-LARGE",
+                )
                 raise ModelError([problem])
             for joint, c in drive.parts if law else ():
                 q = self.joints.get(joint)

@@ -93,6 +93,7 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
             "no link can move",
             "give the robot joints; the base of a URDF robot moves with floating=True, or --floating",
             (robot.file, 1),
+            code="EG-TOPOLOGY",
         )
     _check_masses(robot, found, options.check)
     if robot.problems:
@@ -153,7 +154,13 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
     for name, value in options.locked.items():
         joint = robot.joints.get(name)
         if joint is None:
-            robot.problem(f"lock.{name}", "no such joint", nearest(name, robot.joints, "joints"), (robot.file, 1))
+            robot.problem(
+                f"lock.{name}",
+                "no such joint",
+                nearest(name, robot.joints, "joints"),
+                (robot.file, 1),
+                code="EG-NAME-UNKNOWN",
+            )
             continue
         if joint.type not in ("revolute", "prismatic", "weld"):
             robot.problem(
@@ -161,6 +168,7 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
                 f"is a {joint.type} joint",
                 "only joints of one degree of freedom can be locked",
                 joint.place,
+                code="EG-REFERENCE",
             )
             continue
         axis = np.array(joint.axis) / max(map(abs, joint.axis))  # first, as squares of small numbers vanish
@@ -181,12 +189,20 @@ def _check_ends(robot: Robot) -> None:
     for loop in robot.loops:
         for link, _ in (loop.first, loop.second):
             if link not in robot.links:
-                robot.problem(f"loop.{loop.name}", f"no link {link!r}", nearest(link, robot.links, "links"), loop.place)
+                robot.problem(
+                    f"loop.{loop.name}",
+                    f"no link {link!r}",
+                    nearest(link, robot.links, "links"),
+                    loop.place,
+                    code="EG-NAME-UNKNOWN",
+                )
     for joint in robot.joints.values():
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link and link not in robot.links:
                 remedy = nearest(link, robot.links, "links")
-                robot.problem(f"joint.{joint.name}.{end}", f"no link {link!r}", remedy, joint.place)
+                robot.problem(
+                    f"joint.{joint.name}.{end}", f"no link {link!r}", remedy, joint.place, code="EG-NAME-UNKNOWN"
+                )
         if joint.child and joint.child in carrier:
             other = carrier[joint.child].name
             message = f"the link {joint.child!r} is also the child of the joint {other!r}"
@@ -194,7 +210,7 @@ def _check_ends(robot: Robot) -> None:
                 "the joints of a URDF file form a tree; write one that closes a loop as <loop_joint name= type=> with "
                 "<axis xyz=/>, <link1 link= xyz= rpy=/> and <link2 link= xyz= rpy=/>"
             )
-            robot.problem(f"joint.{joint.name}.child", message, remedy, joint.place)
+            robot.problem(f"joint.{joint.name}.child", message, remedy, joint.place, code="EG-TOPOLOGY")
         carrier.setdefault(joint.child, joint)
 
 
@@ -204,11 +220,17 @@ def _root(robot: Robot) -> str:
     roots = [link for link in robot.links.values() if link.name not in children]
     if robot.links and not roots and all(joint.parent in robot.links for joint in robot.joints.values()):
         robot.problem(
-            "robot", "the joints form a ring: no link is the root", "connect the links as a tree", (robot.file, 1)
+            "robot",
+            "the joints form a ring: no link is the root",
+            "connect the links as a tree",
+            (robot.file, 1),
+            code="EG-TOPOLOGY",
         )
     for link in roots[1:]:
         message = f"has no parent, and neither has {roots[0].name!r}; a robot must have one root"
-        robot.problem(f"link.{link.name}", message, "connect it by a joint, or remove it", link.place)
+        robot.problem(
+            f"link.{link.name}", message, "connect it by a joint, or remove it", link.place, code="EG-TOPOLOGY"
+        )
     if len(roots) == 1 and not robot.problems:
         reached, waiting = set(), [roots[0].name]
         carried: dict[str, list[str]] = {}
@@ -221,7 +243,9 @@ def _root(robot: Robot) -> str:
         for link in robot.links.values():
             if link.name not in reached:
                 message = f"the joints do not connect it to the root {roots[0].name!r}: they form a ring"
-                robot.problem(f"link.{link.name}", message, "connect the links as a tree", link.place)
+                robot.problem(
+                    f"link.{link.name}", message, "connect the links as a tree", link.place, code="EG-TOPOLOGY"
+                )
     return roots[0].name if roots else ""
 
 
@@ -232,9 +256,9 @@ def _check_mimic(robot: Robot, joint: RobotJoint) -> None:
     path = f"joint.{joint.name}.mimic"
     if other is None:
         remedy = nearest(joint.mimic.joint, robot.joints, "joints")
-        robot.problem(path, f"no joint {joint.mimic.joint!r}", remedy, joint.place)
+        robot.problem(path, f"no joint {joint.mimic.joint!r}", remedy, joint.place, code="EG-NAME-UNKNOWN")
     elif other is joint:
-        robot.problem(path, "the joint mimics itself", "name another joint", joint.place)
+        robot.problem(path, "the joint mimics itself", "name another joint", joint.place, code="EG-CIRCLE")
 
 
 def _check_inertias(robot: Robot, lenient: bool) -> None:
@@ -258,7 +282,7 @@ def _check_inertias(robot: Robot, lenient: bool) -> None:
         if fault and lenient and fault[1] == EXCESS:
             continue
         if fault and link.name in moved_links - welded and link.place[1] not in faulty:
-            robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
+            robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place, code="EG-INERTIA")
 
 
 def _has_no_lever(joint: RobotJoint, inertia: Inertia) -> bool:
@@ -312,4 +336,4 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
             f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
             "kinematics alone, check_inertia='note' (--check-inertia note)"
         )
-        robot.problem(f"joint.{joint.name}", message, remedy, joint.place)
+        robot.problem(f"joint.{joint.name}", message, remedy, joint.place, code="EG-NO-INERTIA")

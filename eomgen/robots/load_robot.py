@@ -13,7 +13,7 @@ import numpy as np
 from ..describe.constant_texts import constant
 from ..describe.description import Description
 from ..describe.names import nearest
-from ..errors import ModelError, UsageError
+from ..errors import ModelError, ill_typed, no_choice, no_such
 from ..files.path_names import as_name
 from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import CHECKS, word_of_check
@@ -63,7 +63,7 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
         remedy = "a URDF file begins with <robot>, an MJCF file with <mujoco>"
         if root.tag == "sdf":
             remedy += f"; {CONVERTED['.sdf']}"
-        raise ModelError([root.problem(root.tag, "is not a robot", remedy)])
+        raise ModelError([root.problem(root.tag, "is not a robot", remedy, "EG-FILE-DAMAGED")])
     return describe_robot(robot, options)
 
 
@@ -77,28 +77,28 @@ def make_options(given: dict[str, Any]) -> RobotOptions:
     known = [field.name for field in fields(RobotOptions)]
     for key in given:
         if key not in known:
-            raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
+            raise no_such(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
         if key in given and not (isinstance(given[key], str) and given[key] in allowed):
-            raise UsageError(f"{key} must be one of {', '.join(allowed)}, not {given[key]!r}")
+            raise no_choice(f"{key} must be one of {', '.join(allowed)}, not {given[key]!r}")
     if given.get("check_inertia") is not None:
         word = word_of_check(given["check_inertia"])
         if word is None:
-            raise UsageError(
+            raise no_choice(
                 f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {given['check_inertia']!r}"
             )
         given = {**given, "check_inertia": word}
     friction = given.get("friction", False)
     if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
-        raise UsageError(
+        raise ill_typed(
             f"friction must be True, or the velocity (rad/s or m/s) below which it is smoothed, not {friction!r}"
         )
     for key in ("floating", "merge", "symbolic"):
         if not isinstance(given.get(key, False), bool | np.bool_):
-            raise UsageError(f"{key} must be True or False, not {given[key]!r}")
+            raise ill_typed(f"{key} must be True or False, not {given[key]!r}")
     given = {key: _names(key, value) if key in ("actuate", "lock") else value for key, value in given.items()}
     if not _is_number(given.get("snap", 0.0)) or given.get("snap", 0.0) < 0.0:
-        raise UsageError(f"snap must be an angle (rad), 0 or positive, not {given['snap']!r}")
+        raise ill_typed(f"snap must be an angle (rad), 0 or positive, not {given['snap']!r}")
     if given.get("assets") is not None:
         as_name("assets", given["assets"])
     return RobotOptions(**given)
@@ -121,10 +121,10 @@ def _names(key: str, given: Any) -> Any:
         for name, value in given.items():
             if not _is_number(value):
                 message = f"the value must be a finite number (rad or m), at most {LARGEST:g}"
-                raise UsageError(f"lock={{{name!r}: {value!r}}}: {message}")
+                raise ill_typed(f"lock={{{name!r}: {value!r}}}: {message}")
         return given
     names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Mapping) else (None,)
     if not all(isinstance(name, str) for name in names):
         also = "True" if key == "actuate" else "a mapping of names to values"
-        raise UsageError(f"{key} must be names of joints, or {also}, not {given!r}")
+        raise ill_typed(f"{key} must be names of joints, or {also}, not {given!r}")
     return names

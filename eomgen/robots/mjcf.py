@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..describe.joint_data import limits_nothing
-from ..errors import UsageError
+from ..errors import at_odds
 from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
@@ -41,7 +41,7 @@ def read_mjcf(root: XmlElement, options: RobotOptions) -> Robot:
         The file names others outside its folder, or MuJoCo refuses it; with the line where it says one.
     """
     if options.floating:
-        raise UsageError(f"{root.file}: an MJCF file itself defines which bodies float; leave floating out")
+        raise at_odds(f"{root.file}: an MJCF file itself defines which bodies float; leave floating out")
     scan = Scan(root, options.assets)
     compiled = compile_mjcf(Text(scan.trees, scan.folder, scan.problems), root)
     robot = _MjcfReader(compiled, root, scan.lines).read()
@@ -108,7 +108,9 @@ class _MjcfReader(Compiled):
         if size > 1:
             if kind == "free" and m.dof_armature[dof]:
                 message = "armature on a free joint is not supported: it is mass without weight, which no body has"
-                self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
+                self.robot.problem(
+                    f"joint.{name}.armature", message, 'set armature="0" there', place, code="EG-UNSUPPORTED"
+                )
             for what, acts in (
                 ("dry friction", m.dof_frictionloss[dof] and not self.off("FRICTIONLOSS", "CONSTRAINT")),
                 ("limit", m.jnt_limited[j] and not self.off("LIMIT", "CONSTRAINT")),

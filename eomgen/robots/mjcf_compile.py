@@ -59,7 +59,7 @@ def compile_mjcf(text: Text, root: XmlElement) -> SimpleNamespace:
     if "refused" in answer:
         raise text.refusal(" ".join(answer["refused"].split()), root)
     if "arrays" not in answer:
-        raise ModelError([root.problem("mujoco", *_why(answer))])
+        raise ModelError([root.problem("mujoco", *_why(answer), code="EG-FILE-DAMAGED")])
     return _read(answer, data)
 
 

@@ -82,7 +82,9 @@ class Compiled:
             values = getattr(self.m.opt if key == "gravity" else self.m, key, 0.0)
             if not (np.abs(values) <= LARGEST).all():
                 remedy = f"at most {LARGEST:g}, so that products stay finite"
-                problem = self.root.problem("mujoco", f"{what} ({key}) come out too large or not finite", remedy)
+                problem = self.root.problem(
+                    "mujoco", f"{what} ({key}) come out too large or not finite", remedy, "EG-RANGE"
+                )
                 self.robot.problems.append(problem)
         if self.robot.problems:
             raise ModelError(self.robot.problems)

@@ -57,10 +57,16 @@ class Trees:
         """An element of a tree whose files are in ``home``; ``seen`` are those that are part of it."""
         self.elements += 1
         if self.elements > ELEMENTS:
-            raise ModelError([element.problem("mujoco", "has too many elements", f"at most {ELEMENTS:,} of all files")])
+            raise ModelError(
+                [
+                    element.problem(
+                        "mujoco", "has too many elements", f"at most {ELEMENTS:,} of all files", "EG-TOO-LARGE"
+                    )
+                ]
+            )
         if depth >= DEPTH:
             message = f"at most {DEPTH} levels, over all files"
-            raise ModelError([element.problem(element.tag, "is nested too deeply", message)])
+            raise ModelError([element.problem(element.tag, "is nested too deeply", message, "EG-TOO-LARGE")])
         made = replace(element, attributes=dict(element.attributes), children=[])
         for child in element.children:
             if child.tag.lower() == "include":
@@ -80,7 +86,7 @@ class Trees:
             message = f"{element.attributes['file']!r} is part of the model already"
             if path in self.open:
                 message = f"{element.attributes['file']!r} includes itself"
-            self.problems.append(element.problem("include.file", message, "include each file once"))
+            self.problems.append(element.problem("include.file", message, "include each file once", "EG-CIRCLE"))
             return []
         seen.add(path)
         self.open.append(path)
@@ -96,7 +102,9 @@ class Trees:
             return
         if path in self.open:
             message = f"{element.attributes['file']!r} attaches itself"
-            self.problems.append(element.problem("model.file", message, "a model cannot be part of itself"))
+            self.problems.append(
+                element.problem("model.file", message, "a model cannot be part of itself", "EG-CIRCLE")
+            )
             return
         if path not in self.models:
             self.models[path] = self._tree(self._read(element, path), path, depth)
@@ -113,7 +121,9 @@ class Trees:
     def _read(self, element: XmlElement, path: str) -> XmlElement:
         self.files += 1
         if self.files >= FILES:
-            raise ModelError([element.problem(element.tag, "too many files", f"at most {FILES} make a model")])
+            raise ModelError(
+                [element.problem(element.tag, "too many files", f"at most {FILES} make a model", "EG-TOO-LARGE")]
+            )
         data = self.folder.read(element, path, SIZE - self.bytes)
         self.bytes += len(data)
         return parse_xml(data, path)
@@ -150,7 +160,7 @@ class Scan:
         self.folder = Folder(main if folder is None else folder)
         if not self.folder.holds(main):
             message = f"{root.file} lies outside the folder {folder} of its assets"
-            raise ModelError([root.problem("assets", message, "name a folder that holds the model")])
+            raise ModelError([root.problem("assets", message, "name a folder that holds the model", "EG-FILE")])
         self.trees = Trees(root, self.folder)
         self.problems: list[Problem] = list(self.trees.problems)
         self.lines: Lines = {}
@@ -210,12 +220,14 @@ class Scan:
 
     def _too_large(self, element: XmlElement, key: str, remedy: str) -> None:
         message = f"{element.attributes[key][:20]} is too large"
-        self.problems.append(element.problem(f"{element.tag}.{key}", message, remedy))
+        self.problems.append(element.problem(f"{element.tag}.{key}", message, remedy, "EG-TOO-LARGE"))
 
     def _make(self, element: XmlElement, bodies: int) -> None:
         """Count bodies that copying makes, of siblings and of all files; one problem tells of too many."""
         if self.made <= COPIES < self.made + bodies:
-            self.problems.append(element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,} in all"))
+            self.problems.append(
+                element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,} in all", "EG-TOO-LARGE")
+            )
         self.made += bodies
 
 

@@ -66,7 +66,7 @@ class Text:
         text = _LINE.sub(lambda found: self._back(int(found[1]), root.file), said)
         for path, made in self.names.items():
             text = text.replace(f"'{made}'", f"'{os.path.basename(path)}'")
-        problem = root.problem("mujoco", f"MuJoCo refuses it: {text}")
+        problem = root.problem("mujoco", f"MuJoCo refuses it: {text}", code="EG-FILE-DAMAGED")
         return ModelError([problem._replace(file=place[0], line=place[1]) if place else problem])
 
     def _back(self, number: int, main: str) -> str:

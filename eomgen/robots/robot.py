@@ -208,9 +208,9 @@ class Robot:
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def problem(self, path: str, message: str, remedy: str, place: Place) -> None:
+    def problem(self, path: str, message: str, remedy: str, place: Place, code: str = "EG-MODEL") -> None:
         """Note a fault."""
-        self.problems.append(Problem(path, message, remedy, *place))
+        self.problems.append(Problem(path, message, remedy, *place, code))
 
 
 def describe_tie(tie: Tie, coordinates: Mapping[str, str], locked: Mapping[str, float]) -> dict[str, Any] | None:

@@ -73,9 +73,11 @@ class _UrdfReader:
             read = part.tag in ("link", "joint", *LOOPS)  # elsewhere, "${" may be of ROS or Gazebo
             for element in part.walk():
                 if element.tag in UNEXPANDED or (read and any("${" in x for x in element.attributes.values())):
-                    raise ModelError([element.problem("robot", "is a xacro file", CONVERTED[".xacro"])])
+                    raise ModelError([element.problem("robot", "is a xacro file", CONVERTED[".xacro"], code="EG-FILE")])
         if len(self.root.children) > 20 * LINKS:
-            raise ModelError([self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}")])
+            raise ModelError(
+                [self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}", code="EG-TOO-LARGE")]
+            )
         for element in self.root.children:
             if element.tag == "link":
                 self._link(element)
@@ -85,14 +87,18 @@ class _UrdfReader:
                 self._loop(element)
         robot.notes += note_urdf(self.root)
         if not robot.links:
-            robot.problems.append(self.root.problem("robot", "has no links", "a URDF file has <link> elements"))
+            robot.problems.append(
+                self.root.problem("robot", "has no links", "a URDF file has <link> elements", code="EG-MISSING")
+            )
         if len(robot.links) > LINKS:
-            raise ModelError([self.root.problem("robot", f"has {len(robot.links)} links", f"at most {LINKS}")])
+            raise ModelError(
+                [self.root.problem("robot", f"has {len(robot.links)} links", f"at most {LINKS}", code="EG-TOO-LARGE")]
+            )
         return robot
 
     # -- values ---------------------------------------------------------------------------------------------------
-    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "") -> None:
-        self.robot.problems.append(element.problem(path, message, remedy))
+    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> None:
+        self.robot.problems.append(element.problem(path, message, remedy, code))
 
     def number(
         self, element: XmlElement, key: str, path: str, default: float | None = None, most: float = LARGEST
@@ -102,19 +108,21 @@ class _UrdfReader:
         where = f"{path}.{key}"
         if text is None:
             if default is None:
-                self.fault(element, where, "is missing", f'give {key}="..." in <{element.tag}>')
+                self.fault(element, where, "is missing", f'give {key}="..." in <{element.tag}>', "EG-MISSING")
             return default or 0.0
         return self._finite(element, where, text, most)
 
     def _finite(self, element: XmlElement, path: str, text: str, most: float = LARGEST) -> float:
         value = float(text) if _NUMBER.match(text.strip()) else math.nan
         if most < abs(value) < math.inf:
-            self.fault(element, path, f"{value:g} is too large", f"at most {most:g}, so that products stay finite")
+            self.fault(
+                element, path, f"{value:g} is too large", f"at most {most:g}, so that products stay finite", "EG-RANGE"
+            )
             return 0.0
         if not math.isfinite(value):
             shown = text if len(text) <= 40 else text[:37] + "..."
             what = "not finite" if text.strip().lower() in _SPECIAL else "not a number"
-            self.fault(element, path, f"{shown!r} is {what}", "give a finite number")
+            self.fault(element, path, f"{shown!r} is {what}", "give a finite number", "EG-NUMBER")
             return 0.0
         return value
 
@@ -127,7 +135,7 @@ class _UrdfReader:
             return default  # type: ignore[return-value]
         parts = text.split()
         if len(parts) != 3:
-            self.fault(element, f"{path}.{key}", f"{text[:40]!r} is not three numbers", 'write "x y z"')
+            self.fault(element, f"{path}.{key}", f"{text[:40]!r} is not three numbers", 'write "x y z"', "EG-NUMBER")
             return default  # type: ignore[return-value]
         x, y, z = (self._finite(element, f"{path}.{key}", part) for part in parts)
         return (x, y, z)
@@ -146,13 +154,12 @@ class _UrdfReader:
         name = element.attributes.get("name")
         known = self.robot.links if element.tag == "link" else self.robot.joints
         if not name:
-            self.fault(element, element.tag, "has no name", f'give <{element.tag} name="...">')
+            self.fault(element, element.tag, "has no name", f'give <{element.tag} name="...">', "EG-MISSING")
             return None
         if name in known:
             first = known[name].place[1]
-            self.fault(
-                element, f"{element.tag}.{name}", f"the name is given twice, first in line {first}", "rename one"
-            )
+            message = f"the name is given twice, first in line {first}"
+            self.fault(element, f"{element.tag}.{name}", message, "rename one", "EG-NAME-TAKEN")
             return None
         return name
 
@@ -174,11 +181,11 @@ class _UrdfReader:
         weight, tensor = element.find("mass"), element.find("inertia")
         mass = 0.0
         if weight is None:
-            self.fault(element, f"{path}.mass", "is missing", 'give <mass value="..."/>')
+            self.fault(element, f"{path}.mass", "is missing", 'give <mass value="..."/>', "EG-MISSING")
         else:
             mass = self.number(weight, "value", f"{path}.mass")
             if mass < 0.0 and self.options.check == "error":
-                self.fault(weight, f"{path}.mass", f"is {mass:g}", f"give a mass of 0 or more, {SWITCH}")
+                self.fault(weight, f"{path}.mass", f"is {mass:g}", f"give a mass of 0 or more, {SWITCH}", "EG-RANGE")
         if tensor is None:
             return Inertia(mass, np.zeros(3), np.zeros((3, 3))).seen(frame)
         xx, xy, xz, yy, yz, zz = (
@@ -214,12 +221,8 @@ class _UrdfReader:
 
     def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
-            self.fault(
-                element,
-                path,
-                "a scale of 0 leaves nothing of the mesh",
-                "give three factors other than 0; negative ones mirror the mesh",
-            )
+            remedy = "give three factors other than 0; negative ones mirror the mesh"
+            self.fault(element, path, "a scale of 0 leaves nothing of the mesh", remedy, "EG-RANGE")
         elif min(factors) < 0.0:
             self.robot.notes.append(f"{path}: negative factors mirror the mesh")
 
@@ -232,13 +235,13 @@ class _UrdfReader:
         kind = TYPES.get(given)
         if kind is None:
             message = f"no joint of type {given!r}" if given else "is missing"
-            self.fault(element, f"{path}.type", message, f"types: {', '.join(TYPES)}")
+            self.fault(element, f"{path}.type", message, f"types: {', '.join(TYPES)}", "EG-CHOICE")
         ends = {}
         for end in ("parent", "child"):
             found = element.find(end)
             link = found.attributes.get("link") if found is not None else None
             if not link:
-                self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>')
+                self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>', "EG-MISSING")
             ends[end] = link or ""
         direction = self._axis(element, path, kind)
         if kind == "planar" and (direction[:2] != (0.0, 0.0) or direction[2] < 0.0):
@@ -269,7 +272,8 @@ class _UrdfReader:
         axis, default = element.find("axis"), (1.0, 0.0, 0.0)
         direction = default if axis is None else self.triple(axis, "xyz", f"{path}.axis", default)
         if kind in ("revolute", "prismatic", "planar") and not any(direction):
-            self.fault(axis or element, f"{path}.axis", "the axis has no length", "give three numbers, not all zero")
+            remedy = "give three numbers, not all zero"
+            self.fault(axis or element, f"{path}.axis", "the axis has no length", remedy, "EG-RANGE")
             return default
         return direction
 
@@ -283,13 +287,20 @@ class _UrdfReader:
             self.robot.notes.append(f"{path}: names no type; taken as {plain}")
         kind = LOOP_TYPES.get(given or plain)
         if kind is None:
-            self.fault(element, f"{path}.type", f"no loop is closed by {given!r}", f"types: {', '.join(LOOP_TYPES)}")
+            remedy = f"types: {', '.join(LOOP_TYPES)}"
+            self.fault(element, f"{path}.type", f"no loop is closed by {given!r}", remedy, "EG-CHOICE")
         ends = []
         for words in ENDS:
             end = next((found for word in words if (found := element.find(word)) is not None), None)
             link = end.attributes.get("link", "") if end is not None else ""
             if end is None or not link:
-                self.fault(element, f"{path}.{words[0]}", "is missing", f'give <{words[0]} link="..." xyz= rpy=/>')
+                self.fault(
+                    element,
+                    f"{path}.{words[0]}",
+                    "is missing",
+                    f'give <{words[0]} link="..." xyz= rpy=/>',
+                    "EG-MISSING",
+                )
                 return
             at, o = element.find(f"{end.tag}_origin") or end, (0.0, 0.0, 0.0)
             where = f"{path}.{at.tag}"
@@ -324,7 +335,7 @@ class _UrdfReader:
             return None
         joint = mimic.attributes.get("joint")
         if not joint:
-            self.fault(mimic, f"{path}.mimic", "names no joint", 'give <mimic joint="..."/>')
+            self.fault(mimic, f"{path}.mimic", "names no joint", 'give <mimic joint="..."/>', "EG-MISSING")
             return None
         factor = self.number(mimic, "multiplier", f"{path}.mimic", 1.0)
         return Mimic(joint, factor, self.number(mimic, "offset", f"{path}.mimic", 0.0))

@@ -43,9 +43,9 @@ class XmlElement:
             yield element
             waiting.extend(reversed(element.children))
 
-    def problem(self, path: str, message: str, remedy: str = "") -> Problem:
+    def problem(self, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> Problem:
         """A fault at this element."""
-        return Problem(path, message, remedy, self.file, self.line)
+        return Problem(path, message, remedy, self.file, self.line, code)
 
 
 def read_xml(path: str | os.PathLike[str]) -> XmlElement:
@@ -66,7 +66,7 @@ def read_xml(path: str | os.PathLike[str]) -> XmlElement:
     with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:
-        raise ModelError([Problem("file", "is too large", f"at most {SIZE:,} bytes", name, 1)])
+        raise ModelError([Problem("file", "is too large", f"at most {SIZE:,} bytes", name, 1, code="EG-TOO-LARGE")])
     return parse_xml(data, name)
 
 
@@ -83,7 +83,9 @@ def parse_xml(data: bytes, file: str) -> XmlElement:
     longest = max(map(len, data.split(b">")))
     if longest > PIECE:  # expat would read it again and again
         message = f"has a tag, a comment or a text of {longest:,} bytes"
-        raise ModelError([Problem("file", message, f"at most {PIECE:,} from one '>' to the next", file, 1)])
+        raise ModelError(
+            [Problem("file", message, f"at most {PIECE:,} from one '>' to the next", file, 1, code="EG-TOO-LARGE")]
+        )
     parser = DefusedExpatParser(forbid_dtd=True, forbid_entities=True, forbid_external=True)
     handler = _handler(parser, file)
     parser.setContentHandler(handler)
@@ -94,14 +96,18 @@ def parse_xml(data: bytes, file: str) -> XmlElement:
     except DefusedXmlException:
         message = "declares a document type or an entity"
         remedy = "remove <!DOCTYPE ...>; eomgen expands no entities and reads no other files"
-        raise ModelError([Problem("file", message, remedy, file, parser.getLineNumber() or 1)]) from None
+        raise ModelError(
+            [Problem("file", message, remedy, file, parser.getLineNumber() or 1, code="EG-REFUSED")]
+        ) from None
     except SAXParseException as error:
         message, line = f"not XML: {error.getMessage()}", error.getLineNumber() or 1
-        raise ModelError([Problem("file", message, "check brackets, quotes and closing tags", file, line)]) from None
+        raise ModelError(
+            [Problem("file", message, "check brackets, quotes and closing tags", file, line, code="EG-FILE-DAMAGED")]
+        ) from None
     except (SAXException, ValueError, LookupError) as error:  # an unknown encoding, among others
-        raise ModelError([Problem("file", f"not XML: {error}", "", file, 1)]) from None
+        raise ModelError([Problem("file", f"not XML: {error}", "", file, 1, code="EG-FILE-DAMAGED")]) from None
     if handler.root is None:
-        raise ModelError([Problem("file", "is empty", "", file, 1)])
+        raise ModelError([Problem("file", "is empty", "", file, 1, code="EG-FILE-DAMAGED")])
     root: XmlElement = handler.root
     return root
 
@@ -119,7 +125,9 @@ def _handler(parser: Any, file: str) -> Any:
             self.count = 0
 
         def stop(self, message: str, remedy: str) -> ModelError:
-            return ModelError([Problem("file", message, remedy, file, parser.getLineNumber() or 1)])
+            return ModelError(
+                [Problem("file", message, remedy, file, parser.getLineNumber() or 1, code="EG-TOO-LARGE")]
+            )
 
         def startElement(self, tag: str, attributes: Any) -> None:
             self.count += 1

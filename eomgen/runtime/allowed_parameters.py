@@ -55,4 +55,6 @@ def told(
     where = ""
     if p.ndim > 1:
         where = f" in run {runs[0]}" + f" and {len(runs) - 1} more" * (len(runs) > 1)
-    return [Problem(path + flaw.key, f"{flaw.message} with {given}{where}", flaw.remedy) for flaw in flaws]
+    return [
+        Problem(path + flaw.key, f"{flaw.message} with {given}{where}", flaw.remedy, code="EG-RANGE") for flaw in flaws
+    ]

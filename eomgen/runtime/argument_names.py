@@ -7,7 +7,7 @@ from functools import wraps
 from inspect import signature
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..errors import UsageError
+from ..errors import at_odds
 from ..kernel_table import argument
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def both_names(function: Function) -> Function:
     def call(*args, **given):  # type: ignore[no-untyped-def]
         for other in others.keys() & given.keys() if given else ():
             if others[other] in given or place[others[other]] < len(args):
-                raise UsageError(f"{others[other]} and {other} are the same argument; give one of them")
+                raise at_odds(f"{others[other]} and {other} are the same argument; give one of them")
             given[others[other]] = given.pop(other)
         try:
             return function(*args, **given)

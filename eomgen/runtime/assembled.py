@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError, calls_within
+from ..errors import calls_within, ill_placed, ill_shaped, no_number
 from ..limits.constraints import CHOSEN
 from ..limits.motions import MOST_ANGLE
 from ..numeric.scales import Array
@@ -120,7 +120,7 @@ class Assembled:
         """
         initial, given = self._given(guess, named, t, p, u)
         if given.rates:
-            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
+            raise ill_placed(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
         return initial.from_guess(given.positions) if given.positions else initial.assembled({})
 
     @both_names
@@ -162,9 +162,9 @@ class Assembled:
         """
         state = read_numbers("x", x)
         if state.shape not in ((self.n_q,), (self.n_x,)):
-            raise UsageError(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
+            raise ill_shaped(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
         if not np.isfinite(state).all():
-            raise UsageError(f"x must be finite, not {state}")
+            raise no_number(f"x must be finite, not {state}")
         initial = self._initial(t, None, None)
         here = initial.side(state[: self.n_q])
         there = initial.side(initial.reference())
@@ -195,7 +195,7 @@ class Assembled:
             scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "state" if name in layout.states else "velocity" if name in layout.v else "coordinate"
-                raise UsageError(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
+                raise ill_placed(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
         kernels = (self if p is None and u is None else self.bind(p, u)).kernels
         return initial_of(kernels, read_number("t", t), names)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UnavailableError, ill_shaped
 from ..limits.constraints import STATE
 from ..limits.inertia import SINGULAR
 from ..numeric import algebra
@@ -78,7 +78,7 @@ class Canonical:
         module, layout = self._module, self._module.layout
         z = read_numbers("z", z)
         if z.shape != (self.n_z,):
-            raise UsageError(f"z must have shape ({self.n_z},) [{', '.join(self.z_names)}], not {z.shape}")
+            raise ill_shaped(f"z must have shape ({self.n_z},) [{', '.join(self.z_names)}], not {z.shape}")
         n, s = layout.n_q, layout.scales.q
         q, p = z[:n], z[n:]
         rate, N = np.zeros(layout.n_c), np.eye(layout.n_v)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import too_large
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .layout import Layout
@@ -128,7 +128,7 @@ class Columns:
 
         t, x, u = (self.t, self.x, self.u) if self._steps is None else self._steps()
         if self._steps is not None and not len(t):
-            raise UsageError(
+            raise too_large(
                 "the run took too many steps to keep all of them besides t_eval; for its change points run it without "
                 "t_eval, or in parts"
             )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import ill_shaped
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .kernels import into
@@ -66,7 +66,7 @@ class DaeForm:
         for start, part, label in ((0, y, "y"), (self._n_full, yp, "yp")):
             given = read_numbers(label, part)
             if given.shape != (self.n_y,):
-                raise UsageError(f"{label} must have shape ({self.n_y},), not {given.shape}")
+                raise ill_shaped(f"{label} must have shape ({self.n_y},), not {given.shape}")
             result[start + self._unknowns] = given
         result[2 * self._n_full :] = more
         return result

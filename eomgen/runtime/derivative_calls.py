@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UsageError
+from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, ill_shaped
 from ..numeric.scales import Array
 from .refusals import refuse_reaction_laws, refuse_states, require_velocities
 from .room import read_numbers
@@ -191,7 +191,7 @@ def _stacked(parts: list[tuple[str, Any, int]]) -> Array:
     for name, x, n in read:
         if x.shape not in ((n,), (n, *columns)) or x.ndim > 2:
             batch = columns[0] if columns else "k"
-            raise UsageError(f"{name} must have shape ({n},) or ({n}, {batch}), not {x.shape}")
+            raise ill_shaped(f"{name} must have shape ({n},) or ({n}, {batch}), not {x.shape}")
     return np.concatenate(
         [x if x.shape[1:] == columns else np.repeat(x[:, None], columns[0], axis=1) for _, x, _ in read]
     )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..describe.expressions import parse
-from ..errors import ExpressionError, UsageError
+from ..errors import ExpressionError, UsageError, cannot
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import gradient, jvp
 from ..graph.evaluate import compile_evaluator
@@ -53,7 +53,7 @@ class Formula(Expressed):
         try:
             self.expression: Expr = parse(text, graph, resolve)
         except ExpressionError as error:
-            raise UsageError(f"{what}: {error}") from None
+            raise UsageError(f"{what}: {error}", code=error.code) from None
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
         self._evaluate = compile_evaluator([self.expression], known)
 
@@ -91,7 +91,7 @@ class Formula(Expressed):
         states = sorted(symbols_of([self.expression]) & set(layout.x))
         for state in states:
             if state not in layout.q or state not in moving:
-                raise UsageError(
+                raise cannot(
                     f"input {name}: the equations need its rate {rate}, but the rate of {self.text!r} contains that "
                     f"of {state}, an acceleration; write {name} in t and parameters, or give {rate} too"
                 )

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import ill_shaped
 from .trajectory import Trajectory
 
 #: An end, or start and end (s); texts are expressions of numbers.
@@ -27,5 +27,5 @@ def last_state(given: Any, names: Sequence[str]) -> Any:
     if not isinstance(given, Trajectory):
         return given
     if tuple(given.x_names) != tuple(names):
-        raise UsageError(f"initial: the run has states {', '.join(given.x_names)}; the model has {', '.join(names)}")
+        raise ill_shaped(f"initial: the run has states {', '.join(given.x_names)}; the model has {', '.join(names)}")
     return given.x[:, -1]

@@ -86,7 +86,7 @@ class Initial:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
         q = follow(self.system, start, held)
         if not self.system.aligned(q):
-            raise AssemblyError("the axes of a joint flipped on the path there")
+            raise AssemblyError("the axes of a joint flipped on the path there", code="EG-UNDETERMINED")
         return q
 
     def reference(self, given: Iterable[str] = (), rough: bool = True) -> Array:
@@ -292,7 +292,8 @@ class Initial:
                 remedy = f"give {instead} instead, or another position" if others else "no velocity is possible here"
                 raise AssemblyError(
                     f"{name} = {value:.6g} cannot be reached: the constraints allow no such velocity here, as "
-                    f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
+                    f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}",
+                    code="EG-CONTRADICTION",
                 )
 
     def _solve_rates(self, q: Array, held: Mapping[str, float | Array]) -> Array:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .failure import Fail
@@ -48,11 +48,11 @@ class Kernels:
         self.core = core
         self.layout = layout
         try:
-            self.context = core.context(p, u, UsageError)
+            self.context = core.context(p, u, ill_shaped)
         except UsageError as error:
-            raise UsageError(layout.explain_constants(str(error), p)) from None
+            raise UsageError(layout.explain_constants(str(error), p), code=error.code) from None
         if p is not None and "scales" in core.names:
-            scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, UsageError)
+            scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, ill_shaped)
             self.layout = layout = layout.sized(scales(np.empty(0)))
         if p is not None and not layout.metadata.keys().isdisjoint(("start_terms", "start_fixed")):
             from .late_start import started
@@ -80,7 +80,7 @@ class Kernels:
         """Refuse parameters whose lengths and masses scale nothing."""
         given = zip(self.layout.p, self.context.p, strict=True)
         bad = [f"{name} = {value:.6g}" for name, value in given if not np.isfinite(value)]
-        raise UsageError(f"the sizes computed from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
+        raise not_finite(f"the sizes computed from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
@@ -122,7 +122,7 @@ class Kernels:
                 return Missing(name, ENERGY.format(self.layout.name))
             message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
             return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
-        return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
+        return maker(name, self.context, self.layout.shape(name), self.fail, nan, ill_shaped)
 
     def _poses(self, q: Array, t: float, p: Array | None = None) -> Array:
         return self.state("poses", nan=True)(q, t=t, p=p)
@@ -150,7 +150,7 @@ class Missing:
         ------
         UsageError
         """
-        raise UsageError(self.message)
+        raise cannot(self.message)
 
 
 class Rows:
@@ -182,7 +182,7 @@ class Rows:
         if isinstance(rows, str) and rows == "all":
             return self.every(q, p=p, u=u, out=out, t=t)
         if not isinstance(rows, str) or rows != "independent":
-            raise UsageError(f"rows must be 'independent' or 'all', not {rows!r}")
+            raise no_choice(f"rows must be 'independent' or 'all', not {rows!r}")
         result = self.every(q, p=p, u=u, t=t)[self.independent]
         return into(out, result)
 
@@ -234,7 +234,7 @@ class Constant:
         """An empty array, with a last axis for a batch."""
         shape = read_numbers("x", x).shape
         if shape[:1] != (self.n_in,) or len(shape) > 2:
-            raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
+            raise ill_shaped(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
         expected = self.value.shape + shape[1:]
         return np.zeros(expected) if out is None else fitting(out, expected)
 

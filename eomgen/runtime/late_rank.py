@@ -31,5 +31,6 @@ def require_rank(kernels: Kernels, J: Array) -> None:
     if found > layout.rank:
         raise UsageError(
             f"with the given {', '.join(changed)}, {found} constraint rows are independent, but with the declared "
-            f"values {layout.rank} are, and these determine the degrees of freedom; declare values like the given ones"
+            f"values {layout.rank} are, and these determine the degrees of freedom; declare values like the given ones",
+            code="EG-REDUNDANT",
         )

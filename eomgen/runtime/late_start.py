@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within
+from ..errors import TO_BE_FINITE, AssemblyError, calls_within, not_finite
 from ..numeric.scales import Array
 from .layout import Layout
 from .tapes import play_arrays
@@ -61,7 +61,7 @@ class LateStart:
         """
         if bad := [self.bad[name] for name in declared if name in self.bad]:
             shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.layout.p, self.p, strict=True))
-            raise UsageError(f"{bad[0]} is no number with {shown}: {TO_BE_FINITE}")
+            raise not_finite(f"{bad[0]} is no number with {shown}: {TO_BE_FINITE}")
         tell_fixed(self.layout, self.p, declared)
         return declared
 

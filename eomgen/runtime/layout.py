@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import bad_data, cannot, ill_shaped
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
 from .allowed_parameters import require_allowed
@@ -34,7 +34,7 @@ class Layout:
     def __init__(self, metadata: str | Mapping[str, Any]) -> None:
         data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
         if data.get("abi") != ABI:
-            raise UsageError(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
+            raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
         self.metadata = data
         self.name: str = data["name"]
         self.q: tuple[str, ...] = tuple(data["q_names"])
@@ -174,7 +174,7 @@ class Layout:
         remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
         if turning and not self.given_rates:
             remedy += "; or choose other independent coordinates, or rotation: euler_angles"
-        raise UsageError(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
+        raise cannot(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
@@ -220,7 +220,7 @@ class Layout:
         else:
             result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):
-            raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
+            raise ill_shaped(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
         if what == "parameter":
             self.require_allowed(result)
         return result

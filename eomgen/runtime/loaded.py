@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..errors import UsageError
+from ..errors import bad_data
 from ..files.path_names import as_path
 from .arrays import BROKEN, read_arrays
 from .storage import FORMAT, RUNS, Stored
@@ -47,5 +47,5 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except BROKEN as error:
         told = f"a {source.suffix} is for other programs; load the .npz of the run"
         told = told if source.suffix in RUNS[1:] else str(error)
-        raise UsageError(f"{source} is not a trajectory saved by eomgen: {told}") from None
+        raise bad_data(f"{source} is not a trajectory saved by eomgen: {told}") from None
     return Trajectory(t, x, columns, header, t_events, x_events)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .kernels import into
@@ -71,7 +71,7 @@ class MechanicalInverse:
         whole = self.layout.n_v
         if given.shape[:1] != (whole,):
             names = ", ".join(self.layout.states)
-            raise UsageError(
+            raise ill_shaped(
                 f"inverse_dynamics of a model with first-order states takes v = [v; s], ({whole},) or ({whole}, k), "
                 f"not {given.shape}: forces depend on the states {names}, which come after the velocities"
             )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import PartitionError, UsageError
+from ..errors import PartitionError, at_odds, ill_shaped, no_number
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .refusals import require_switched
@@ -85,7 +85,7 @@ class Minimal:
         """
         start = self._module.assemble() if q is None else np.array(read_numbers("q", q))
         if start.shape != (self._layout.n_q,):
-            raise UsageError(f"q must have shape ({self._layout.n_q},), not {start.shape}")
+            raise ill_shaped(f"q must have shape ({self._layout.n_q},), not {start.shape}")
         self._start[0] = self._memory.q = start
         self._memory.recent = []
 
@@ -101,7 +101,7 @@ class Minimal:
         full = read_numbers("x", x)
         layout = self._layout
         if full.ndim not in (1, 2) or len(full) != layout.n_x:
-            raise UsageError(f"x must be of shape ({layout.n_x},) or ({layout.n_x}, k), not {full.shape}")
+            raise ill_shaped(f"x must be of shape ({layout.n_x},) or ({layout.n_x}, k), not {full.shape}")
         return np.concatenate([full[layout.independent_q], full[layout.n_q + layout.independent]])
 
     def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
@@ -124,12 +124,12 @@ class Minimal:
         """
         x = read_numbers("x", x_min, self._layout.n_x)
         if x.shape[:1] != (self.n_x,) or x.ndim > 2:
-            raise UsageError(f"x must have shape ({self.n_x},) or ({self.n_x}, k), not {x.shape}")
+            raise ill_shaped(f"x must have shape ({self.n_x},) or ({self.n_x}, k), not {x.shape}")
         if x.ndim == 1:
             return self._solve(read_number("t", t), x)
         times = read_numbers("t", t)
         if times.shape not in ((), x.shape[1:]):
-            raise UsageError(f"t must be a number or have shape {x.shape[1:]}, one a state, not {times.shape}")
+            raise ill_shaped(f"t must be a number or have shape {x.shape[1:]}, one a state, not {times.shape}")
         times = np.broadcast_to(times, x.shape[1:])
         result = np.empty((self._layout.n_x, x.shape[1]))
         for j in range(x.shape[1]):
@@ -158,10 +158,10 @@ class Minimal:
             The position is out of reach.
         """
         if p is not None:
-            raise UsageError("the minimal form takes its parameters from its module: module.bind(p=...).minimal")
+            raise at_odds("the minimal form takes its parameters from its module: module.bind(p=...).minimal")
         state = read_numbers("x", x)
         if state.shape != (self.n_x,):
-            raise UsageError(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
+            raise ill_shaped(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
         t = read_number("t", t)
         memory = self._memory
         before = memory.q
@@ -184,7 +184,7 @@ class Minimal:
         near = memory.q
         if way.size and not way.max() <= STEP:
             if not np.isfinite(way).all():
-                raise UsageError(f"x is not finite: {x}")
+                raise no_number(f"x is not finite: {x}")
             near = self._path.follow(near, q_i, t)
         full = self._path.motion(q_i, v_i, np.zeros_like(v_i), near, t)[: self._layout.n_x]
         memory.q = full[:n].copy()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, ill_shaped
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .kernels import into
@@ -60,11 +60,13 @@ class Part:
         """
         layout = self.layout
         if layout.n_com == 0:
-            raise UsageError(f"model {layout.name!r} has no {self.name}: no body of it has a mass")
+            raise UsageError(
+                f"model {layout.name!r} has no {self.name}: no body of it has a mass", code="EG-NO-INERTIA"
+            )
         state = read_numbers("x", x)
         if state.shape[:1] != (self.n_in,) or state.ndim > 2:
             given = "q" if self.n_in == layout.n_q else "x"
-            raise UsageError(f"{given} must have shape ({self.n_in},) or ({self.n_in}, k), not {state.shape}")
+            raise ill_shaped(f"{given} must have shape ({self.n_in},) or ({self.n_in}, k), not {state.shape}")
         if self.n_in != layout.n_x:
             state = np.concatenate([state, np.zeros((layout.n_x - self.n_in, *state.shape[1:]))])
         every = self.whole(state, p=p, u=u, t=t)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped, ill_typed, incomplete
 from ..numeric.scales import Array
 from ..texts import shown
 from .near_names import unknown
@@ -29,16 +29,16 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
     """
     if model is not None:
         if not hasattr(model, "x_names"):
-            raise UsageError(f"model must be a module, as Model.compile() returns, not {shown(model)}")
+            raise ill_typed(f"model must be a module, as Model.compile() returns, not {shown(model)}")
         if tuple(trajectory.x_names) != model.x_names:
-            raise UsageError(
+            raise ill_shaped(
                 f"the trajectory of {trajectory.name!r} has states {', '.join(trajectory.x_names)}; module "
                 f"{model.name!r} has {', '.join(model.x_names)}: give the module that it was made with"
             )
         return model.bind(p=trajectory.metadata.get("parameters"))
     found: BoundModel | None = getattr(trajectory.columns, "module", None)
     if found is None:
-        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not contain; give model=module")
+        raise incomplete(f"{purpose} needs the model, which a saved trajectory does not contain; give model=module")
     return found
 
 

@@ -7,14 +7,14 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from ..errors import MissingDependencyError, UnavailableError, UsageError
+from ..errors import MissingDependencyError, UnavailableError, UsageError, at_odds, ill_typed
 from ..instance_names import undotted
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
 
 
-class UnknownNameError(UsageError, KeyError):
+class UnknownNameError(UsageError, KeyError, code="EG-NAME-UNKNOWN"):
     """A key that does not exist; also a KeyError, so that mappings behave as expected."""
 
     def __str__(self) -> str:
@@ -26,7 +26,7 @@ def without_dots(given: Mapping[Any, Any], instances: Mapping[str, str]) -> dict
     found = {plain_name(name, instances): value for name, value in given.items()}
     if len(found) < len(given):
         twice = [name for name in given if plain_name(name, instances) != name and plain_name(name, instances) in given]
-        raise UsageError(f"{', '.join(map(repr, twice))} is given under both of its names; give it once")
+        raise at_odds(f"{', '.join(map(repr, twice))} is given under both of its names; give it once")
     return found
 
 
@@ -93,7 +93,7 @@ def read_names(what: str, given: Any) -> tuple[str, ...]:
     except TypeError:
         names = (None,)
     if not all(isinstance(name, str) for name in names):
-        raise UsageError(f"{what} must be a name or a list of names, not {shown(given)}")
+        raise ill_typed(f"{what} must be a name or a list of names, not {shown(given)}")
     return names
 
 
@@ -105,7 +105,7 @@ def require_mapping(what: str, given: Any) -> None:
     UsageError
     """
     if not isinstance(given, Mapping):
-        raise UsageError(f"{what} must be a mapping of names to values, not {shown(given)}")
+        raise ill_typed(f"{what} must be a mapping of names to values, not {shown(given)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
@@ -132,4 +132,4 @@ def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
     except TypeError:
         given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
         remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
-        raise UsageError(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None
+        raise ill_typed(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None

@@ -70,7 +70,7 @@ class NumpyCore:
         self.drivers = Drivers(self.layout, self.blocks)
         self.names = tuple(name for name in NAMED if name in self.blocks or name in self.drivers.names)
 
-    def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Context:
+    def context(self, p: Any = None, u: Any = None, error: Callable[[str], Exception] = ValueError) -> Context:
         """Bind parameters (n_p,) and inputs (n_u,), the declared values by default.
 
         Raises
@@ -84,7 +84,7 @@ class NumpyCore:
         u = _vector(_declared(data["u_values"]) if u is None else u, self.layout.n_u, "u", error)
         return Context(p, u, self.constants(p, error))
 
-    def constants(self, p: Array, error: type[Exception]) -> Array:
+    def constants(self, p: Array, error: Callable[[str], Exception]) -> Array:
         """The constants handed to the blocks."""
         if self.precompute is None:
             return p

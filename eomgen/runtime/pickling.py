@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..errors import ToolchainError, UsageError
+from ..errors import ToolchainError, cannot
 from ..files.build_folder import MANIFEST, read_entry
 from ..files.ownership import read_trusted, require_trusted
 from ..files.source import find_module, load_source
@@ -66,7 +66,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
     def load(group: str) -> Any:
         if group not in made:
             rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].late) == group)
-            raise UsageError(f"the module was pickled without {rare}; call one of them before you pickle it")
+            raise cannot(f"the module was pickled without {rare}; call one of them before you pickle it")
         return _find_core(*made[group])
 
     return kind(LateCore(core, names, load), p, u)
@@ -89,7 +89,8 @@ def _find_core(name: str, file: str) -> ModuleType:
     except (OSError, ValueError) as error:
         what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
         raise ToolchainError(
-            f"the compiled code of the pickled module is {what}: {file}; compile the model again"
+            f"the compiled code of the pickled module is {what}: {file}; compile the model again",
+            code="EG-FILE-DAMAGED",
         ) from error
     loader = machinery.ExtensionFileLoader(name, file)
     spec = util.spec_from_file_location(name, file, loader=loader)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import at_odds, cannot, incomplete
 from ..limits.pictures import FAINT
 from ..notation.labels import TIME, label
 from ..notation.notation import Notation
@@ -86,14 +86,14 @@ def choose(
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
     if y is not None and x is None:
-        raise UsageError("y= needs x=, for example plot(x='x', y='y'); for columns over time give their names alone")
+        raise incomplete("y= needs x=, for example plot(x='x', y='y'); for columns over time give their names alone")
     if x is not None and kind != "time":
-        raise UsageError(f"x= and kind={kind!r} cannot be used together; leave out one of them")
+        raise at_odds(f"x= and kind={kind!r} cannot be used together; leave out one of them")
     if x is not None and not names:
-        raise UsageError(f"plot(x={x!r}) names no column to draw against it; give y= or names of columns")
+        raise incomplete(f"plot(x={x!r}) names no column to draw against it; give y= or names of columns")
     panels, across = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
     if not panels:
-        raise UsageError(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
+        raise cannot(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
     return panels, across
 
 
@@ -223,7 +223,7 @@ def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -
     chosen = names or tuple(n for n in trajectory.metadata["q_names"] if f"{n}_dot" in trajectory.names)
     for name in chosen:
         if f"{name}_dot" not in trajectory.names:
-            raise UsageError(f"{name!r} has no rate among the columns, so there is no phase portrait of it")
+            raise cannot(f"{name!r} has no rate among the columns, so there is no phase portrait of it")
     columns = refined(trajectory, (*chosen, *(f"{name}_dot" for name in chosen)))[1]
     panels, printed = [], Notation.of(trajectory.metadata).mathtext
     for group in by_unit(trajectory, chosen):
@@ -247,11 +247,11 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
     """Largest violation of the constraints over time, of the stored states, and the raw one's largest."""
     module = getattr(trajectory.columns, "module", None)
     if module is None:
-        raise UsageError(
+        raise cannot(
             "residuals over time need the model: plot the trajectory of simulate itself, not one read from a file"
         )
     if not module.n_rows:
-        raise UsageError(f"model {module.name!r} has no constraints, so there are no residuals")
+        raise cannot(f"model {module.name!r} has no constraints, so there are no residuals")
     t, x = trajectory.t, trajectory.x
     u = trajectory.to_numpy(*module.u_names) if module.u_names else None
     position = np.abs(module.constraints.every(x[: module.n_q], t=t, u=u)).max(axis=0, initial=0.0)
@@ -278,7 +278,7 @@ def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[l
     t = trajectory.t
     span = float(t[-1] - t[0]) if len(t) else 0.0
     if len(t) < 8 or span <= 0.0:
-        raise UsageError("a spectrum needs a run forward in time of at least 8 points")
+        raise cannot("a spectrum needs a run forward in time of at least 8 points")
     count = max(FINE, len(t))
     times = t[0] + span * np.arange(count) / count
     module = getattr(trajectory.columns, "module", None)

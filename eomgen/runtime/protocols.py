@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
@@ -140,7 +140,7 @@ class Core(Protocol):
     metadata: str
     names: tuple[str, ...]
 
-    def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Any: ...
+    def context(self, p: Any = None, u: Any = None, error: Callable[[str], Exception] = ValueError) -> Any: ...
     def timed(
         self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
     ) -> Any: ...

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, untrue
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE
 from ..numeric.scales import Array
@@ -41,7 +41,7 @@ def require_agreement(forcing: Driven, start: float, end: float) -> None:
             if rate not in values:
                 bound = base[layout.u.index(rate)] if rate in layout.u else 0.0
                 if first in layout.u and bound != 0.0:
-                    raise UsageError(
+                    raise untrue(
                         f"input {rate} is bound to {bound:.6g}, but it is the rate of {name}, which is constant; bind "
                         f"{rate} to 0, or give {name} over time in inputs="
                     )
@@ -53,7 +53,7 @@ def require_agreement(forcing: Driven, start: float, end: float) -> None:
                 found = find_contradiction(f, g, start, end, CONTRADICTS_TABLE if table else CONTRADICTS)
                 if found is not None:
                     t, changes, says = found
-                    raise UsageError(
+                    raise untrue(
                         f"input {rate} is not the rate of {name}: at t = {t:.6g} s {name} changes by {changes:.6g} per "
                         f"second, but {rate} is {says:.6g}; leave {rate} out if {name} is a number, a table or a "
                         "text, or correct it"
@@ -62,7 +62,8 @@ def require_agreement(forcing: Driven, start: float, end: float) -> None:
                 if jump is not None:
                     raise UsageError(
                         f"input {name}: the equations need its rate {rate}, but {name} jumps at t = {jump:.6g} s; such "
-                        "a jump is an impact; write it smoothly"
+                        "a jump is an impact; write it smoothly",
+                        code="EG-JUMP",
                     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UnavailableError, no_choice
 
 if TYPE_CHECKING:
     from ..numeric.scales import Array
@@ -83,7 +83,7 @@ def require_switched(layout: Layout, states: Array) -> None:
     given = dict(zip(layout.states, states, strict=True))
     for name in layout.metadata.get("switched", ()):
         if (value := given[f"{name}_closed"]) not in (0.0, 1.0):
-            raise UsageError(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
+            raise no_choice(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
 
 
 def refuse_closed(layout: Layout, states: Array, what: str) -> None:

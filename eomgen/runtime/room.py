@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, ill_shaped, ill_typed, no_number, too_large
 from ..limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..numeric.scales import Array
 from ..texts import shown
@@ -28,7 +29,7 @@ def require_room(what: str, numbers: float, remedy: str) -> None:
     UsageError
     """
     if numbers > MOST_NUMBERS:
-        raise UsageError(
+        raise too_large(
             f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call can keep at most "
             f"{MOST_NUMBERS:.3g}; {remedy}"
         )
@@ -43,7 +44,10 @@ def require_steps(name: str, step: float, start: float, end: float) -> None:
     """
     latest = max(abs(start), abs(end))
     if abs(end - start) > MOST_STEPS * step or (start != end and latest + step == latest):
-        raise UsageError(f"{name} = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end")
+        raise UsageError(
+            f"{name} = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end",
+            code="EG-ENDLESS",
+        )
 
 
 def as_real(given: Any) -> Array | None:
@@ -99,7 +103,7 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
     return _floats(what, given, f"{what} must hold real numbers")
 
 
-def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageError) -> Array:
+def read_vector(what: str, given: Any, n: int, error: Callable[[str], Exception] = ill_shaped) -> Array:
     """An array of n floats.
 
     Raises
@@ -114,7 +118,9 @@ def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageErr
     return found
 
 
-def fitting(out: Any, shape: tuple[int, ...], what: str = "out", error: type[Exception] = UsageError) -> Array:
+def fitting(
+    out: Any, shape: tuple[int, ...], what: str = "out", error: Callable[[str], Exception] = ill_shaped
+) -> Array:
     """The array that takes a result, if it can."""
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64:
         given = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
@@ -163,10 +169,10 @@ def read_plain(what: str, given: Any) -> float:
     else:
         found = as_real(given)
         if found is None or found.ndim:
-            raise UsageError(f"{what} must be a number, not {shown(given)}")
+            raise no_number(f"{what} must be a number, not {shown(given)}")
         result = float(found)
     if not isfinite(result):
-        raise UsageError(f"{what} must be finite, not {result}")
+        raise no_number(f"{what} must be finite, not {result}")
     return result
 
 
@@ -181,7 +187,7 @@ def read_text(what: str, given: str) -> float:
     try:
         from ..describe.constant_texts import constant
     except ImportError:
-        raise UsageError(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
+        raise no_number(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
     return constant(given, what)
 
 
@@ -206,12 +212,12 @@ def read_flag(what: str, given: Any) -> bool:
     UsageError
     """
     if not isinstance(given, (bool, np.bool_)):
-        raise UsageError(f"{what} must be True or False, not {shown(given)}")
+        raise ill_typed(f"{what} must be True or False, not {shown(given)}")
     return bool(given)
 
 
 def _floats(what: str, given: Any, wanted: str) -> Array:
     found = as_real(with_numbers(what, given))
     if found is None:
-        raise UsageError(f"{wanted}, not {shown(given)}")
+        raise ill_typed(f"{wanted}, not {shown(given)}")
     return found

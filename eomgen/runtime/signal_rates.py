@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, cannot, incomplete
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
@@ -114,7 +114,8 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
             raise UsageError(
                 f"input {name}: the equations need {rate}, but {what} jumps in the {table.interpolation} table at "
                 f't = {found[0]:.6g} s (an impact); give Signal(times, values, "cubic") over the whole run, a text, or '
-                f"{rate} too"
+                f"{rate} too",
+                code="EG-JUMP",
             )
     zero = np.zeros(layout.n_x)
     for first, of in layout.input_rates.items():
@@ -127,13 +128,17 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
                 continue  # conditions have slope 0: only they can hide a jump
             what = f"input {name}: the equations need its rate {rate}"
             if f.depends_on_state:
-                raise UsageError(f"{what}, but conditions on the state can make it jump; write it without them")
+                raise UsageError(
+                    f"{what}, but conditions on the state can make it jump; write it without them", code="EG-JUMP"
+                )
             value, slope = f.function(forcing.parameters), g.function(forcing.parameters)
             jump = find_jump(value, slope, zero, start, end)
             if jump is None:
                 jump = find_switch(value, slope, f.switches(forcing.parameters), zero, start, end)
             if jump is not None:
-                raise UsageError(f"{what}, but it jumps at t = {jump:.6g} s, which is an impact; write it smoothly")
+                raise UsageError(
+                    f"{what}, but it jumps at t = {jump:.6g} s, which is an impact; write it smoothly", code="EG-JUMP"
+                )
 
 
 def find_jump(
@@ -255,7 +260,7 @@ def fill_rates(
             led = led or rate in signals
             if rate in given:
                 if not led and not (isinstance(given[rate], int | float) and given[rate] == 0):
-                    raise UsageError(f"input {rate} is the rate of {first}, which is constant; give {first} too")
+                    raise incomplete(f"input {rate} is the rate of {first}, which is constant; give {first} too")
                 led = True
                 last, order, value, at = rate, times, given[rate], times
             elif last:
@@ -282,7 +287,7 @@ def derive(name: str, rate: str, value: Any) -> Any:
     found = derivative() if callable(derivative) else None
     if found is not None:
         return of_time(found, True) if callable(found) else read_number(f"derivative of input {name}", found)
-    raise UsageError(
+    raise cannot(
         f"input {name}: the equations need its rate {rate}, and the rate of a function is not known; give {rate} too, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"
     )

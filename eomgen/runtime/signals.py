@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, ill_shaped, ill_typed, no_number, not_finite, off_range
 from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..texts import shown
@@ -49,16 +49,16 @@ class Signal(Tabulated):
             raise unknown("interpolation", interpolation, ORDERS)
         self.interpolation, self.order, self.corners = interpolation, ORDERS[interpolation], corners
         if self.times.ndim != 1 or self.times.shape != self.values.shape or not self.times.size:
-            raise UsageError(
+            raise ill_shaped(
                 "times and values must be two lists of the same length, "
                 f"not shapes {self.times.shape} and {self.values.shape}"
             )
         if not (np.isfinite(self.times).all() and np.isfinite(self.values).all()):
-            raise UsageError("times and values must be finite")
+            raise no_number("times and values must be finite")
         falling = np.flatnonzero(np.diff(self.times) <= 0.0)
         if falling.size:
             k = int(falling[0])
-            raise UsageError(f"times must increase, not go from {self.times[k]} to {self.times[k + 1]}")
+            raise off_range(f"times must increase, not go from {self.times[k]} to {self.times[k + 1]}")
 
     def __repr__(self) -> str:
         span = f"t = {self.times[0]:.6g} .. {self.times[-1]:.6g} s"
@@ -227,10 +227,10 @@ class Forcing:
             try:
                 return Signal(*value)
             except UsageError as error:
-                raise UsageError(f"input {name}: {error}") from None
+                raise UsageError(f"input {name}: {error}", code=error.code) from None
         found = as_real(value)
         if found is None or found.ndim:
-            raise UsageError(
+            raise ill_typed(
                 f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
                 f"f(t, x), not {shown(value)}"
             )
@@ -293,7 +293,7 @@ class Forcing:
     def require_finite(self) -> None:
         """Raise UsageError if a value was not finite."""
         if self.lapse is not None:
-            raise UsageError(str(self.lapse))
+            raise not_finite(str(self.lapse))
 
     def __bool__(self) -> bool:
         """Whether anything varies."""
@@ -323,7 +323,7 @@ class Forcing:
             return float(found)
         many = isinstance(value, np.ndarray) and value.ndim
         returned = f"an array of shape {value.shape}" if many else shown(value)
-        raise UsageError(
+        raise ill_shaped(
             f"input {self.names[index]} must be one number at each time, but its function returned {returned} "
             f"at t = {t:.6g} s"
         )

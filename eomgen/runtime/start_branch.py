@@ -217,7 +217,8 @@ class StartBranch:
             shown = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.v, v, strict=True) if n in self.names)
             return AssemblyError(
                 f"{where}, and no motion goes on with the given velocities {shown or 'there'}; give those of one "
-                "branch, or start a little beside this position"
+                "branch, or start a little beside this position",
+                code="EG-UNDETERMINED",
             )
         wanted, left = list[str](), undecided.copy()
         size = np.abs(undecided).max(axis=1)
@@ -233,5 +234,6 @@ class StartBranch:
         several = f"branches found have {shown}" if found else "no branch was found that has them"
         return AssemblyError(
             f"{where}, where the given velocities do not tell its branches apart: {several}; give "
-            f"{' and '.join(wanted)} too, or start a little beside this position"
+            f"{' and '.join(wanted)} too, or start a little beside this position",
+            code="EG-UNDETERMINED",
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import bad_file, cannot
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
@@ -48,7 +48,7 @@ class Stored:
     def energies(self) -> Array:
         """Kinetic, potential and total energy (3, n_t)."""
         if not self.has_energies:
-            raise UsageError("the model of this trajectory has no energy: it has no kinetic_energy")
+            raise cannot("the model of this trajectory has no energy: it has no kinetic_energy")
         if self._energies is None:  # a file of an earlier version
             return np.array([self["T"], self["V"], self["energy"]])
         return self._energies
@@ -65,7 +65,7 @@ def table_path(path: str | Path, what: str, endings: tuple[str, ...] = TABLES) -
     target = as_path("path", path)
     target = target if target.suffix else target.with_suffix(".npz")
     if target.suffix not in endings:
-        raise UsageError(f"{target}: {what} written as {' or '.join(endings)}, not {target.suffix!r}")
+        raise bad_file(f"{target}: {what} written as {' or '.join(endings)}, not {target.suffix!r}")
     return target
 
 

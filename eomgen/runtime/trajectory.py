@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import cannot, off_range
 from ..numeric.scales import Array
 from .near_names import find_lacking, plain_name, require, unknown
 from .room import read_numbers
@@ -183,18 +183,18 @@ class Trajectory:
             another one.
         """
         if self._sample is None and (self._again is None or not len(self.t)):
-            raise UsageError(
+            raise cannot(
                 "this trajectory has no solution between its times, and cannot be made again, for it was read from a "
                 "file or copied, has controllers=, or is not of simulate; give simulate dense_output=True, or t_eval="
             )
         times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
-            raise UsageError(f"times must lie within the run, {low:.6g} .. {high:.6g} s")
+            raise off_range(f"times must lie within the run, {low:.6g} .. {high:.6g} s")
         if self._sample is None:
             run: Any = self._again()  # type: ignore[misc]
             if not np.array_equal(run.x, self.x):
-                raise UsageError("inputs or events of this run give other values now; give dense_output=True")
+                raise cannot("inputs or events of this run give other values now; give dense_output=True")
             self._sample = run._sample
         return self._sample(times)
 
@@ -257,7 +257,7 @@ class Trajectory:
         """
         columns: Any = self.columns
         if not hasattr(type(columns), "change_points"):
-            raise UsageError("change points need the model: use the trajectory of simulate, not one read from a file")
+            raise cannot("change points need the model: use the trajectory of simulate, not one read from a file")
         found: list[ChangePoint] = columns.change_points
         return found
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, ProjectionError, UsageError
+from ..errors import EvaluationError, ProjectionError, ill_shaped, no_number, too_large
 from ..limits.motions import FOLLOWED
 from ..numeric.continuation import Continuation
 from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
@@ -150,7 +150,7 @@ class DependentMotion:
 
     def _require_near(self, target: Array, length: float) -> None:
         if not length <= FOLLOWED:
-            raise UsageError(
+            raise too_large(
                 f"the path to {self._place(target)} is {length:.3g} rad or length scales long, and at most "
                 f"{FOLLOWED:g} "
                 "are allowed, in small steps that stay on the branch; give a nearer position (without whole turns), "
@@ -208,18 +208,18 @@ def motions(
     for name, part in zip(labels, arrays, strict=True):
         full = np.zeros((size, *columns)) if part is None else part
         if full.shape not in ((size,), (size, *columns)) or full.ndim > 2:
-            raise UsageError(f"{name} must have shape ({size},) or ({size}, k), not {full.shape}")
+            raise ill_shaped(f"{name} must have shape ({size},) or ({size}, k), not {full.shape}")
         if not np.isfinite(full).all():
-            raise UsageError(f"{name} must be finite")
+            raise no_number(f"{name} must be finite")
         parts.append(np.broadcast_to(full if full.shape[1:] == columns else full[:, None], (size, *columns)))
     q, v, a = (part if columns else part[:, None] for part in parts)
     v, a = (np.concatenate([part, np.zeros((layout.n_states, part.shape[1]))]) for part in (v, a))
     if t.shape not in ((), q.shape[1:]):
-        raise UsageError(f"t must be a number or have shape {q.shape[1:]}, one a position, not {t.shape}")
+        raise ill_shaped(f"t must be a number or have shape {q.shape[1:]}, one a position, not {t.shape}")
     times = np.broadcast_to(t, q.shape[1:])
     if guess is not None:
         if guess.shape != (layout.n_q,):
-            raise UsageError(f"guess must have shape ({layout.n_q},), not {guess.shape}")
+            raise ill_shaped(f"guess must have shape ({layout.n_q},), not {guess.shape}")
         near = [guess] * q.shape[1]
     elif (times == 0.0).all():
         near = path.follow_all(reference(0.0), q)

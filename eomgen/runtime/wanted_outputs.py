@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..limits.runs import DIFFERENCE, WIDE_DIFFERENCE
 from ..marker_places import place_of_marker
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
@@ -130,7 +130,7 @@ def _output(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRat
     by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(found, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
     if by_a.any() or not np.allclose(by_v[:, 0], by_v[:, 1]):
         on = "accelerations" if by_a.any() else "velocities, and not linearly"
-        raise UsageError(
+        raise cannot(
             f"the output {name!r} depends on {on}, so it cannot be given as an initial value; give coordinates"
         )
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import ill_typed, off_range
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..notation.notation import Notation
@@ -43,7 +43,7 @@ def animate(
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
-        raise UsageError(
+        raise ill_typed(
             f"forces must be True, the name of a joint, spring or damper, or a list of names, not {shown(forces)}"
         )
     for name in plot:  # unknown names fail before anything is drawn
@@ -72,7 +72,7 @@ def write(
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
     if isinstance(dpi, bool) or not isinstance(dpi, int | float) or not 1.0 <= dpi <= MOST_DOTS:
-        raise UsageError(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
+        raise off_range(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
     if format in FILMS:
         return InlineFilm(FILMS[format](Frames.of(scene, motion, curves, dpi)), format)
     path = None if file is None else as_path("file", file)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import no_such, not_finite
 from ..limits.pictures import ROUNDED, SAME
 from ..suggestions import hint
 from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
@@ -59,7 +59,7 @@ def build_scene(
     ]  # unknown names fail before anything is evaluated
     poses = module.poses(q, t=t, u=u)
     if not np.isfinite(poses).all():
-        raise UsageError(
+        raise not_finite(
             "the poses of the bodies are not finite at this position; give finite coordinates within the model's reach"
         )
     frames = _with_ground(poses)
@@ -93,7 +93,7 @@ def _tracked(data: PictureData, name: str) -> PlacedFrame:
         return PlacedFrame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
     near = hint(name, known, quoted=False) or f"there are {', '.join(known)}"
-    raise UsageError(f"no marker or body {name!r} to trace; {near}")
+    raise no_such(f"no marker or body {name!r} to trace; {near}")
 
 
 def _with_ground(poses: Array) -> Array:

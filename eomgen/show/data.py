@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..operations.table import OPERATIONS
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
             if "picture" in metadata
             else "it was compiled by an earlier version of eomgen; compile it again"
         )
-        raise UsageError(f"there is nothing to draw of model {metadata['name']!r}: {why}")
+        raise cannot(f"there is nothing to draw of model {metadata['name']!r}: {why}")
     tape = data["tape"]
     values = [float(x) for x in _evaluate(tape, p, 0.0, 0.0)]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import at_odds, ill_shaped, ill_typed, no_number
 from ..texts import shown
 from .branch_views import telling_values, telling_view
 from .build_scene import build_scene
@@ -26,17 +26,17 @@ def position(module: Any, x: Any, t: float) -> Array:
     try:
         given = np.asarray(x, dtype=float)
     except (TypeError, ValueError):
-        raise UsageError(f"x must be a state, a position or values by name, not {shown(x)}") from None
+        raise ill_typed(f"x must be a state, a position or values by name, not {shown(x)}") from None
     if given.shape == () and "x" in module.q_names:
-        raise UsageError(
+        raise ill_shaped(
             f'x is a whole state here; give the coordinate called x in a mapping: draw({{"x": {given:g}}})'
         )
     if given.shape not in ((module.n_x,), (module.n_q,)):
-        raise UsageError(
+        raise ill_shaped(
             f"x has shape {given.shape}; give a state ({module.n_x},), a position ({module.n_q},) or values by name"
         )
     if not np.isfinite(given).all():
-        raise UsageError("x has values that are not finite")
+        raise no_number("x has values that are not finite")
     return given[: module.n_q]
 
 
@@ -53,9 +53,7 @@ def draw(
     """See :func:`eomgen.runtime.drawing.draw`."""
     if named:
         if x is not None and not isinstance(x, Mapping):
-            raise UsageError(
-                f"give either a state or values by name, not both; {', '.join(named)} came beside {shown(x)}"
-            )
+            raise at_odds(f"give either a state or values by name, not both; {', '.join(named)} came beside {shown(x)}")
         x = {**(x or {}), **named}
     scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
     return draw_scene(scene, ax)
@@ -111,7 +109,7 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None, view: tuple[float, flo
     flat = scene.view is not None
     if ax is not None and hasattr(ax, "get_zlim") == flat:
         needed = "plain axes" if flat else 'axes in space: plt.figure().add_subplot(projection="3d")'
-        raise UsageError(f"the mechanism is {'planar' if flat else 'spatial'}; ax must be {needed}")
+        raise ill_typed(f"the mechanism is {'planar' if flat else 'spatial'}; ax must be {needed}")
     if flat:
         from .flat import Flat, figure_size
 

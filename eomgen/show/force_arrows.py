@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import no_such
 from ..limits.pictures import NOTHING, SAME, STEP
 from .data import GROUND, Array, PlacedFrame, read_picture
 from .scene import Item, Scene, placed
@@ -41,7 +41,7 @@ def with_arrows(scene: Scene, module: Any, motion: ShownMotion, wanted: Sequence
         known = [*joints, *(one["name"] for one in elements)]
         for name in wanted:
             if name not in known:
-                raise UsageError(
+                raise no_such(
                     f"no joint, spring or damper {name!r} whose force is to be shown; there are {', '.join(known)}"
                 )
 

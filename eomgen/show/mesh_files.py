@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_data, bad_file, too_large
 from ..files.path_names import as_name, beside
 from ..files.reading import open_plain
 from ..limits.files import MESH
@@ -53,7 +53,7 @@ def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool =
 
 def _located(file: str, description: Any) -> str:
     if description is None:
-        raise UsageError("the module was not made from a model here, so the folder of the file is not known")
+        raise bad_file("the module was not made from a model here, so the folder of the file is not known")
     model = description.place("")[0]
     if file.startswith(PACKAGE):  # of a robot: the folder of the package is that of its file
         file = file.removeprefix(PACKAGE).partition("/")[2]
@@ -72,10 +72,10 @@ def read_mesh(path: str) -> Mesh:
     """
     ending = os.path.splitext(path)[1].lower()
     if ending not in READERS:
-        raise UsageError(f"{ending or 'no ending'}: STL, OBJ and DAE files can be drawn")
+        raise bad_file(f"{ending or 'no ending'}: STL, OBJ and DAE files can be drawn")
     status = os.stat(path)
     if status.st_size > MESH:
-        raise UsageError(f"it has {status.st_size:,} bytes; at most {MESH:,}")
+        raise too_large(f"it has {status.st_size:,} bytes; at most {MESH:,}")
     return _read(os.path.abspath(path), ending, status.st_mtime_ns, status.st_size)
 
 
@@ -88,11 +88,11 @@ def _read(path: str, ending: str, _changed: int, _size: int) -> Mesh:
     except UsageError:
         raise
     except (ValueError, IndexError, OverflowError):
-        raise UsageError(f"it cannot be read as a file {ending}") from None
+        raise bad_file(f"it cannot be read as a file {ending}") from None
     if not len(faces) or not np.isfinite(vertices).all():
-        raise UsageError("it holds no triangles, or vertices that are not finite")
+        raise bad_data("it holds no triangles, or vertices that are not finite")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise UsageError("its triangles name vertices that it does not have")
+        raise bad_data("its triangles name vertices that it does not have")
     return thinned(vertices, faces)
 
 
@@ -125,12 +125,14 @@ def _read_obj(data: bytes) -> Mesh:
 def _read_dae(data: bytes) -> Mesh:
     """All geometry of a COLLADA scene, in metres; its ``up_axis`` is left as it is, as robots' viewers do."""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise UsageError("it declares a document type or an entity, which is never expanded")
+        raise UsageError("it declares a document type or an entity, which is never expanded", code="EG-REFUSED")
     try:
         import collada  # noqa: F401  # by which trimesh reads them
         import trimesh
     except ImportError:
-        raise UsageError("files .dae need trimesh and pycollada: pip install 'eomgen[mesh]'") from None
+        raise UsageError(
+            "files .dae need trimesh and pycollada: pip install 'eomgen[mesh]'", code="EG-PACKAGE-MISSING"
+        ) from None
     try:
         mesh: Any = trimesh.load(io.BytesIO(data), file_type="dae", force="mesh")
     except Exception as error:  # pycollada raises errors of many kinds

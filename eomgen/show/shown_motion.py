@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, off_range, too_large
 from ..limits.pictures import ROUNDED
 from ..notation.labels import TIME, label
 from ..notation.notation import Notation
@@ -74,12 +74,10 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
     """
     for name, value in (("fps", fps), ("speed", speed)):
         if value is not None and not (isinstance(value, int | float) and 0.0 < value < np.inf):
-            raise UsageError(f"{name} must be a number greater than 0, not {value!r}")
+            raise off_range(f"{name} must be a number greater than 0, not {value!r}")
     t = trajectory.t
     if len(t) < 2:
-        raise UsageError(
-            "the run has only one point, so there is no motion to show; draw its state with module.draw(x)"
-        )
+        raise cannot("the run has only one point, so there is no motion to show; draw its state with module.draw(x)")
     if t[0] == t[-1]:  # a range of coordinates at one time
         led = trajectory.metadata.get("led") or trajectory.x_names[:1]
         over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
@@ -92,7 +90,7 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         speed = max(span / LONGEST, min(1.0, span / SHORTEST))
     count = int(np.ceil(span / speed * fps)) + 1
     if count > FRAMES:
-        raise UsageError(
+        raise too_large(
             f"the animation would have {count} frames, and {FRAMES} is the most; give a speed of "
             f"{span * fps / FRAMES:.3g} or more, a lower fps, or a shorter run"
         )

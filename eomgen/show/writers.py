@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, at_odds, bad_file, no_choice
 from ..files.path_names import as_path
 from ..files.writing import refuse_link, whole_file
 from ..texts import shown
@@ -39,9 +39,9 @@ def require_target(file: Any, format: Any) -> None:
             require_kind(as_path("file", file))
         return
     if not isinstance(format, str) or format not in FORMATS:
-        raise UsageError(f"format must be one of {', '.join(map(repr, FORMATS))}, not {shown(format)}")
+        raise no_choice(f"format must be one of {', '.join(map(repr, FORMATS))}, not {shown(format)}")
     if file is not None:
-        raise UsageError("format= is for an animation without a file; the ending of the file's name selects the kind")
+        raise at_odds("format= is for an animation without a file; the ending of the file's name selects the kind")
     _require_libraries(f".{format}")
 
 
@@ -54,19 +54,19 @@ def require_kind(path: Path) -> None:
     """
     kind, word = kind_of(path), path.name.removeprefix(".").lower()
     if word in FORMATS and kind == FOLDER and not path.is_dir():
-        raise UsageError(
+        raise bad_file(
             f"{str(path)!r} has no ending, so it would be a folder for PNG frames; give the name of a file such as "
             f"'run.{word}', or format={word!r} without a file for one that a notebook shows"
         )
     if kind not in (*WRITERS, ".html"):
-        raise UsageError(
+        raise bad_file(
             f"{path}: the name of an animation must end in .gif, .mp4 or .html, or have no ending (a folder for PNG "
             "frames)"
         )
     if kind == FOLDER:
         refuse_link(path)
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            raise UsageError(
+            raise bad_file(
                 f"{path}: the folder for frames must be new or empty; name another folder, or empty this one"
             )
     _require_libraries(kind)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_data, bad_file, no_choice, off_range
 from ..files.path_names import as_path
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
@@ -58,9 +58,9 @@ class Checkpoint:
         path = as_path("checkpoint", file)
         every = read_number("checkpoint_every", every)
         if every < 0.0:
-            raise UsageError(f"checkpoint_every must be a number of seconds, 0 or more, not {every}")
+            raise off_range(f"checkpoint_every must be a number of seconds, 0 or more, not {every}")
         if not isinstance(resume, bool | None):
-            raise UsageError(f"resume must be True, False or None, not {shown(resume)}")
+            raise no_choice(f"resume must be True, False or None, not {shown(resume)}")
         self.file, self.every, self.resume = path, every, resume
         self.identity: dict[str, Any] = {}
         self.kept: dict[str, Any] | None = None
@@ -85,13 +85,13 @@ class Checkpoint:
                 raise ValueError("another format")
         except FileNotFoundError:
             if self.resume:
-                raise UsageError(f"there is no checkpoint {self.file} to resume from") from None
+                raise bad_file(f"there is no checkpoint {self.file} to resume from") from None
             return
         except BROKEN as error:
             raise self.damaged(error) from None
         names = differences(self.identity, header)
         if names:
-            raise UsageError(
+            raise bad_data(
                 f"checkpoint {self.file} belongs to another run: {', '.join(names)} differ; "
                 "name another file, or begin anew with resume=False"
             )
@@ -99,7 +99,7 @@ class Checkpoint:
 
     def damaged(self, why: object) -> UsageError:
         """The error for a file that cannot be gone on from."""
-        return UsageError(
+        return bad_data(
             f"checkpoint {self.file} is damaged, or is not a checkpoint of eomgen: {why}; begin anew with "
             "resume=False, or name another file"
         )

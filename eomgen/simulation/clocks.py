@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, cannot, off_range, untrue
 from ..limits.constraints import MEASURED
 from ..limits.runs import MOST_STEPS, WHOLE
 from ..numeric.scales import Array
@@ -50,21 +50,22 @@ def at_next_samples(
         states, first = ", ".join(clock["states"]), np.where(np.arange(len(found)) == place, 0.0, found)
         late, period = _lateness(values, t, found, event, place)[0], _lateness(values, 0.0, first, event, place)[1]
         if not period > 0.0:
-            raise UsageError(f"the period of {states} is {period:.6g} s; give a positive time between samples")
+            raise off_range(f"the period of {states} is {period:.6g} s; give a positive time between samples")
         start, end = span or (t, t)
         if abs(end - start) > MOST_STEPS * period:
             raise UsageError(
                 f"a run from {start:g} to {end:g} s has {abs(end - start) / period:.2g} samples of {states}, one every "
-                f"{period:g} s, so it would not end; give a shorter span"
+                f"{period:g} s, so it would not end; give a shorter span",
+                code="EG-ENDLESS",
             )
         if (latest := max(abs(start), abs(end))) + FINEST * period == latest:
-            raise UsageError(
+            raise off_range(
                 f"the period of {states}, {period:g} s, is lost in rounding at times near {latest:g} s; begin the run "
                 "nearer to t = 0"
             )
         if not abs(found[place] - round(found[place])) < WHOLE:
             name = module.x_names[place]
-            raise UsageError(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
+            raise off_range(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
         if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
             found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
             while found[place] >= 1.0 and _lateness(values, t, _less_one(found, place), event, place)[0] <= instant(t):
@@ -96,13 +97,13 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
     """
     clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
     if clocks and end < start:
-        raise UsageError(
+        raise cannot(
             f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
             f"to {end:.6g} s"
         )
     switched: list[str] = module.metadata.get("switched", [])
     if switched and end < start:
-        raise UsageError(
+        raise cannot(
             f"a run of constraints that close and open ({', '.join(switched)}) goes forward in time, not from "
             f"{start:.6g} s to {end:.6g} s"
         )
@@ -138,7 +139,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
         ):
             if not abs(value) <= limit and state not in (initial or ()):
                 name = state.removesuffix("_closed")
-                raise UsageError(
+                raise untrue(
                     f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
                     f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or "
                     "closed: false"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, ill_shaped
 from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names
@@ -50,9 +50,9 @@ def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
     there = isinstance(method, str) and method in getattr(module.core, "methods", ())
     if isinstance(method, str) and method == "Taylor":
         if not there:
-            raise UsageError(no_series(module))
+            raise cannot(no_series(module))
         if not forcing.stepwise:
-            raise UsageError(
+            raise cannot(
                 "method Taylor takes only inputs that are constant between corners: numbers, and tables with "
                 'interpolation "zero-order"; for other inputs use DOP853'
             )
@@ -98,7 +98,7 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
 def require_one(rtol: Any) -> float:
     """A relative tolerance as compiled methods take it, or a UsageError."""
     if not isinstance(rtol, float):
-        raise UsageError(f"rtol must be one number for a compiled method, not of shape {rtol.shape}")
+        raise ill_shaped(f"rtol must be one number for a compiled method, not of shape {rtol.shape}")
     return rtol
 
 

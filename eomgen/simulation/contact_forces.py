@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot, off_range
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_number
@@ -117,7 +117,7 @@ class ContactForces:
         """
         kept, time = self._single(), read_number("t", t)
         if not len(kept) or not self.t[0] <= time <= self._ends[-1]:
-            raise UsageError(f"t must be a time of the run, from {self.t[0]:.6g} to {self.t[-1]:.6g} s, not {time:.6g}")
+            raise off_range(f"t must be a time of the run, from {self.t[0]:.6g} to {self.t[-1]:.6g} s, not {time:.6g}")
         rows = kept[min(int(np.searchsorted(self._ends, time)), len(kept) - 1)]
         found = []
         for row, force in zip(rows, forces_on_second(rows), strict=True):
@@ -130,7 +130,7 @@ class ContactForces:
 
     def _single(self) -> Sequence[Array]:
         if self._kept is None:
-            raise UsageError("single contacts of this run were not kept: simulate with contact_forces=True")
+            raise cannot("single contacts of this run were not kept: simulate with contact_forces=True")
         return self._kept
 
 

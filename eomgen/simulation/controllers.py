@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, at_odds, cannot, ill_typed
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_mapping, require_time_and_state, without_dots
@@ -47,7 +47,8 @@ class Controller:
         if found is None or found.ndim or not np.isfinite(found):
             raise SimulationError(
                 f"the controller of {self.name} must return one finite number, but returned {shown(given)} "
-                f"at t = {t:.6g} s"
+                f"at t = {t:.6g} s",
+                code="EG-NUMBER",
             )
         return float(found)
 
@@ -75,7 +76,7 @@ class ControlledEvents(Events):
         found = _by_event(layout, controllers)
         if found and keeps:
             message = "a run with controllers= keeps no checkpoint, for a function may hold values that no file keeps"
-            raise UsageError(f"{message}; leave checkpoint= out")
+            raise at_odds(f"{message}; leave checkpoint= out")
         super().__init__(layout, given)
         self.controllers = found
         for i in found:
@@ -103,14 +104,14 @@ def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:
     clocks: list[dict[str, Any]] = layout.metadata.get("clocks", [])
     taken = [name for clock in clocks for name in clock["open"]]
     if wanted and not taken:
-        raise UsageError(
+        raise cannot(
             f"controllers give the values of sampled states without a law, and {layout.name!r} has none; declare one "
             "with m.sampled(name, period=...)"
         )
     check_names("sampled state without a law", wanted, taken)
     for name, function in wanted.items():
         if not callable(function):
-            raise UsageError(f"the controller of {name} must be a function f(t, x), not {shown(function)}")
+            raise ill_typed(f"the controller of {name} must be a function f(t, x), not {shown(function)}")
         require_time_and_state(f"the controller of {name}", function)
     found: dict[int, list[Controller]] = {}
     for clock in clocks:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError, calls_within
+from ..errors import SimulationError, at_odds, calls_within, cannot, no_choice
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
@@ -108,11 +108,9 @@ def integrate_dae(
     ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
     for name in OWN:
         if name in options:
-            raise UsageError(
-                f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate"
-            )
+            raise at_odds(f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate")
     if not DaeForm(module).n_y:
-        raise UsageError(f"{module.name} has no unknowns that IDA could solve for; use simulate")
+        raise cannot(f"{module.name} has no unknowns that IDA could solve for; use simulate")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
@@ -282,7 +280,7 @@ class _DaeRun:
         try:
             return make(residual, atol=atol, **chosen)
         except (TypeError, ValueError) as error:
-            raise UsageError(f"IDA refuses an option of dae.solve: {error}") from None
+            raise no_choice(f"IDA refuses an option of dae.solve: {error}") from None
 
     def _happen(self, t: float, x: Array, fired: list[int]) -> Array | None:
         """The state after events; None where it stays."""

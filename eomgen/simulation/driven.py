@@ -14,7 +14,7 @@ from ..analysis.followed_path import FollowedPath
 from ..analysis.kinematic import complete, follow_to_start, start_from
 from ..analysis.kinematic_motion import KinematicAnalysis, keep
 from ..analysis.open_joint import describe_gap
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, cannot, no_such
 from ..numeric.roots import find_root
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
@@ -55,12 +55,12 @@ def follow_drivers(
     """
     if not is_driven(module) or _led_by_inputs(module, inputs, method):
         if method is not None:
-            raise UsageError(
+            raise cannot(
                 f"method 'kinematic' is for mechanisms without degrees of freedom; {module.name} has {module.n_dof}"
             )
         return None
     if checkpoint is not None:
-        raise UsageError(
+        raise cannot(
             f"{module.name} is moved by its drivers, position by position; such a run cannot keep a checkpoint"
         )
     forcing = Forcing(module.layout, inputs)
@@ -69,9 +69,7 @@ def follow_drivers(
     forcing.attach(bound)
     watched = Events(module.layout, events)
     if watched.resets:
-        raise UsageError(
-            f"{module.name} has no degree of freedom: its drivers move it, and no event can reset its state"
-        )
+        raise cannot(f"{module.name} has no degree of freedom: its drivers move it, and no event can reset its state")
     listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
@@ -83,7 +81,7 @@ def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method:
     led = Forcing(module.layout, inputs).constrained
     if led and method == "kinematic":
         names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
-        raise UsageError(
+        raise cannot(
             f"method 'kinematic' needs drivers that are expressions of t, but the inputs {names} move {module.name}; "
             "leave method= out to integrate it"
         )
@@ -121,7 +119,7 @@ def simulate_driven(
     """
     for name in given:
         if name not in ("rtol", "atol", "max_step", "first_step"):
-            raise UsageError(
+            raise no_such(
                 f"a run of a mechanism that drivers move entirely has no option {name!r}; give method= "
                 "too to integrate it"
             )

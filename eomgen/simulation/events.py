@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError, ZenoError, calls_within
+from ..errors import ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range
 from ..limits.rounding import TINY
 from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
@@ -66,7 +66,7 @@ class RunEvent:
         action: int = GO_ON,
     ) -> None:
         if not callable(function):
-            raise UsageError(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
+            raise ill_typed(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
         require_time_and_state("an event", function)
         self.function, self.action = function, action
         self.name = name or str(getattr(function, "__name__", type(function).__name__))
@@ -90,7 +90,7 @@ class RunEvent:
         found: Any = as_real(value) if self.users else value
         if self.users and (found is None or found.ndim or not (for_slope or isfinite(found))):
             text = shown(value if found is None or found.ndim else float(found))
-            raise UsageError(
+            raise no_number(
                 f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
             )
@@ -254,10 +254,10 @@ def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | Non
     check_names("key of an event", options, ("expression", "terminal", "direction"))
     text = options.get("expression")
     if not isinstance(text, str):
-        raise UsageError(f"event {name or ''}: its expression must be a text, not {text!r}")
+        raise ill_typed(f"event {name or ''}: its expression must be a text, not {text!r}")
     direction = options.get("direction") or 0
     if direction not in (-1, 0, 1):
-        raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
+        raise no_choice(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = RunEvent(_only_in_c, name or text, options.get("terminal"), direction)
     return event, read_formula(layout, text, f"event {name or text!r}", beside)
 
@@ -270,7 +270,7 @@ def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
 
 def _only_in_c(t: float, x: Array) -> float:
     """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
-    raise UsageError("an event given by name or text has values only in a run; give a function f(t, x) instead")
+    raise cannot("an event given by name or text has values only in a run; give a function f(t, x) instead")
 
 
 def _unwatched(t: float, x: Array) -> float:
@@ -283,7 +283,7 @@ def _times(name: str, given: Any) -> int:
     plain = given is None or isinstance(given, (bool, np.bool_)) or (isinstance(given, float) and given.is_integer())
     found = int(given or 0) if plain else as_count(given)
     if found is None or found < 0:
-        raise UsageError(
+        raise off_range(
             f"event {name}: terminal must be true, false, or the number of events that ends the run (1, 2, ...), "
             f"not {shown(given)}"
         )

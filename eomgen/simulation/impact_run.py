@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..analysis.impact import Impact, strike_run
 from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..analysis.impact_sliding import Rough, check_friction
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, cannot, no_such, off_range
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
 from ..numeric.counts import read_count
@@ -80,19 +80,19 @@ def simulate_impacts(
     refuse_rigid(module.layout, "simulate_impacts")
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
-            raise UsageError(
+            raise no_such(
                 f"simulate_impacts has no {key}=; use t_events of the run that it returns, and at(t) for any times"
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
     rough = check_friction(module.layout, friction, found)
     if not module.layout.n_dof:
-        raise UsageError(
+        raise cannot(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
         )
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     if end < start:
-        raise UsageError(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
+        raise cannot(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
@@ -106,7 +106,7 @@ def _ending(module: BoundModel) -> list[str]:
     declared = module.layout.metadata.get("events") or []
     for event in declared:
         if int(event.get("terminal") or 0) > 1:
-            raise UsageError(
+            raise cannot(
                 f"event {event['name']} ends a run after {event['terminal']} times, and simulate_impacts cannot "
                 "count them; give the gaps as events with restitution, and use simulate"
             )
@@ -144,7 +144,7 @@ class _ImpactRun:
         values = self.gaps.values(t, x)
         low = values < -np.maximum(self.limits, allowance(self.module.layout, self.gaps.names, BEYOND))
         for i in np.flatnonzero(low):
-            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
+            raise off_range(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
         fired, idle = np.zeros(len(values), dtype=bool), 0
         while True:
             closed = fired | (self.gaps.values(t, x) <= self.limits)
@@ -167,7 +167,9 @@ class _ImpactRun:
             idle = idle + 1 if t - began <= INSTANT * max(abs(t), 1.0) else 0
             if idle > IDLE:
                 names = ", ".join(name for name, one in zip(self.gaps.names, fired, strict=True) if one)
-                raise SimulationError(f"the gap {names} closes again and again at t = {t:.6g} s without an impact")
+                raise SimulationError(
+                    f"the gap {names} closes again and again at t = {t:.6g} s without an impact", code="EG-EVENT"
+                )
 
     def _store(self, t: Array, x: Array) -> None:
         if self.times and self.impacts and self.impacts[-1][0] == t[0] and self._struck:
@@ -278,5 +280,6 @@ class _ImpactRun:
             i = int(np.flatnonzero(beyond[:, k])[0])
             raise SimulationError(
                 f"the gap {self.gaps.names[i]} is {values[i, k]:.6g} at t = {t[k]:.6g} s without an impact before: "
-                "it jumps there, or it closes and opens within one step; give max_step"
+                "it jumps there, or it closes and opens within one step; give max_step",
+                code="EG-EVENT",
             )

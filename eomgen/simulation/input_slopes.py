@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Tabulated
 from ..runtime.layout import Layout
@@ -98,7 +98,7 @@ class AtOneState:
             return self.function(t, None)
         except Exception:
             self.function(t, x)  # a fault of its own comes out as it is
-        raise UsageError(
+        raise cannot(
             f"input {self.name} is a Python function of the state, and its derivatives are not known; give it as an "
             'expression in a text, such as "-k*theta", or as a function of time alone'
         )

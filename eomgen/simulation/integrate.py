@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, no_choice
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
@@ -87,7 +87,7 @@ def choose_solver(method: Any) -> Any:
         return getattr(scipy, method)
     if isinstance(method, type) and issubclass(method, scipy.OdeSolver):
         return method
-    raise UsageError(f"method must be one of {', '.join(METHODS)}, or a subclass of OdeSolver, not {method!r}")
+    raise no_choice(f"method must be one of {', '.join(METHODS)}, or a subclass of OdeSolver, not {method!r}")
 
 
 def check_options(solver: Any, options: Collection[str], own: Collection[str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, UsageError
+from ..errors import EvaluationError, SimulationError, UsageError, cannot
 from ..numeric.scales import Array
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
@@ -72,9 +72,9 @@ class Integrator:
         step: float | None = None,
     ) -> None:
         if not module.layout.n_dof:
-            raise UsageError(f"{module.name} has no degree of freedom to integrate; use simulate")
+            raise cannot(f"{module.name} has no degree of freedom to integrate; use simulate")
         if Events(module.layout, None).resets:
-            raise UsageError(f"events of {module.name} reset its state, and an integrator finds no events; simulate it")
+            raise cannot(f"events of {module.name} reset its state, and an integrator finds no events; simulate it")
         self._given = (module, method, rtol, atol, max_step, first_step, step)
         self.module, self.method = module, method
         self._step = check_method(method, step)
@@ -91,7 +91,7 @@ class Integrator:
             self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
             self._compiled.make_stall_check = self._stall_check
         elif step is not None:
-            raise UsageError("method RK4 needs compiled code: use target='cython'")
+            raise cannot("method RK4 needs compiled code: use target='cython'")
         else:
             choose_solver(method)
 

@@ -68,4 +68,5 @@ def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callab
         f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
         "give initial values nearer to such a state, or write the inputs in t",
         [],
+        code="EG-CONTRADICTION",
     )

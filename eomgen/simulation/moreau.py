@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, UsageError, calls_within
+from ..errors import (
+    EvaluationError,
+    SimulationError,
+    calls_within,
+    cannot,
+    ill_typed,
+    incomplete,
+    off_range,
+    untrue,
+)
 from ..limits.rigid_contacts import ITERATIONS, SOLVED
 from ..limits.runs import SAME
 from ..numeric.counts import as_count
@@ -68,21 +77,21 @@ def step_rigidly(
     given = {key: value for key, value in options.items() if value is not None and value is not False}
     check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))
     if step is None:
-        raise UsageError("method moreau needs step=, the size of its steps (s), for example step=1e-3")
+        raise incomplete("method moreau needs step=, the size of its steps (s), for example step=1e-3")
     h = check_step("step", step)
     tolerance = read_number("contact_tolerance", given.get("contact_tolerance", SOLVED))
     if not tolerance > 0.0:
-        raise UsageError(f"contact_tolerance must be greater than 0, not {tolerance:.6g}")
+        raise off_range(f"contact_tolerance must be greater than 0, not {tolerance:.6g}")
     iterations = as_count(given.get("contact_iterations", ITERATIONS))
     if iterations is None or iterations < 1:
-        raise UsageError(f"contact_iterations must be a whole number from 1, not {given['contact_iterations']}")
+        raise off_range(f"contact_iterations must be a whole number from 1, not {given['contact_iterations']}")
     keep = given.get("contact_forces", False)
     if keep is not True and keep is not False:
-        raise UsageError(f"contact_forces must be True or False, not {shown(keep)}")
+        raise ill_typed(f"contact_forces must be True or False, not {shown(keep)}")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     if end < start:
-        raise UsageError("method moreau runs forwards only: impacts cannot be undone")
+        raise cannot("method moreau runs forwards only: impacts cannot be undone")
     require_steps("step", h, start, end)
     _require_no_others(module, events)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
@@ -94,7 +103,7 @@ def step_rigidly(
     steps = RigidSteps(bound, forcing, tolerance, iterations)
     found = deep_start(bound, start, x, forcing(start, x) if forcing else None)
     if found is not None:
-        raise UsageError(
+        raise untrue(
             f"{module.name} starts with shapes inside each other; {found}. Rigid shapes cannot: change the initial "
             "values, or put only shapes into groups that are apart"
         )
@@ -117,7 +126,8 @@ def step_rigidly(
             if not (np.isfinite(q).all() and np.isfinite(v).all()):
                 raise SimulationError(
                     f"moreau stopped at t = {t:.6g} s of {end:.6g} s: the state is not finite. Velocity-dependent and "
-                    "stiff forces are taken explicitly: try a smaller step"
+                    "stiff forces are taken explicitly: try a smaller step",
+                    code="EG-NOT-FINITE",
                 )
             states[:n_q, k + 1], states[n_q:, k + 1] = q, v
             sums.add(k, steps.acting, float(times[k + 1]) - t)
@@ -162,19 +172,19 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
     UsageError
     """
     if events is not None:
-        raise UsageError("method moreau watches no events; run without events=, or by another method")
+        raise cannot("method moreau watches no events; run without events=, or by another method")
     if module.layout.reaction_laws:
         names = ", ".join(module.layout.reaction_laws)
-        raise UsageError(f"method moreau has no friction by reactions of joints (here {names}); use another method")
+        raise cannot(f"method moreau has no friction by reactions of joints (here {names}); use another method")
     for name, of in module.metadata.get("rigid_by_motion", {}).items():
-        raise UsageError(
+        raise cannot(
             f"friction or restitution of contact {name!r} depends on {', '.join(of)}; by method moreau it may "
             "depend on time, coordinates, parameters and inputs"
         )
     if Events(module.layout, None).resets:
-        raise UsageError(f"{module.name} has events that reset its state, which method moreau does not watch")
+        raise cannot(f"{module.name} has events that reset its state, which method moreau does not watch")
     if ends := [event["name"] for event in module.metadata.get("events", []) if event["terminal"]]:
-        raise UsageError(f"method moreau watches no events, and {', '.join(ends)} ends the run; leave it out here")
+        raise cannot(f"method moreau watches no events, and {', '.join(ends)} ends the run; leave it out here")
 
 
 def _require_it(module: BoundModel, method: Any) -> None:
@@ -187,7 +197,7 @@ def _require_it(module: BoundModel, method: Any) -> None:
     if not isinstance(method, str) or method != NAME:
         names = module.metadata["rigid_only"]
         told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
-        raise UsageError(
+        raise cannot(
             f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "
             f"method='moreau' and step={told}, or choose another normal_law"
         )

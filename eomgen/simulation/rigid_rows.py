@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, cannot, off_range
 from ..numeric.pair_sums import RECORD
 from ..numeric.scales import Array
 
@@ -44,7 +44,7 @@ class RigidContacts:
     def __init__(self, module: BoundModel) -> None:
         known = module.metadata.get("rigid_contacts")
         if not known:
-            raise UsageError(
+            raise cannot(
                 f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
                 "can be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
             )
@@ -72,7 +72,8 @@ class RigidContacts:
                 raise SimulationError(
                     f"contacts {name!r}: {listed} pairs of shapes are near each other at t = {t:.6g} s, and there is "
                     f"room for {room}; leave out shapes that overlap others of their body, or put shapes that "
-                    "never meet into contacts of their own"
+                    "never meet into contacts of their own",
+                    code="EG-TOO-LARGE",
                 )
             rows = every[start + 1 : start + 1 + RECORD * listed].reshape(listed, RECORD).copy()
             rows[:, :2] += shapes
@@ -114,7 +115,7 @@ class RigidContacts:
             k = int(np.argmax(bad))
             starts = np.cumsum([count for *_, count in self.lists])
             name = self.lists[int(np.searchsorted(starts, records[k, 0], side="right"))][0]
-            raise UsageError(
+            raise off_range(
                 f"contacts {name!r}: friction is {friction[k]:.6g} and restitution {restitution[k]:.6g}; friction is "
                 "0 or greater, restitution from 0 to 1"
             )

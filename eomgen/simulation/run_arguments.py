@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import ill_shaped, ill_typed, incomplete, no_choice, off_range
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
@@ -45,7 +45,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_number("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
-        raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
+        raise ill_typed(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
     return float(pair[0]), float(pair[1])
 
 
@@ -71,11 +71,11 @@ def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
 def check_method(method: Any, step: Any) -> float | None:
     """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
     if method is not None and not isinstance(method, (str, type)):
-        raise UsageError(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
+        raise no_choice(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
     if isinstance(method, str) and method not in NAMES:
         raise unknown("method", method, NAMES)
     if (isinstance(method, str) and method == "RK4") != (step is not None):
-        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it but moreau")
+        raise incomplete("method RK4 needs step=, the size of its steps (s), and no other method takes it but moreau")
     return None if step is None else check_step("step", step)
 
 
@@ -89,7 +89,7 @@ def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Ar
         or not min(start, end) <= times[first] <= times[last] <= max(start, end)
         or not (times[1:] > times[:-1] if end >= start else times[1:] < times[:-1]).all()
     ):
-        raise UsageError(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
+        raise off_range(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
     return times
 
 
@@ -121,7 +121,7 @@ def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing |
     x = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if x.shape != (module.n_x,):
         names = ", ".join(module.x_names)
-        raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
+        raise ill_shaped(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
     x = module.project(x, t=t)
     if module.layout.rank:
         Initial(module.kernels, t).on_branch(x[: module.n_q], x[module.n_q :], module.layout.v)

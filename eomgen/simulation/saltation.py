@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NoDerivativeError, UsageError
+from ..errors import NoDerivativeError, cannot
 from ..limits.impacts import ASIDE, CONTRADICTS, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
@@ -48,7 +48,7 @@ class Saltation:
         corners: Sequence[float],
     ) -> None:  # fmt: skip
         if events.functions:
-            raise UsageError(
+            raise cannot(
                 f"event {events.functions[0].name} is a Python function, and its derivatives are not known; give its "
                 "expression as a text"
             )

@@ -212,7 +212,8 @@ def _require_same(found: Trajectory, alone: Trajectory) -> None:
         if len(ours) != len(theirs):
             raise SimulationError(
                 f"event {name} is found {len(theirs)} times by simulate, but {len(ours)} times together with the "
-                "derivatives, because it comes and goes within one step of the solver; give max_step"
+                "derivatives, because it comes and goes within one step of the solver; give max_step",
+                code="EG-EVENT",
             )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_typed
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
@@ -76,7 +76,7 @@ class Sensitivities:
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
         if not (isinstance(key, tuple) and len(key) == 2):
-            raise UsageError(f"write sensitivities[state or output, parameter], not {key!r}")
+            raise ill_typed(f"write sensitivities[state or output, parameter], not {key!r}")
         what, name = key
         if what not in self._rows:
             raise unknown("state or output", what, self._rows)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..analysis.balance import assembly_jacobian
-from ..errors import UsageError
+from ..errors import at_odds, ill_placed, incomplete, untrue
 from ..limits.constraints import CONTRADICTION, STATE
 from ..marker_places import place_of_marker
 from ..numeric import algebra
@@ -66,15 +66,15 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
             initial.append((column, name))
         elif name in (*layout.x, *layout.loops, *layout.loop_rates):
             which = f"{', '.join(held)} {'are' if len(held) > 1 else 'is'}" if held else "nothing is"
-            raise UsageError(
+            raise ill_placed(
                 f"{name} is not held at the start ({which}), so there is no derivative by it; name it in hold="
             )
         else:
             raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
     if not names:
-        raise UsageError("name at least one parameter, input or initial value")
+        raise incomplete("name at least one parameter, input or initial value")
     if len(set(names)) != len(names):
-        raise UsageError(f"give each name only once: {', '.join(names)}")
+        raise at_odds(f"give each name only once: {', '.join(names)}")
     return Differentiated(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
@@ -86,7 +86,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     q, found = x[: layout.n_q], []
     starts = [*(given or ()), *layout.initial_outputs]
     if outputs := [name for name in starts if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
-        raise UsageError(
+        raise incomplete(
             f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "
             "coordinates that x0(...) finds for it"
         )
@@ -142,7 +142,7 @@ def start_sensitivity(
         (wanted[name],) = columns.spread(slopes[name][None], np.zeros((1, layout.n_u)))
     for column, name in columns.initial:
         if len(initial.gradients(x[:n_q], name)) != 1:
-            raise UsageError(f"{name} cannot change alone; use the angular velocity, or rotation: euler_angles")
+            raise ill_placed(f"{name} cannot change alone; use the angular velocity, or rotation: euler_angles")
         wanted[name][column] = 1.0
     N = scales.rates(x[:n_q], np.eye(n_v))
     # positions
@@ -203,7 +203,7 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     left = np.abs(A @ found - b).max(axis=0)
     bad = np.flatnonzero(left > CONTRADICTION * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:
-        raise UsageError(
+        raise untrue(
             f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values do "
             "not allow it; hold fewer values"
         )

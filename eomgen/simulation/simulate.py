@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError, calls_within
+from ..errors import (
+    EvaluationError,
+    SimulationError,
+    SimulationInterrupted,
+    calls_within,
+    cannot,
+    incomplete,
+)
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.option_types import Number, SolverOptions
@@ -158,7 +165,7 @@ def simulate(
 
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
-        raise UsageError("resume needs checkpoint=, the file to continue from")
+        raise incomplete("resume needs checkpoint=, the file to continue from")
     if usual is None and (
         (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof)
     ):
@@ -193,7 +200,7 @@ def simulate(
         forcing = Forcing(module.layout, inputs)
         compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
         if method == "RK4" and not compiled:
-            raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
+            raise cannot("method RK4 needs compiled code: use target='cython', and no input that is a function")
         if compiled:
             solver, title = None, str(method)
             check_names("option of simulate", settings, (), OPTIONS)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import cannot
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
@@ -48,12 +48,12 @@ class Pause:
     def __init__(self, checkpoint: Checkpoint, solver: Any, dense: bool) -> None:
         name = solver.__name__
         if name not in STATE or not solver.__module__.startswith("scipy."):
-            raise UsageError(
+            raise cannot(
                 f"a run with method {name} cannot keep a checkpoint, because its state cannot be read; "
                 f"use one of {', '.join(STATE)}"
             )
         if dense:
-            raise UsageError(
+            raise cannot(
                 f"a checkpoint of a run by SciPy's {name} keeps no continuous solution: leave dense_output out and "
                 "give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code"
             )

@@ -97,14 +97,16 @@ class StallCheck:
         if self.taken * self.kept > MOST_NUMBERS:
             raise SimulationError(
                 f"the run has taken {self.taken} steps up to t = {t:.6g} s of {self.end:.6g} s, and more cannot be "
-                "kept; give a shorter span, or in Python the times to store, t_eval"
+                "kept; give a shorter span, or in Python the times to store, t_eval",
+                code="EG-TOO-LARGE",
             )
         wanted, gone = abs(self.end - t) * self.taken, abs(t - self.start)
         if (self.taken > ENOUGH and wanted > ENDLESS * gone) or (self.taken > FEW and wanted > HOPELESS * gone):
             more = abs(self.end - t) / max(abs(t - self.start), TINY) * self.taken
             raise SimulationError(
                 f"the run has taken {self.taken} steps up to t = {t:.6g} s and needs {more:.1e} more to reach "
-                f"t = {self.end:.6g} s, which would take too long; give a shorter span, or looser tolerances"
+                f"t = {self.end:.6g} s, which would take too long; give a shorter span, or looser tolerances",
+                code="EG-ENDLESS",
             )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UnavailableError, UsageError, cannot
 from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.late import eager
@@ -136,7 +136,7 @@ def solver_class(core: Any, name: str) -> Any:
 
 def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     """In place of a class that SciPy does not have."""
-    raise UsageError("method Taylor can integrate only the rhs of its module, with constant inputs")
+    raise cannot("method Taylor can integrate only the rhs of its module, with constant inputs")
 
 
 def step(
@@ -168,7 +168,7 @@ def step(
     """
     refuse_rigid(module.layout, "step")
     if module.layout.n_events and Events(module.layout, None).resets:
-        raise UsageError(
+        raise cannot(
             f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"
         )
     core, u = eager(module.core), module.kernels.fail.vector("u", u, module.u)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import ill_shaped, no_number, off_range
 from ..limits.runs import LEAST_RTOL
 from ..runtime.room import as_real, read_flag, read_number
 from ..texts import shown
@@ -53,9 +53,9 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
     if "min_step" in checked:
         checked["min_step"] = read_number("min_step", checked["min_step"])
         if checked["min_step"] < 0.0:
-            raise UsageError(f"min_step must not be negative, not {checked['min_step']:.6g}")
+            raise off_range(f"min_step must not be negative, not {checked['min_step']:.6g}")
     if checked.get("first_step", 0.0) > span:
-        raise UsageError(f"first_step must not exceed the span of {span:.6g} s, not {checked['first_step']:.6g}")
+        raise off_range(f"first_step must not exceed the span of {span:.6g} s, not {checked['first_step']:.6g}")
     return checked
 
 
@@ -64,11 +64,11 @@ def _tolerance(name: str, given: Any, n: int) -> Any:
         return given
     values = as_real(read_number(name, given) if isinstance(given, str) else given)
     if values is None:
-        raise UsageError(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
+        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
     if values.shape not in ((), (n,)):
-        raise UsageError(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
+        raise ill_shaped(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise UsageError(f"{name} must not be negative and must be finite, not {shown(given)}")
+        raise off_range(f"{name} must not be negative and must be finite, not {shown(given)}")
     return values if values.ndim else float(values)
 
 
@@ -78,8 +78,8 @@ def check_step(name: str, given: Any) -> float:
         return given
     found = as_real(read_number(name, given) if isinstance(given, str) else given)
     if found is None or found.ndim:
-        raise UsageError(f"{name} must be a number of seconds, not {shown(given)}")
+        raise no_number(f"{name} must be a number of seconds, not {shown(given)}")
     value = float(found)
     if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
-        raise UsageError(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
+        raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
     return value

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..analysis.linear import output_derivatives
-from ..errors import UsageError
+from ..errors import cannot
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .input_slopes import InputSlopes
@@ -36,7 +36,7 @@ class Move(NamedTuple):
         n_x, n_u = len(self.x), len(self.u)
         by_u = slopes[:, n_x + 1 : n_x + 1 + n_u]
         for j in np.flatnonzero(by_u.any(axis=0) & ~np.isfinite(self.u).all(axis=1)):
-            raise UsageError(
+            raise cannot(
                 f"{what} depends on input {names[j]}, a Python function, and its rate is not known; give it as an "
                 "expression in a text, or as a table"
             )

@@ -8,7 +8,7 @@ from stat import S_ISREG
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UsageError, bad_data, bad_file, off_range, too_large
 from ..files.path_names import as_name
 from ..limits.files import MESH
 from ..records import dataclass
@@ -45,15 +45,13 @@ def measure_mesh(path: str) -> MeshProperties:
     try:
         stat = os.stat(path)
     except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from None
+        raise bad_file(f"cannot read {path}: {error.strerror}") from None
     if not S_ISREG(stat.st_mode):
-        raise UsageError(f"{path} is not a plain file")
+        raise bad_file(f"{path} is not a plain file")
     if not path.lower().endswith(".stl"):
-        raise UsageError(f"{path}: only STL files (.stl) can be read")
+        raise bad_file(f"{path}: only STL files (.stl) can be read")
     if stat.st_size > MESH:
-        raise UsageError(
-            f"{path} has {stat.st_size:,} bytes, and {MESH:,} is the most; use a mesh with fewer triangles"
-        )
+        raise too_large(f"{path} has {stat.st_size:,} bytes, and {MESH:,} is the most; use a mesh with fewer triangles")
     return _measure(os.path.abspath(path), stat.st_mtime_ns, stat.st_size)
 
 
@@ -63,27 +61,29 @@ def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
     try:
         import trimesh
     except ImportError:
-        raise UsageError("meshes need trimesh: pip install 'eomgen[mesh]', or pip install trimesh") from None
+        raise UsageError(
+            "meshes need trimesh: pip install 'eomgen[mesh]', or pip install trimesh", code="EG-PACKAGE-MISSING"
+        ) from None
     log = trimesh.util.log
     told, log.disabled = log.disabled, True  # it logs the tracebacks of what it tries first
     try:
         mesh = trimesh.load(path, file_type="stl", force="mesh")
     except Exception as error:  # whatever a parser meets in a broken file
-        raise UsageError(f"{path} is not an STL file that can be read ({error})") from None
+        raise bad_data(f"{path} is not an STL file that can be read ({error})") from None
     finally:
         log.disabled = told
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
-        raise UsageError(f"{path} has no triangles, or vertices that are not finite")
+        raise bad_data(f"{path} has no triangles, or vertices that are not finite")
     if not mesh.is_watertight:
-        raise UsageError(f"{path} does not bound a solid: its surface has holes (edges of one triangle only)")
+        raise bad_data(f"{path} does not bound a solid: its surface has holes (edges of one triangle only)")
     if not mesh.is_winding_consistent:
-        raise UsageError(f"{path} does not bound a solid: neighbouring triangles are wound in opposite senses")
+        raise bad_data(f"{path} does not bound a solid: neighbouring triangles are wound in opposite senses")
     measured = mesh.mass_properties
     volume = float(measured["volume"])
     if not np.isfinite(volume + np.sum(measured["inertia"]) + np.sum(measured["center_mass"])):
-        raise UsageError(f"{path} is so large or so small that its volume or its inertia is not finite")
+        raise off_range(f"{path} is so large or so small that its volume or its inertia is not finite")
     if not volume > 0.0:
-        raise UsageError(f"{path} is inside out: its triangles face inwards, so the volume is {volume:.3g}")
+        raise bad_data(f"{path} is inside out: its triangles face inwards, so the volume is {volume:.3g}")
     centre = np.asarray(measured["center_mass"], dtype=float)
     tensor = np.asarray(measured["inertia"], dtype=float)
     tensor = 0.5 * (tensor + tensor.T)

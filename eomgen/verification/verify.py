@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EomgenError, UsageError
+from ..errors import EomgenError, off_range
 from ..limits.rounding import EPS
 from ..limits.runs import MOST_STATES
 from ..numeric.counts import read_count
@@ -88,9 +88,7 @@ def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
         or not isinstance(seconds, int | float | np.integer | np.floating)
         or not seconds >= 0.0
     ):
-        raise UsageError(
-            f"verify: seconds must be the time for all checks, a number of 0 or more, not {shown(seconds)}"
-        )
+        raise off_range(f"verify: seconds must be the time for all checks, a number of 0 or more, not {shown(seconds)}")
     most = read_count("verify: states, the number of random states,", states, 1, MOST_STATES)
     return most, read_count("verify: seed, of the random states,", seed)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ...errors import UsageError
+from ...errors import cannot
 from ...layer import read_layer, read_sources
 from ...program import Block, KernelDriver, Program
 from ...simulation.events import GO_ON, RESET, crowd_of
@@ -53,7 +53,7 @@ def emit_device_text(program: Program) -> str:
     refuse_sums(program, "target 'cuda'")
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
     if native:
-        raise UsageError(
+        raise cannot(
             f"target 'cuda': function {', '.join(native)} is C code, which may need what a device does not have; "
             "give a table or an expression"
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import ModelError, Problem, UsageError
+from ...errors import ModelError, Problem, no_choice
 from ...program import Program
 from ...targets import FMI_VERSIONS
 
@@ -23,7 +23,7 @@ def check_version(version: str) -> str:
     for known in FMI_VERSIONS:
         if str(version) in (known, known.partition(".")[0]):
             return known
-    raise UsageError(f"there is no version {version!r} of FMI here; there are {', '.join(FMI_VERSIONS)}")
+    raise no_choice(f"there is no version {version!r} of FMI here; there are {', '.join(FMI_VERSIONS)}")
 
 
 def refuse_impacts(program: Program) -> None:
@@ -35,7 +35,7 @@ def refuse_impacts(program: Program) -> None:
     """
     remedy = "describe the new velocities with reset, or leave the event out"
     problems = [
-        Problem(f"events.{event['name']}.restitution", "an FMU cannot hold an impact", remedy)
+        Problem(f"events.{event['name']}.restitution", "an FMU cannot hold an impact", remedy, code="EG-UNSUPPORTED")
         for event in program.metadata.get("events", ())
         if event["restitution"] is not None
     ]
@@ -44,6 +44,7 @@ def refuse_impacts(program: Program) -> None:
             f"contacts.{name}.normal_law",
             "rigid contacts exert impulses, which an FMU cannot hold",
             "choose another normal_law",
+            code="EG-UNSUPPORTED",
         )
         for name in program.metadata.get("rigid_only", ())
     ]
