@@ -178,7 +178,7 @@ def test_slips_as_json(call: Call, verb: str) -> None:
         result = call(*words)
         assert result.code == 2
         error = result.json["error"]
-        assert set(error) == {"type", "exit_code", "message", "problems"}
+        assert set(error) == {"type", "code", "exit_code", "message", "problems"}
         assert (error["type"], error["exit_code"], error["problems"]) == ("UsageError", 2, [])
         assert error["message"] in result.err  # people read it on stderr as without --json
 
@@ -196,10 +196,10 @@ def test_faults_of_a_model_are_told_all_at_once_with_their_lines(call: Call, tmp
     told = call("run", file, "--json")
     assert told.code == 1
     assert set(told.json) == {"error"}
-    assert set(told.json["error"]) == {"type", "exit_code", "message", "problems"}
+    assert set(told.json["error"]) == {"type", "code", "exit_code", "message", "problems"}
     problem = told.json["error"]["problems"][0]
-    assert set(problem) == {"path", "message", "remedy", "file", "line"}
-    assert (problem["path"], problem["line"]) == ("bodies.rod.mass", 9)
+    assert set(problem) == {"path", "message", "remedy", "file", "line", "code"}
+    assert (problem["path"], problem["line"], problem["code"]) == ("bodies.rod.mass", 9, "EG-NAME-UNKNOWN")
 
 
 FALLS = "name: fall\ngravity: [0, -9.81, 0]\nbodies: {b: {mass: 1}}\n"
