@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import subprocess
@@ -178,12 +177,8 @@ def test_coincident_points() -> None:
     speeds = sum(v.diff() ** 2 for v in (x1, x2, y1, y2)) / 2
     lm = LagrangesMethod(speeds - 9.81 * (y1 + y2), [x1, x2, y1, y2], hol_coneqs=[(x1 - x2) ** 2 + (y1 - y2) ** 2])
     lm.form_lagranges_equations()
-    try:
-        n = eg.from_sympy(lm, "a").check().degrees_of_freedom
-    except eg.EomgenError as e:
-        assert "component" in str(e), e
-    else:
-        assert n == 2, n
+    with pytest.raises(eg.ModelError, match="component"):
+        eg.from_sympy(lm, "a").check()
 
 
 def test_independent_kept() -> None:
@@ -199,11 +194,7 @@ def test_independent_kept() -> None:
     m.guess(q=0.6, s=-0.2, r=1.5)
     m.initial(q=0.6)
     m.independent("q")
-    try:
-        names = m.compile(target="numpy").minimal.x_names
-    except eg.EomgenError:
-        return
-    assert "q" in names, names
+    assert "q" in m.compile(target="numpy").minimal.x_names
 
 
 def test_casadi_without_holonomic_rows() -> None:
@@ -281,7 +272,9 @@ def test_states_without_freedoms() -> None:
     for target in ("numpy", "cython"):
         end = model(head + '{s: {rate: "-s", initial: 2}}\n').compile(target=target).simulate((0, 1))["s"][-1]
         assert abs(end - 2 * np.exp(-1)) < 1e-7, end
-        model(head + '{s: {sampled: "0.5*s+1", period: 0.1, initial: 2}}\n').compile(target=target).simulate((0, 1))
+        text = head + '{s: {sampled: "0.5*s+1", period: 0.1, initial: 4}}\n'
+        end = model(text).compile(target=target).simulate((0, 0.25))["s"][-1]
+        assert end == 2 + 2 / 2**3  # samples at 0, 0.1 and 0.2 s
 
 
 def test_limits_of_urdf_at_infinity() -> None:
@@ -324,6 +317,14 @@ def test_documents_are_well_formed() -> None:
     assert not bad, bad
 
 
+def test_sliding_is_seen() -> None:
+    """A force that changes sign with the velocity holds the state where it jumps: refused, over a short span too."""
+    mod = model(SPRING.replace("u - c*q_dot - k*q", '"where(q_dot > 0, -4, 4)"')).compile()
+    for more in ({}, {"t_eval": [0, 0.05]}):
+        with pytest.raises(eg.SimulationError):
+            mod.simulate((0, 0.05), **more)
+
+
 def test_latex_of_loops() -> None:
     """No double superscript in LaTeX, whatever the joints are called (here B and P beside the projection)."""
     m = model("""name: six
@@ -345,7 +346,7 @@ independent: [theta]
 initial: {theta: 0.5}
 guess: {psi: 1.8, phi: 2.5}
 """)
-    text = m.derive()._repr_latex_() or ""
+    text = m.derive()._repr_latex_()
     assert "}^T M_t" not in text or "}^{\\ast}^T" not in text, "double superscript"
 
 
@@ -368,9 +369,8 @@ def test_advice_keeps_the_mechanism() -> None:
     whole = {"g0", "g1", "g2"}
     notes = " ".join(map(str, epicyclic(whole).notes))
     advice = re.search(r"leave ([\w, ]+?) out", notes)
-    if advice:
-        n = epicyclic(whole - set(re.findall(r"g\d", advice.group(1)))).degrees_of_freedom
-        assert n == 1, f"following the note: {n} degrees of freedom"
+    left_out = set(re.findall(r"g\d", advice.group(1))) if advice else set()
+    assert epicyclic(whole - left_out).degrees_of_freedom == 1
 
 
 def test_damaged_results() -> None:
@@ -382,7 +382,7 @@ def test_damaged_results() -> None:
         for k in list(arrays):
             changed = {("x" + a if a == k else a): v for a, v in arrays.items()}
             np.savez(f"{d}/b.npz", **changed)
-            with contextlib.suppress(eg.EomgenError):
+            with pytest.raises(eg.UsageError):
                 eg.load_trajectory(f"{d}/b.npz")
 
 
@@ -401,11 +401,7 @@ def test_auxiliary_forces_that_act() -> None:
     kane.kanes_equations(
         [Particle("b", point, m)], [(point, (normal - m * g) * frame.y + (push - mu * normal) * frame.x)]
     )
-    try:
-        mod = eg.from_sympy(kane, "box", parameters={m: 2.0, mu: 0.3, g: 9.81}).compile(target="numpy")
-    except eg.EomgenError as e:
-        assert "auxiliary" in str(e).lower(), e
-        return
+    mod = eg.from_sympy(kane, "box", parameters={m: 2.0, mu: 0.3, g: 9.81}).compile(target="numpy")
     assert "normal" not in mod.u_names
     assert "g" in mod.p_names
     got = mod.rhs(0.0, mod.x0({"u": 1.0}), u={"push": 20.0})[-1]
@@ -482,13 +478,10 @@ def test_parameters_without_a_value() -> None:
     for name in ("g", "l", "m"):
         m.parameter(name)
     m.revolute("J", m.ground, m.body("b", mass="m", com=(0, "-l", 0)), coordinate="q")
-    try:
-        mod = m.compile(target="numpy")
-    except eg.EomgenError as e:
-        assert "bind" not in str(e), e
-    else:
-        a = mod.rhs(0.0, [0.1, 0.0], p={"g": 9.81, "l": 1.0, "m": 1.0})[1]
-        assert abs(a + 9.81 * np.sin(0.1)) < 1e-12
+    with pytest.raises(eg.ModelError) as told:
+        m.compile(target="numpy")
+    assert [problem.path for problem in told.value.problems] == ["parameters.g", "parameters.l", "parameters.m"]
+    assert "bind" not in str(told.value)
 
 
 def test_weld_of_mjcf_without_torque() -> None:
@@ -528,7 +521,7 @@ def test_leftovers_in_robot_files() -> None:
         '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
         '<axis xyz="0 0 1"/></joint><xacro:imu_sensor name="x"/></robot>'
     )
-    model(text, ".urdf").check()
+    assert any("xacro" in note for note in model(text, ".urdf").notes)
     text = (
         '<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body><body name="post">'
         '<geom size=".1" pos="2 0 0"/></body>'
