@@ -78,7 +78,7 @@ class Copy:
             cwd=self.root, env=self._environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         ) as process:  # fmt: skip
             try:
-                text, code = process.communicate(timeout=LIMIT)[0], process.returncode
+                text, code = process.communicate(timeout=LIMIT if first else 20.0 * LIMIT)[0], process.returncode
             except subprocess.TimeoutExpired:
                 process.kill()
                 text, code = process.communicate()[0], -1
