@@ -110,18 +110,18 @@ class Tyre(Force):
         up = vec.scale(1.0 / upright, vec.sub(normal, vec.scale(tilt, axis)))  # in the wheel's plane
         along = vec.scale(1.0 / upright, vec.cross(axis, normal))
         across = vec.cross(normal, along)
-        spin = view.angular_velocity(self.wheel)
-        turning = vec.sub(spin, vec.scale(vec.dot(spin, axis), axis))  # of the carcass, which does not spin
+        whirl = view.angular_velocity(self.road)
+        spin = vec.sub(view.angular_velocity(self.wheel), whirl)  # against the road, as all that follows
+        omega = vec.dot(spin, axis)
+        turning = vec.sub(spin, vec.scale(omega, axis))  # of the carcass, which does not spin
         arm = height / upright
         lowest, patch = vec.scale(-self.radius, up), vec.scale(-arm, up)
-        whirl = view.angular_velocity(self.road)
+        moving = vec.sub(view.velocity(self.wheel), vec.add(view.velocity(self.road), vec.cross(whirl, reach)))
 
         def over_road(place: Vec3) -> Vec3:
-            own = vec.add(view.velocity(self.wheel), vec.cross(turning, place))
-            return vec.sub(own, vec.add(view.velocity(self.road), vec.cross(whirl, vec.add(reach, place))))
+            return vec.add(moving, vec.cross(turning, place))
 
         velocity = over_road(patch)
-        omega = vec.dot(vec.sub(spin, whirl), axis)
         return _WheelMotion(
             normal,
             along,

@@ -341,3 +341,20 @@ def test_forces_pass_smoothly_through_a_standstill(law: dict[str, Any]) -> None:
     x[forward] = 0.02  # its own velocity of reversal is 0.1
     wanted = differences(mod, x)
     np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_a_road_that_pitches_slips_as_a_wheel_that_is_carried_round_it() -> None:
+    """Only the motion of the wheel against the road counts."""
+    law = {"radius": 0.3, "stiffness": 2e5, "relaxation": (0.3, 0.3), "law": "brush"}
+    rates = []
+    for rocked in ("road", "arm"):
+        m = eg.Model("pitching", gravity=(0, 0, 0))
+        body = m.body(rocked, mass=1, inertia=(1, 1, 1))
+        m.revolute("rock", m.ground, body, axis="y")
+        road, base = (body, m.ground) if rocked == "road" else (m.ground, body)
+        m.revolute("spin", base.at(0, 0, 0.28), m.body("wheel", mass=20, inertia=(0.5, 0.9, 0.5)), axis="y")
+        m.tyre("tyre", road, "wheel", slip_stiffness=6e4, friction=0.9, **law)
+        mod = m.compile(target="numpy")
+        rate = mod.rhs(0.0, mod.x0(rock_dot=2.0 if rocked == "road" else -2.0))
+        rates.append(rate[mod.x_names.index("tyre_deflection_x")])
+    assert rates[0] == pytest.approx(rates[1], rel=1e-12)

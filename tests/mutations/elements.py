@@ -258,8 +258,8 @@ FAULTS = (
     ),
     Fault(
         "tyre-turning-road", "eomgen/forces/tyres.py",
-        "vec.cross(whirl, vec.add(reach, place))",
-        "vec.cross(whirl, reach)",
+        "spin = vec.sub(view.angular_velocity(self.wheel), whirl)",
+        "spin = view.angular_velocity(self.wheel)",
         "a road that turns moves under the wheel's centre, not where it touches",
         ("tests/forces/test_tyres.py::test_a_road_that_rocks_about_the_patch_does_not_slip",),
     ),
