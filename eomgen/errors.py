@@ -40,7 +40,7 @@ from .texts import shortened, visible
 #: What kinds of faults there are: the ``code`` of every error and problem, which stays as it is when texts change.
 CODES = {
     "EG-USAGE": "A call or a command line is not of the form it must have.",
-    "EG-UNSUPPORTED": "The model, the method or the target cannot do what is asked.",
+    "EG-UNSUPPORTED": "The model, the method or the target does not support this.",
     "EG-NAME-UNKNOWN": "Nothing has the name that is given.",
     "EG-NAME-TAKEN": "A name is that of something else already, or reserved.",
     "EG-NAME-FORM": "A text cannot be a name.",
@@ -68,7 +68,7 @@ CODES = {
     "EG-LOOP-OPEN": "The loops do not close from the guess.",
     "EG-CONTRADICTION": "Given values contradict each other, or the constraints.",
     "EG-REDUNDANT": "A constraint or a driver has no effect, or repeats others.",
-    "EG-UNDETERMINED": "What is given does not determine what is asked.",
+    "EG-UNDETERMINED": "The given values do not determine the result.",
     "EG-PARTITION": "The chosen coordinates are not independent.",
     "EG-INERTIA": "No body can have the inertia that is given.",
     "EG-NO-INERTIA": "A motion has no inertia behind it.",
