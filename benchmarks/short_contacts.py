@@ -14,7 +14,7 @@ import numpy as np
 import eomgen as eg
 
 KINDS = ("circle", "segment", "polygon")
-METHODS = ("DOP853", "RK45", "RK23", "Radau")
+METHODS = ("DOP853", "RK45", "Radau")
 GRAZING = 0.02  #: depth, relative to the thinner of the two, from which on the ball has to be turned
 
 

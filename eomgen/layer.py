@@ -34,7 +34,7 @@ LAYER = {
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
-    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
+    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "_contacts.pxi": ("cython/_contacts.pxi",),
     "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),

@@ -29,8 +29,8 @@ OPTIONS = {
     "; give limits={name: ..}": "",
     "method='embedding'": "--method embedding",
     "method='moreau'": "--solver moreau",
-    "leave dense_output out and give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code": "leave --plot out, "
-    "or take --solver DOP853, RK45, RK23 or Radau with --target cython",
+    "leave dense_output out and give t_eval, or take DOP853, RK45 or Radau in compiled code": "leave --plot out, "
+    "or take --solver DOP853, RK45 or Radau with --target cython",
 }
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])

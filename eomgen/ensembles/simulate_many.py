@@ -85,8 +85,7 @@ def simulate_many(
     count : int, optional
         Number of runs, needed if no array gives it.
     method : str, optional
-        DOP853, RK45, RK23, RK4, Radau and Taylor run in compiled code; other methods of ``simulate`` one run after the
-        other.
+        DOP853, RK45, RK4, Radau and Taylor run in compiled code; other methods of ``simulate`` one run after the other.
     t_eval : (m,) array, optional
         Times to store; the end alone by default.
     events : str, list of str, or mapping of names to expressions, optional

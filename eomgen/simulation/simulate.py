@@ -88,9 +88,9 @@ def simulate(
         Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) are derived from it; for a
         function without a method ``derivative`` they must be given too.
     method : str or OdeSolver subclass, optional
-        A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
-        with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
-        velocities) each step of the first three starts on the constraints where the last came near
+        A method of SciPy: DOP853 (default), RK45, Radau (stiff), RK23, BDF, LSODA.  The first three run in compiled
+        code with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
+        velocities) each step of the first two starts on the constraints where the last came near
         them.  Implicit ones get the exact Jacobian.  In compiled code only: RK4, which takes steps of one size, and
         Taylor, of orders up to 23, for smooth trees of a few bodies at tight tolerances.  moreau takes contacts between
         groups as rigid, with Coulomb's friction, in steps of one size.

@@ -55,7 +55,7 @@ class Pause:
         if dense:
             raise cannot(
                 f"a checkpoint of a run by SciPy's {name} keeps no continuous solution: leave dense_output out and "
-                "give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code"
+                "give t_eval, or take DOP853, RK45 or Radau in compiled code"
             )
         self.checkpoint, self.names, self.carried = checkpoint, STATE[name], dict[str, Any]()
         self.due = perf_counter() + checkpoint.every

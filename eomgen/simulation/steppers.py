@@ -45,7 +45,7 @@ def solver_class(core: Any, name: str) -> Any:
     ----------
     core : Core
         Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'RK23', 'Radau', 'Taylor'}
+    name : {'DOP853', 'RK45', 'Radau', 'Taylor'}
 
     Raises
     ------

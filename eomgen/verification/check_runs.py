@@ -34,7 +34,7 @@ from .finding import RIGID, Finding
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
-ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
+ORDERS = {"RK4": 4, "RK45": 5, "DOP853": 8}
 #: By how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others.
 SHORT = 0.5
 SAME_STEP = 0.1  #: distance of the ends of two steps that are one method's, in their error

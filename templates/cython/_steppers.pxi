@@ -49,7 +49,7 @@ cdef extern from "eomgen_steppers.h" nogil:
         const char *name
         int rows_K, rows_F, error_order, squares, expands
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor
+    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor
     long eomgen_further(const eomgen_method *, long, const eomgen_series *)
     const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
@@ -62,20 +62,20 @@ cdef extern from "eomgen_steppers.h" nogil:
     const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
-cdef method_pointer[6] METHODS
-METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
-METHODS[3], METHODS[4], METHODS[5] = &eomgen_rk4, &eomgen_radau, &eomgen_taylor
-for _index in range(3 if "rhs" in names else 0):  # once: to ask the processor may take longer than a short run
+cdef method_pointer[5] METHODS
+METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk4
+METHODS[3], METHODS[4] = &eomgen_radau, &eomgen_taylor
+for _index in range(2 if "rhs" in names else 0):  # once: to ask the processor may take longer than a short run
     METHODS[_index] = eomgen_suited(METHODS[_index], MODEL.kernels[find("rhs", ValueError)].n_in)
 
 
-_TITLES = [METHODS[_index].name.decode() for _index in range(6)]
+_TITLES = [METHODS[_index].name.decode() for _index in range(5)]
 
 
 cdef method_pointer find_method(str name) except NULL:
     """The method of a name, with what it needs of the model."""
     cdef int i
-    for i in range(6):
+    for i in range(5):
         if name == _TITLES[i] and name in methods:
             if METHODS[i].expands and seen_series(SERIES) == NULL:
                 take_lanes()
@@ -89,7 +89,7 @@ cdef method_pointer find_method(str name) except NULL:
 
 
 methods = tuple([
-    METHODS[i].name.decode() for i in range(6)
+    METHODS[i].name.decode() for i in range(5)
     if (METHODS[i].squares == 0 or "jacobian" in names) and (not METHODS[i].expands or HAS_SERIES)
 ])
 

@@ -35,7 +35,7 @@ def mixed(copies: int) -> Any:
 
 
 @pytest.mark.parametrize("copies", [1, 3], ids=["few states", "many states"])
-@pytest.mark.parametrize("method", ["DOP853", "RK45", "RK23", "Radau"])
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau"])
 def test_steps_are_those_of_scipy(method: str, copies: int) -> None:
     """Times of the steps, states at their ends and between, and how often the rates were asked for."""
     mod = mixed(copies)
@@ -133,7 +133,7 @@ def test_after_a_reset_rates_are_those_of_the_new_state() -> None:
     hits = fall + np.concatenate([[0.0], np.cumsum(2 * speed * 0.9 ** np.arange(1, 20) / 9.81)])
     k = int((hits < 4.0).sum())
     after, up = 4.0 - hits[k - 1], speed * 0.9**k
-    for method in ("DOP853", "RK45", "RK23"):
+    for method in ("DOP853", "RK45"):
         run = mod.simulate(4.0, method=method, rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(run.t_events["floor"], hits[:k], atol=1e-9)
         assert run["h"][-1] == pytest.approx(up * after - 9.81 * after**2 / 2, abs=1e-8)
@@ -175,7 +175,7 @@ def test_tables_are_read_as_scipy_reads_them(kind: str) -> None:
 
 COUNT, SLOPE, LATE = 7, 0.6, 0.4
 SAMPLES = np.linspace(0.0, 3.0, 13)
-LANES = {"DOP853": 1e-8, "RK45": 1e-8, "RK23": 1e-6, "Taylor": 1e-10}
+LANES = {"DOP853": 1e-8, "RK45": 1e-8, "Taylor": 1e-10}
 
 
 @cache
@@ -205,13 +205,17 @@ def swings(k: int, forced: bool) -> np.ndarray:
     [*((False, method) for method in LANES), *((True, method) for method in LANES if method != "Taylor")],
 )
 def test_every_run_of_an_ensemble_has_its_own_closed_form(method: str, forced: bool) -> None:
-    """With about as many steps as SciPy takes: those of lanes are a ninth shorter, so that fewer are rejected."""
+    """With about as many steps as SciPy takes: those of lanes are a ninth shorter, so that fewer are rejected.
+
+    The first step is too long and is tried again.
+    """
     mod, rtol = oscillator(), LANES[method]
     k = np.arange(COUNT)
     ramp = {"u": eg.Signal([0.0, LATE, 10.0], [0.0, 0.0, SLOPE * (10.0 - LATE)], "linear")}
     runs = mod.simulate_many(
         3.0, {"x": 1.0 - 0.2 * k, "x_dot": 0.5 * k}, parameters={"k": 2.0 + 5.0 * k},
         inputs=ramp if forced else {"u": 0.3 * k}, method=method, t_eval=SAMPLES, rtol=rtol, atol=1e-9,
+        first_step=1.5,
     )  # fmt: skip
     assert runs.ok.all()
     for one in range(COUNT):
@@ -224,6 +228,6 @@ def test_every_run_of_an_ensemble_has_its_own_closed_form(method: str, forced: b
             continue
         judge = solve_ivp(
             lambda t, x, one=one: [x[1], 0.3 * one - (2.0 + 5.0 * one) * x[0]], (0.0, 3.0),
-            [1.0 - 0.2 * one, 0.5 * one], method, rtol=rtol, atol=1e-9,
+            [1.0 - 0.2 * one, 0.5 * one], method, rtol=rtol, atol=1e-9, first_step=1.5,
         )  # fmt: skip
         assert 0.95 * (len(judge.t) - 1) <= runs.steps[one] <= 1.2 * (len(judge.t) - 1) + 2

@@ -17,7 +17,7 @@ from sweeps import part_of
 import eomgen as eg
 from benchmarks.short_contacts import GRAZING, judge, model, shot
 
-COMPILED = ("DOP853", "RK45", "RK23", "Radau")
+COMPILED = ("DOP853", "RK45", "Radau")
 SPEED = 20.0
 
 
@@ -35,7 +35,7 @@ def wall(target: str) -> Any:
 @pytest.mark.parametrize(
     ("target", "method", "way"),
     [
-        *(("cython", name, 1.0) for name in (*COMPILED, "BDF", "LSODA")),
+        *(("cython", name, 1.0) for name in (*COMPILED, "RK23", "BDF", "LSODA")),
         ("cython", "DOP853", -1.0),
         ("numpy", "RK45", 1.0),
     ],
@@ -76,7 +76,7 @@ def test_random_shots_are_turned_where_they_touch(kind: str) -> None:
     module, rng, touched = model(kind).compile(optimize=0), np.random.default_rng(11), 0
     for k in range(35):
         one = shot(rng, kind)
-        turned, _ = judge(module, one, COMPILED[k % 4])
+        turned, _ = judge(module, one, COMPILED[k % 3])
         touched += one.depth > GRAZING
         assert turned > 1e-6 if one.depth > GRAZING else one.depth > 0 or turned < 1e-6, (k, one)
     assert touched > 25

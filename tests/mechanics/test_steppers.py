@@ -106,7 +106,7 @@ NAMES = (
     "rolling_disc",
     "bicycle",
 )
-TOLERANCES_agreement = {"DOP853": (1e-8, 1e-10), "RK45": (1e-7, 1e-9), "RK23": (1e-6, 1e-8)}
+TOLERANCES_agreement = {"DOP853": (1e-8, 1e-10), "RK45": (1e-7, 1e-9)}
 END = 2.0
 
 

@@ -15,8 +15,8 @@ import eomgen as eg
 
 G, E, END = 9.81, 0.9, 2.0
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
-COMPILED = ["RK23", "RK45", "DOP853", "Radau", "Taylor", "RK4"]
-STEPPED = ["RK45", "DOP853", "Radau", "BDF", "LSODA"]
+COMPILED = ["RK45", "DOP853", "Radau", "Taylor", "RK4"]
+STEPPED = ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 
 #: Error of the times of events: methods of low order keep fewer digits.
 ERROR = {"BDF": 2e-6, "LSODA": 1e-6, "RK23": 1e-7, "IDA": 1e-6, "sensitivities": 1e-6}

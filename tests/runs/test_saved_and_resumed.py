@@ -104,7 +104,6 @@ def go_through(module: Any, file: Path, killed: Callable[[int], None], kills: in
 COMPILED = [
     {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14},
     {"method": "RK45", "rtol": 1e-9, "t_eval": np.linspace(0, 60, 501)},
-    {"method": "RK23", "rtol": 1e-6, "dense_output": True},
     {"method": "Radau", "rtol": 1e-7, "dense_output": True, "t_eval": np.linspace(0, 60, 77)},
     {"method": "Taylor", "rtol": 1e-13, "events": {"low": "theta1", "fast": "bend_dot - 1"}},
     {"method": "RK4", "step": 5e-3},

@@ -10,7 +10,7 @@ from ...program import Program
 from ..sources import number_texts
 from .variables import coordinate_of, find_exact
 
-_METHODS = ("DOP853", "RK45", "RK23", "Radau")  #: those that co-simulation can run; DOP853 stands for others
+_METHODS = ("DOP853", "RK45", "Radau")  #: those that co-simulation can run; DOP853 stands for others
 _NO_LIMIT = 1e300  #: (s) of a step
 
 

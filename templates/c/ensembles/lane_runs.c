@@ -203,8 +203,8 @@ static flag accept_steps(lane_run *run, real error, int order)
 
 static const lane_method *find_method(const char *name)
 {
-    static const lane_method *const methods[] = { &lane_dop853, &lane_rk45, &lane_rk23, &lane_taylor };
-    for (int i = 0; i < 4; i++) {
+    static const lane_method *const methods[] = { &lane_dop853, &lane_rk45, &lane_taylor };
+    for (int i = 0; i < 3; i++) {
         if (strcmp(methods[i]->name, name) == 0) {
             return methods[i];
         }

@@ -90,7 +90,7 @@ static inline long eomgen_further(const eomgen_method *method, long n, const eom
     return (method->squares > 0 ? method->squares * n * n + 16 + n : 0) + (method->expands ? series->n_work : 0);
 }
 
-extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor;
+extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor;
 /* The same method for this processor and so many states, to the same bits. */
 const eomgen_method *eomgen_suited(const eomgen_method *method, int n);
 

@@ -50,9 +50,9 @@ static inline void measure(const eomgen_run *run, double *scale)
 
 const eomgen_method *eomgen_suited(const eomgen_method *method, int n)
 {
-    const eomgen_method *const plain[] = {&eomgen_dop853, &eomgen_rk45, &eomgen_rk23};
-    const eomgen_method *const wide[] = {&wide_dop853, &wide_rk45, &wide_rk23};
-    for (int k = 0; n >= WIDE_FROM && k < 3; k++) {
+    const eomgen_method *const plain[] = {&eomgen_dop853, &eomgen_rk45};
+    const eomgen_method *const wide[] = {&wide_dop853, &wide_rk45};
+    for (int k = 0; n >= WIDE_FROM && k < 2; k++) {
         if (method == plain[k] && eomgen_processor() != 0) {
             return wide[k];
         }
