@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mutations.fault import ROOT, Fault
+from mutations.fault import ROOT, Fault, read_sources
 
 FOLDERS = ("eomgen", "tests", "docs", "notebooks", "benchmarks")
 FILES = ("pyproject.toml", "README.md", "Makefile", "LICENSE")
@@ -70,7 +70,7 @@ class Copy:
             raise RuntimeError(f"the copy in {self.root} does not run its own sources: {done.stderr}")
 
     def run(self, tests: Sequence[str], *, first: bool = True) -> Outcome:
-        """Run tests in the copy, up to the first failure unless told otherwise."""
+        """Run tests in the copy, up to the first failure or all of them."""
         words = ["-p", "mutations.layers", "-q", "--tb=short", "-p", "no:cacheprovider", *(["-x"] if first else [])]
         start = time.monotonic()
         with subprocess.Popen(
@@ -83,20 +83,20 @@ class Copy:
                 process.kill()
                 text, code = process.communicate()[0], -1
         shutil.rmtree(self.root / "tmp", ignore_errors=True)
-        told = [line for line in text.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-        failed = [line.split(" ", 1)[1].split(" - ")[0] for line in told]
+        lines = [line for line in text.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+        failed = [line.split(" ", 1)[1].split(" - ")[0] for line in lines]
         return Outcome(code, time.monotonic() - start, failed[0] if failed else "", text)
 
     def run_with(self, fault: Fault, tests: Sequence[str]) -> Outcome:
         """The same with a fault, which is taken back afterwards."""
-        path = self.root / fault.file
-        before = path.read_text(encoding="utf-8")
+        texts = read_sources(self.root)
+        path, text = fault.apply(texts)
         try:
-            fault.apply(self.root)
+            path.write_text(text, encoding="utf-8")
             self._forget(path)
             return self.run(tests)
         finally:
-            path.write_text(before, encoding="utf-8")
+            path.write_text(texts[path], encoding="utf-8")
             self._forget(path)
 
     @staticmethod

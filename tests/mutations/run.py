@@ -29,7 +29,7 @@ HEAD = """# Deliberate faults and the tests that caught them
 
 Written by `make mutations` (`python tests/mutations/run.py`), which puts each fault into a copy of the sources.
 
-| fault | file | what it breaks | caught by | s |
+| fault | where | what it breaks | caught by | s |
 |---|---|---|---|---|
 """
 
@@ -82,7 +82,7 @@ def write_table(outcomes: Sequence[tuple[Fault, Outcome]]) -> None:
     lines = []
     for fault, outcome in outcomes:
         by = f"`{outcome.by}`" if outcome.code == FAILED else "**nobody**"
-        lines.append(f"| {fault.id} | `{fault.file}` | {fault.breaks} | {by} | {outcome.seconds:.0f} |")
+        lines.append(f"| {fault.id} | `{fault.where}` | {fault.breaks} | {by} | {outcome.seconds:.0f} |")
     RESULTS.write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
 
 
