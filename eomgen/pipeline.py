@@ -126,11 +126,25 @@ def derive_as(
     baumgarte: tuple[float, float] | None = None,
 ) -> Derived:
     """The same as a result of another type."""
+    start = perf_counter()
+    with alone():
+        mechanism = model.mechanism()
+    return derive_mechanism(kind, mechanism, method, independent, baumgarte, perf_counter() - start)
+
+
+@np.errstate(all="ignore")
+def derive_mechanism(
+    kind: type[Derived],
+    mechanism: Mechanism,
+    method: str,
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+    described: float = 0.0,
+) -> Derived:
+    """The equations of motion of what a model says; ``described`` is the time (s) that reading it took."""
     from .program.choice import choose
 
-    seconds: dict[str, float] = {}
-    with alone(), _timed(seconds, "describe"):
-        mechanism = model.mechanism()
+    seconds = {"describe": described}
     chosen = choose_method(mechanism, method)
     with alone(), _timed(seconds, "kinematics"):
         plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip

@@ -115,24 +115,6 @@ def components() -> Any:
 
 
 @picture
-def invariance() -> Any:
-    """One slider-crank, described in two sets of body frames."""
-    figure, axes = panels(2, 1, size=(6.0, 4.2))
-    for turn, ax in zip((0.0, 0.6), axes, strict=True):
-        m = eg.Model("slider_crank")
-        crank, rod, slider = (m.body(n, mass=1, inertia={"zz": 0.01}) for n in ("crank", "rod", "slider"))
-        back = {"rpy": (0, 0, -turn)}
-        m.revolute("A", m.ground, crank.marker("a", at=(0, 0, 0), **back), coordinate="theta")
-        m.revolute("B", crank.marker("b", at=(0.1 * np.cos(turn), -0.1 * np.sin(turn), 0), **back), rod)
-        m.revolute("C", rod.at(0.35, 0, 0), slider)
-        m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
-        m.initial(theta=0.9)
-        m.compile(target="numpy").draw(ax=ax, axes=True)
-        ax.set_title("body frame of the crank " + ("turned by 0.6 rad" if turn else "along the crank"), fontsize=9)
-    return figure
-
-
-@picture
 def joints() -> Any:
     """Joints in a plane and in space."""
     figure = plt.figure(figsize=(7.2, 3.6), layout="constrained")

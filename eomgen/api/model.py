@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..describe.builder import Builder
-from ..describe.visit import copied
 from ..errors import too_large
 from ..files.inline_pictures import picture_html, side_by_side
 from ..simulation.progress import waiting
@@ -119,9 +118,7 @@ class Model(Builder):
         **options: Unpack[BuildOptions],
     ) -> Module:
         """Derive, generate and compile a module; see :meth:`~.equations.Equations.compile`."""
-        module = self.derive(method, independent, baumgarte).compile(target, **options)
-        module.description = copied(self._description)  # the model may change later
-        return module
+        return self.derive(method, independent, baumgarte).compile(target, **options)
 
 
 def from_sympy(

@@ -181,8 +181,6 @@ class Module(BoundModel):
         ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
     equations : Equations or None
         What the module was compiled from; None of a generated package.
-    description : Description or None
-        A copy of the model's description, as it was when this was compiled.
     minimal : Minimal
         The strictly minimal form, ``x = [q_i; v_i]``, if the model has one.
     canonical : Canonical

@@ -29,7 +29,6 @@ from .verb_run import complete_parameters, sort_settings
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
-    from ..api.model import Model
     from ..api.module import Module
 
 
@@ -39,7 +38,6 @@ class Prepared(NamedTuple):
     equations: Equations
     module: Module  #: with the parameters and inputs of ``--set`` bound
     initial: dict[str, float]  #: the values of ``--set`` that are coordinates or rates
-    model: Model  #: as it was described
 
     def heading(self, t: float) -> dict[str, Any]:
         """What every result of --json begins with."""
@@ -101,7 +99,7 @@ def prepare(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    return Prepared(equations, module.bind(parameters, inputs), initial, described)
+    return Prepared(equations, module.bind(parameters, inputs), initial)
 
 
 def pairs(values: Any) -> list[list[float]]:

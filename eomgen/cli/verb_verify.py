@@ -26,10 +26,8 @@ from .sections import verb_command
 )
 def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
     """Check a compiled model against independent computations; exit with 5 if a limit is broken."""
-    from ..verification.verify import verify_model
-
     with stage("verify"):
-        found = verify_model(work.model, work.module, states=states, seed=seed, seconds=seconds)
+        found = work.module.verify(states=states, seed=seed, seconds=seconds)
     if as_json:
         heading = {"name": work.equations.name, "method": work.equations.method}
         print_json(heading | found.as_dict() | {"seconds": round(found.seconds, 3)})

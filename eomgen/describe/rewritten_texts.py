@@ -93,11 +93,6 @@ def motions_of(value: Any) -> set[MarkerQuantity]:
     return found
 
 
-def is_zero(value: Any) -> bool:
-    """Whether a value is the number 0."""
-    return not isinstance(value, str) and float(value) == 0.0
-
-
 def scaled(value: Any, factor: float) -> Any:
     """A value times a number."""
     if not isinstance(value, str):
@@ -112,18 +107,6 @@ def total(factors: Sequence[float], values: Sequence[Any]) -> Any:
     if not texts:
         return float(known)
     return " + ".join([*(["" + repr(float(known))] if known else []), *(f"({text})" for text in texts)])
-
-
-def product(a: Any, b: Any) -> Any:
-    """The product of two values."""
-    if not isinstance(a, str):
-        return scaled(b, float(a))
-    return scaled(a, float(b)) if not isinstance(b, str) else f"({a})*({b})"
-
-
-def negative(value: Any) -> Any:
-    """A value with its sign changed."""
-    return scaled(value, -1.0) if not isinstance(value, str) else f"-({value})"
 
 
 def number_of(value: Any, parameters: Mapping[str, float]) -> float:

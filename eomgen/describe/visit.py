@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..marker_places import place_of_marker
-from .description import GROUND_NAME, DescribedEntry, Description
+from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MARKER, Field, Fields, fields_of
 
 
@@ -221,8 +221,3 @@ def _placed(body: str, placed: Any, slot: Slot, visitor: Visitor) -> Any:
     if isinstance(placed, Mapping):
         return visitor.placement(body, placed, slot)
     return visitor.placement(body, {"at": placed}, slot)
-
-
-def bodies_of(description: Description) -> list[DescribedEntry]:
-    """Entries of bodies, ground aside."""
-    return [entry for entry in description.sections["bodies"] if entry.name != GROUND_NAME]

@@ -27,14 +27,11 @@ COLLECTED = 1e3
 LOOSE = 1e6  #: tolerance that accepts every step
 LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
 SLOWEST = 1e-3  #: rate (1/s) below which nothing changes
-#: Tolerances of runs of a model written otherwise, and by how much their ends may differ.
-RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
 
 # -- states ----------------------------------------------------------------------------------------------------------
 CLOSED = 1e-9  #: scaled residual of a state that counts as closed
 #: Least part of the largest singular value of J, and of the freedoms' in coordinates, of a state that is regular.
 REGULAR = 1e-3
-DEPENDENT = 1e-9  #: part of the largest below which a singular value is that of a redundant row
 #: Rounding of a result over its size, at least: 45 eps.
 ROUNDED = 1e-14
 

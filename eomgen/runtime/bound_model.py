@@ -34,8 +34,6 @@ class BoundModel(Assembled, Momenta):
 
     #: what it was made from; None for a module of an exported package, or from a pickle
     equations: Any = None
-    #: the description of the model at the time of ``Model.compile``; None for a module that was made in another way
-    description: Any = None
 
     rhs: Timed
     jacobian: Timed
@@ -143,7 +141,6 @@ class BoundModel(Assembled, Momenta):
         layout = self.layout
         other = object.__new__(type(self))
         other.core, other.layout, other.equations = self.core, layout, self.equations
-        other.description = self.description
         new_p = layout.values("parameter", layout.p, p, self.p)
         other._setup(self.core, layout, new_p, layout.values("input", layout.u, u, self.u))
         return other

@@ -77,19 +77,30 @@ def _tree(bench: Bench, name: str) -> Finding:
     return found.finding()
 
 
+def true_accelerations(bench: Bench, k: int) -> tuple[Array, Array, float]:
+    """v' at a state in many digits, of M a + h + C_q^T l = 0 and C_q a + gamma = 0; what rounding allows, and the size.
+
+    Raises
+    ------
+    ZeroDivisionError
+        The system is singular.
+    """
+    truth = bench.truths[k]
+    a, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
+    own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
+    limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
+    return a, limit, max(size_of(a), size_of(own))
+
+
 def _accelerations(bench: Bench) -> Finding:
-    """v' of the motion against M a + h + C_q^T l = 0, C_q a + gamma = 0 solved in many digits."""
     found, n_q = Comparison(f"accelerations: {source(bench)}"), bench.module.n_q
     for k, truth in enumerate(bench.truths):
         try:
-            a, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+            a, limit, size = true_accelerations(bench, k)
         except ZeroDivisionError:
             return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
-        actual = bench.rhs(truth.case)
-        mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
-        own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
-        limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
-        found.add(k, actual[n_q:] - a, limit, max(size_of(a), size_of(own)), [f"{n}'" for n in bench.layout.v])
+        found.add(k, bench.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in bench.layout.v])
     return found.finding()
 
 

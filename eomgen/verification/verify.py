@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -47,8 +47,8 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     seed : int
         Of the states.
     seconds : float
-        Time for all checks.  Variants of the model (the same mechanism described differently) get the time that is
-        left, and at least 2 s; variants for which no time is left are counted.
+        Time for all checks.  Variants (the same mechanism described differently) get the time that is left, and at
+        least 2 s; variants for which no time is left are counted.
 
     Returns
     -------
@@ -68,16 +68,13 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     Notes
     -----
     A module that was compiled here is compared with its graph, with the graph in 50 digits, with Newton's and
-    Euler's equations of every body and with SciPy.  Where ``Model.compile`` made it, variants of the model are
-    compiled and compared with it too; with ``Equations.compile`` the model is not known, and they are left out.
-    One of an exported package is compared with the figures that came with it, and with itself.
+    Euler's equations of every body, with SciPy and with variants of its mechanism.  One of an exported package is
+    compared with the figures that came with it, and with itself.
     """
     states, seed = _read(states, seed, seconds)
     start = perf_counter()
     with told_by_the_caller():
-        found = _of_module(module, states, seed)
-    left = max(LEAST, seconds - (perf_counter() - start))
-    found += _variants(module, getattr(module, "description", None), seed, left)
+        found = _of_module(module, states, seed, start + seconds)
     return Verification(module.name, tuple(found), perf_counter() - start)
 
 
@@ -93,7 +90,7 @@ def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
     return most, read_count("verify: seed, of the random states,", seed)
 
 
-def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
+def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[Finding]:
     """What the module says of itself, and what follows from its equations."""
     if not module.n_x:
         return _of_fixed_bodies(module)
@@ -103,9 +100,9 @@ def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
     if equations is None:
         found += jacobians(module, cases)
         why = "they need the equations, and a package does not contain them: verify the model that it was made from"
-        found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
+        found.append(Finding.skipped("graph, free bodies, derivatives, runs, variants", why))
     else:
-        found += _with_equations(module, equations, cases)
+        found += _with_equations(module, equations, cases, seed, end)
     return found
 
 
@@ -120,50 +117,6 @@ def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
     ]
 
 
-def verify_model(
-    model: Any, module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS
-) -> Verification:
-    """:func:`verify` of a module, and what concerns the model that it was made from.
-
-    Parameters
-    ----------
-    model : Model
-    states, seed : int
-    seconds : float
-        Time for all of it; variants have what is left, and at least :data:`LEAST`.
-    """
-    states, seed = _read(states, seed, seconds)
-    start = perf_counter()
-    with told_by_the_caller():
-        found = _of_module(module, states, seed)
-    found += _variants(module, model, seed, max(LEAST, seconds - (perf_counter() - start)))
-    return Verification(module.name, tuple(found), perf_counter() - start)
-
-
-def _variants(module: BoundModel, model: Any, seed: int, seconds: float) -> list[Finding]:
-    """Variants of a model or description; left out where it is not known or has no motion to compare."""
-    check = "variants: the same mechanism described differently"
-    if model is None:
-        return [
-            Finding.skipped(
-                check, "the description of the model is not known: compile with Model.compile, or use eomgen verify"
-            )
-        ]
-    if module.metadata.get("no_inertia"):
-        return [Finding.skipped(check, "the model is for kinematics only")]
-    if not module.n_x:
-        return [Finding.skipped(check, "the model has no coordinate")]
-    if why := _only_in_c(getattr(module, "equations", None)):
-        return [Finding.skipped(check, why)]
-    from .variants import variant_findings
-
-    try:
-        with told_by_the_caller():
-            return variant_findings(model, seed=seed, seconds=seconds)
-    except EomgenError as error:
-        return [failed(check, error)]
-
-
 def _only_in_c(equations: Derivation | None) -> str:
     """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
     functions = equations.kinematics.graph.functions.values() if equations is not None else ()
@@ -171,11 +124,13 @@ def _only_in_c(equations: Derivation | None) -> str:
     return f"{', '.join(blind)} is C code without a Python version, so nothing else can evaluate it" if blind else ""
 
 
-def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]) -> list[Finding]:
-    """All groups; one that cannot be carried out fails."""
+def _with_equations(
+    module: BoundModel, equations: Derivation, cases: list[Case], seed: int, end: float
+) -> list[Finding]:
+    """All groups, and variants until a time; one that cannot be carried out fails."""
     why = _only_in_c(equations)
     if why:
-        return [Finding.skipped("graph, free bodies, derivatives, runs", why)]
+        return [Finding.skipped("graph, free bodies, derivatives, runs, variants", why)]
     from ..equations.digits_kept import FREE, note_lost_digits, smallest_share
     from .bench import Bench
 
@@ -184,7 +139,7 @@ def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]
     idle = module.metadata.get("no_inertia")
     if idle:
         why = f"the model is for kinematics only: {idle}"
-        found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs", why))
+        found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs, variants", why))
     elif equations.method not in FREE and (note := note_lost_digits(*parts)):
         share = smallest_share(*parts)
         found.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
@@ -194,4 +149,8 @@ def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]
             found += check(bench)
         except (EomgenError, ArithmeticError) as error:
             found.append(failed(f"checks of {group}", error))
+    if not idle:
+        from .variants import variant_findings
+
+        found += variant_findings(bench, max(LEAST, end - perf_counter()), seed)
     return found

@@ -14,7 +14,7 @@ import models
 import numpy as np
 import pytest
 from command import run
-from sweeps import COVERING, part_of
+from sweeps import COVERING, METHODS, part_of
 
 import eomgen as eg
 from eomgen.generation import generate
@@ -75,6 +75,16 @@ def test_correct_models_have_no_breach(make: Callable[[], eg.Model]) -> None:
     assert any(not f.left_out for f in found.findings)
     if make is ball:  # runs with events that reset are left out, with the reason
         assert all(f.left_out and "reset" in f.note for f in found.findings if f.check.startswith("steppers"))
+
+
+def test_a_loop_is_compared_with_itself_in_other_frames_cuts_and_methods() -> None:
+    module = models.build("four_bar").compile("embedding", target="numpy")
+    found = module.verify(states=1, seconds=60.0)
+    variants = {f.check.removeprefix("variants: "): f for f in found.findings if f.check.startswith("variants: ")}
+    methods = {f"method {name}" for name in METHODS[1:]}
+    assert {*variants} == {"body frames turned", "another joint cut", "target numpy", *methods}
+    assert {name for name, f in variants.items() if f.left_out} == {"target numpy"}  # which it is itself
+    assert all(f.worst <= f.limit < 1e-9 for f in variants.values() if not f.left_out)
 
 
 @pytest.mark.thorough
