@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 import eomgen as eg
+from eomgen.base.files import example_files, find_example
 from eomgen.runtime.refined import states_at
-from eomgen.shipped import example_files, find_example
 from eomgen.show.film_frames import Frames
 from eomgen.show.palettes import indices_in, palette_of
 from eomgen.show.shown_motion import moving_scene, sample

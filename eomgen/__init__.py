@@ -101,7 +101,7 @@ def _late(name: str) -> Any:
         near = (
             ""
             if name.startswith("_")
-            else import_module(".suggestions", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
+            else import_module(".base.names", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
         )
         text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
         raise import_module(".errors", __name__).UnavailableError(text)

@@ -7,8 +7,8 @@ from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
+from .base.texts import fold
 from .equations import TreeEquations
-from .files.terminal import fold
 from .graph.copies import copied
 from .graph.core import Expr
 from .graph.count import Operations, count

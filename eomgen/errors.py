@@ -35,7 +35,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from .texts import shortened, visible
+from .base.texts import shortened, visible
 
 #: What kinds of faults there are: the ``code`` of every error and problem, which stays as it is when texts change.
 CODES = {

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .base.files import as_path
 from .emit import emit_package
 from .emit.write import write_package
 from .errors import EomgenError, cannot
-from .files.path_names import as_path
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
 from .targets import find_target

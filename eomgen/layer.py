@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
-from .limits.in_c import definitions
-from .operations import tape_rows
-from .shipped import shipped
+from .base.files import shipped
+from .base.limits.in_c import definitions
+from .base.operations import tape_rows
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (

@@ -7,13 +7,12 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Unpack
 
 from .api.model import Model
+from .base.files import as_name, example_files, find_example
+from .base.names import hint
+from .base.texts import shown
 from .describe import describe_yaml_file
 from .errors import ModelError, at_odds, bad_file, no_choice, no_such
-from .files.path_names import as_name
 from .numeric.rigid_inertia import CHECKS, word_of_check
-from .shipped import example_files, find_example
-from .suggestions import hint
-from .texts import shown
 
 if TYPE_CHECKING:
     from .runtime.option_types import LoadOptions, RobotKeywords

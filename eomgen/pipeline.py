@@ -15,6 +15,7 @@ import numpy as np
 
 from . import __version__
 from .alone import alone
+from .base.texts import shown
 from .derivation import Derivation
 from .describe.dotted_names import Undotted
 from .describe.sympy_face import names_of
@@ -38,7 +39,6 @@ from .kinematics.other_branches import other_branches
 from .kinematics.report import MechanismReport, report
 from .runtime.near_names import read_names, unknown
 from .targets import TARGETS, find_target
-from .texts import shown
 
 if TYPE_CHECKING:
     from .describe.builder import Builder

@@ -61,7 +61,7 @@ class Target(NamedTuple):
     precisions : bool
         Whether its numbers may be of single precision.
     kernels : tuple of str
-        The functions it has, of :data:`~.kernel_table.KERNELS`; all if empty.
+        The functions it has, of :data:`~.base.kernel_table.KERNELS`; all if empty.
     whole : str
         "file.function" of (equations, directory, version) that writes one file instead of a package.
     """

@@ -7,9 +7,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from . import pipeline
+from .base.files import find_module, load_source
 from .emit.traced import LIBRARIES, emit_traced
 from .errors import MissingDependencyError
-from .files.source import find_module, load_source
 
 if TYPE_CHECKING:
     from .derivation import Derivation

@@ -20,12 +20,11 @@ ROOMS = {
     "mechanics": "constraints derivation equations frames joints kinematics rotations solids",
     "forces": "elements forces",
     "runs": "analysis ensembles identification runtime simulation",
-    "model": "describe instance_names loading marker_places robots suggestions",
-    "code": "compilation cuda_functions device emit files fmu generation kernel_table layer program shipped targets "
-    "traced_functions",
-    "shown": "cli explain notation printing reading show",
-    "core": "alone graph numeric operations pipeline records simplify syntax_trees verification",
-    "attack": "describe files robots texts",
+    "model": "base describe loading robots",
+    "code": "base compilation cuda_functions device emit fmu generation layer program targets traced_functions",
+    "shown": "base cli explain printing reading show",
+    "core": "alone base graph numeric pipeline records simplify syntax_trees verification",
+    "attack": "base describe robots",
 }
 #: Scripts that made reference numbers with other programs, which need not be installed.
 collect_ignore_glob = ["reference/*.py"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.files import ownership
+from eomgen.base import files as ownership
 
 STRANGER = 12345  #: a user id that nobody has
 

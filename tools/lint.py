@@ -21,7 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 #: Nothing that executes or parses code by other means than eomgen's own parser is called.
 FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
-#: Numbers below this are limits, which stand in eomgen/limits alone; numbers in formulas, such as 1/720, are larger.
+#: Numbers below this are limits, which stand in base/limits alone; numbers in formulas, such as 1/720, are larger.
 SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
@@ -57,15 +57,15 @@ def forbidden() -> Iterator[str]:
 
 
 def limits() -> Iterator[str]:
-    """Limits that do not stand in eomgen/limits; files in C take theirs from there by name."""
+    """Limits that do not stand in eomgen/base/limits; files in C take theirs from there by name."""
     for name, nodes in NODES.items():
-        if name.startswith("eomgen.limits"):
+        if name.startswith("eomgen.base.limits"):
             continue
         floats = {n.value for n in nodes if isinstance(n, ast.Constant) and type(n.value) is float}
         small = {x for x in floats if 0.0 < abs(x) < SMALL}
         if small != NO_LIMITS.get(str(FILES[name].relative_to(ROOT / "eomgen")), set()):
-            yield f"{name}: limits outside eomgen/limits, or no longer there: {small}"
-    definitions = import_module("eomgen.limits.in_c").definitions
+            yield f"{name}: limits outside eomgen/base/limits, or no longer there: {small}"
+    definitions = import_module("eomgen.base.limits.in_c").definitions
     for folder, pattern in (
         ("drivers", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
         ("ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
@@ -113,6 +113,7 @@ def directions() -> Iterator[str]:
     for name, others in graph.items():
         for other in others:
             here, there = ((f"{one}.").split(".")[1] for one in (name, other))
+            here, there = ("base" if one == "errors" else one for one in (here, there))  # one floor
             if here != there and here not in ("", "__main__") and there and rows[there] >= rows[here]:
                 yield f"{name} imports {other}, which stands in the same row of ARCHITECTURE.md or above"
 

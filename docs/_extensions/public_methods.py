@@ -12,7 +12,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
 
 import eomgen
-import eomgen.limits as eomgen_limits
+import eomgen.base.limits as eomgen_limits
 from eomgen.constraints import CONSTRAINTS
 from eomgen.errors import CODES
 from eomgen.forces import FORCES
@@ -79,13 +79,13 @@ class Codes(SphinxDirective):
 
 
 class Limits(SphinxDirective):
-    """``{eomgen-limits}``: every number of :mod:`eomgen.limits`, by the file it is in."""
+    """``{eomgen-limits}``: every number of :mod:`eomgen.base.limits`, by the file it is in."""
 
     def run(self) -> list[nodes.Node]:
         """The nodes in place of the directive."""
         text = ""
         for found in pkgutil.iter_modules(eomgen_limits.__path__):
-            name = f"eomgen.limits.{found.name}"
+            name = f"eomgen.base.limits.{found.name}"
             text += f"\n### {found.name}\n\n" + _rst(
                 [f".. automodule:: {name}", "   :members:", "   :member-order: bysource"]
             )

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import STATE
-from ..limits.rounding import TINY
-from ..limits.statics import DISPLACED
+from ..base.limits.analyses import DISPLACED
+from ..base.limits.constraints import STATE
+from ..base.limits.numbers import TINY
 from ..numeric import algebra
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base.limits.analyses import MOVING
 from ..errors import EquilibriumError
-from ..limits.statics import MOVING
 from ..numeric.scales import Array
 from .newton import marquardt, newton
 from .search import Search, SearchPoint

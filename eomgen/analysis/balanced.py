@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..limits.constraints import STATE
-from ..limits.statics import DIFFERENCES
+from ..base.limits.analyses import DIFFERENCES
+from ..base.limits.constraints import STATE
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.constraint_kernels import constraint_system

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..limits.motions import ASTRAY
+from ..base.limits.analyses import ASTRAY
 from ..numeric.curves import Point
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.texts import shown
 from ..errors import ill_typed, off_range
 from ..runtime.given_start import Start
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_number, read_numbers
-from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic import complete, start_from

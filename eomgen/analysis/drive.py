@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.analyses import AFFINE, REACHED, REMAINDER, WELL_ABOVE
+from ..base.limits.constraints import STATE as RANK
+from ..base.limits.numbers import TINY
+from ..base.names import hint, joined
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
-from ..limits.constraints import STATE as RANK
-from ..limits.rounding import TINY
-from ..limits.statics import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
@@ -26,7 +27,6 @@ from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.refusals import refuse_reaction_laws, refuse_states
 from ..runtime.room import read_numbers
-from ..suggestions import hint, joined
 from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from .tables import as_text
 

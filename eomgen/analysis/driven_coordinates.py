@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.limits.analyses import NULL
 from ..errors import EomgenError
-from ..limits.motions import NULL
 from ..numeric import algebra
 from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.constraint_system import ConstraintSystem

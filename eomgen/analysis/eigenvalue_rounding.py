@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.rounding import EPS, TINY
+from ..base.limits.numbers import EPS, TINY
 from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.motions import ALIGNED, POOR, SAME
+from ..base.limits.analyses import ALIGNED, POOR, SAME
 from ..numeric.curves import ASTRAY, Point, interpolate
 from ..numeric.projection import largest
 from ..numeric.scales import Array

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.constraints import MEASURED
+from ..base.limits.impacts import BEYOND, HELD, ROUNDED, TOUCHING
 from ..errors import UsageError, at_odds, cannot, ill_shaped, no_such, untrue
-from ..limits.constraints import MEASURED
-from ..limits.impacts import BEYOND, HELD, ROUNDED, TOUCHING
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array

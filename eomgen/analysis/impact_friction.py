@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
 from ..errors import untrue
-from ..limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
 from ..numeric.contact_impulses import solve_contacts
 from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array

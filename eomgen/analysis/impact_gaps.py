@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.impacts import ELSEWHERE
+from ..base.names import hint, joined
 from ..errors import cannot, ill_typed, incomplete, no_such, off_range
-from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
@@ -16,7 +17,6 @@ from ..runtime.near_names import without_dots
 from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import DeclaredSignal
-from ..suggestions import hint, joined
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
 from ..errors import untrue
-from ..limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.impacts import ROUNDED
+from ..base.names import hint, joined
 from ..errors import UsageError, ill_placed, ill_typed, no_such, off_range
-from ..limits.impacts import ROUNDED
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import without_dots
 from ..runtime.room import read_number
-from ..suggestions import hint, joined
 from .impact_friction import Sliding
 from .impact_gaps import Gaps
 

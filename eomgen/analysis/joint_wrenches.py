@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.constraints import UNMOVED
 from ..errors import cannot
-from ..limits.constraints import UNMOVED
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .constrained import ProjectedStates

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.analyses import ALIGNED, SINGULAR
+from ..base.limits.constraints import EXACT, UNMOVED
+from ..base.texts import shown
 from ..errors import (
     AssemblyError,
     PartitionError,
@@ -22,15 +25,12 @@ from ..errors import (
     no_number,
     too_large,
 )
-from ..limits.constraints import EXACT, UNMOVED
-from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_flag, read_number, read_numbers, require_room
-from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic_motion import KinematicAnalysis, keep

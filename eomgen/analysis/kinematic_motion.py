@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.analyses import SLACK
 from ..errors import cannot
-from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of

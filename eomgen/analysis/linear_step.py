@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.rounding import EPS
-from ..limits.statics import ARRIVED, CLOSE
+from ..base.limits.analyses import ARRIVED, CLOSE
+from ..base.limits.numbers import EPS
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array

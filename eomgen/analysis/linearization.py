@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.analyses import COUPLED, STILL
 from ..errors import cannot
-from ..limits.statics import COUPLED, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.rounding import TINY
-from ..limits.statics import ARRIVED, DAMPING, GAINED, SHORTEST
+from ..base.limits.analyses import ARRIVED, DAMPING, GAINED, SHORTEST
+from ..base.limits.numbers import TINY
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.limits.constraints import CONTRADICTION
 from ..errors import TO_BE_FINITE
-from ..limits.constraints import CONTRADICTION
 from ..numeric.closure import close
 from ..numeric.scales import Array
 from .driven_coordinates import DrivenCoordinates

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.limits.analyses import DIFFERENCES, LEAST_UNKNOWN
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
-from ..limits.statics import DIFFERENCES, LEAST_UNKNOWN
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Indices

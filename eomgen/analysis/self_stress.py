@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.constraints import BALANCE as RANK
-from ..limits.statics import SEEN
+from ..base.limits.analyses import SEEN
+from ..base.limits.constraints import BALANCE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .constrained import ProjectedStates

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
+from ..base.limits.analyses import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.curves import Point, Tangent
 from ..numeric.projection import largest
 from ..numeric.roots import SECTIONS, carry_out, find_root, search_least

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.rounding import EPS
+from ..base.limits.numbers import EPS
 from ..numeric import algebra
 from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.rounding import EPS
+from ..base.limits.numbers import EPS
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .eigenvalue_rounding import ROUNDING, graded_modes, stability_of_matrix

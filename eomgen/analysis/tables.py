@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-from ..files.terminal import aligned_rows
-from ..limits.descriptions import SHOWN, SHOWN_COMPLEX
-from ..texts import html_table
+from ..base.limits.numbers import SHOWN, SHOWN_COMPLEX
+from ..base.texts import aligned_rows, html_table
 
 
 def number(value: complex, digits: int = 6) -> str:

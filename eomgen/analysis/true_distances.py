@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.limits.constraints import MEASURED
 from ..errors import cannot
-from ..limits.constraints import MEASURED
 from ..numeric import algebra
 from ..numeric.ranks import rank
 from ..numeric.scales import Array

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..limits.rounding import EPS
-from ..limits.statics import CLOSE
+from ..base.limits.analyses import CLOSE
+from ..base.limits.numbers import EPS
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST

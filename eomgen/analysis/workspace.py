@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.files import whole_file
+from ..base.inline_pictures import picture_html
+from ..base.notation import Notation
 from ..errors import ill_shaped
-from ..files.inline_pictures import picture_html
-from ..files.writing import whole_file
-from ..notation.notation import Notation
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.analyses import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..errors import cannot
-from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..numeric import algebra
 from ..numeric.roots import find_root
 from ..numeric.scales import Array

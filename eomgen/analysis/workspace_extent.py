@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.motions import FLAT_CELL, SLACK
+from ..base.limits.analyses import FLAT_CELL, SLACK
 from ..numeric import algebra
 from ..numeric.scales import Array
 

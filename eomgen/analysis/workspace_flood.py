@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.analyses import SLACK
 from ..errors import AssemblyError, PartitionError
-from ..limits.motions import SLACK
 from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
 from ..numeric.scales import Array

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.texts import shown
 from ..errors import ill_chosen, ill_placed, ill_typed, incomplete, no_choice, off_range, too_large
 from ..numeric.counts import as_count, read_count
 from ..numeric.scales import Array
 from ..runtime.near_names import read_names, unknown
 from ..runtime.room import as_real, read_number, read_numbers
-from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

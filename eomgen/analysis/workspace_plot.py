@@ -6,9 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..base.notation import Notation, label
 from ..errors import ill_typed
-from ..notation.labels import label
-from ..notation.notation import Notation
 from ..runtime.near_names import require
 
 MARKS = {"stop": ("x", "tab:red"), "change point": ("^", "tab:orange"), "outputs": (".", "black")}

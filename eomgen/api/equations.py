@@ -9,8 +9,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
+from ..base.inline_pictures import picture_html, side_by_side
 from ..derivation import Derivation
-from ..files.inline_pictures import picture_html, side_by_side
 from ..runtime.near_names import find_lacking
 from .module import Module
 

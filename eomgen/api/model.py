@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
+from ..base.inline_pictures import picture_html, side_by_side
 from ..describe.builder import Builder
 from ..errors import too_large
-from ..files.inline_pictures import picture_html, side_by_side
 from ..simulation.progress import waiting
 from .equations import Equations, derive
 

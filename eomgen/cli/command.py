@@ -11,9 +11,9 @@ from importlib import import_module
 
 import click
 
+from ..base.names import hint
+from ..base.texts import visible
 from ..errors import UsageError
-from ..suggestions import hint
-from ..texts import visible
 from .failures import USAGE, to_dict
 from .screen import print_json
 

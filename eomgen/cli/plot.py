@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 import numpy as np
 
+from ..base.files import save_figure
+from ..base.notation import Notation
 from ..errors import MissingDependencyError, bad_file, incomplete
-from ..files.writing import save_figure
-from ..notation.notation import Notation
 from .shared_options import split_names
 
 if TYPE_CHECKING:

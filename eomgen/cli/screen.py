@@ -13,8 +13,7 @@ from typing import Any
 
 import click
 
-from ..files.terminal import aligned_rows, terminal_width
-from ..texts import visible
+from ..base.texts import aligned_rows, terminal_width, visible
 
 WIDTH = 120  #: of tables that do not go to a terminal
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ..suggestions import closest
+from ..base.names import closest
 
 DERIVATION = "Derivation and compilation"
 INTEGRATION = "Integration"

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..base.files import kind_of, refuse_link
+from ..base.names import closest
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number
-from ..files.reading import kind_of
-from ..files.writing import refuse_link
-from ..suggestions import closest
 from ..targets import TARGETS
 from .number_option import NumberRange
 from .sections import DERIVATION, INTEGRATION, ROBOTS, shared_option
@@ -279,7 +278,7 @@ def _missing(path: Path) -> str:
         return f"{path} is {what}, not a plain file; " + (
             "name a model file in it" if path.is_dir() else "copy its content into a file"
         )
-    from ..shipped import example_files
+    from ..base.files import example_files
 
     if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files.writing import save_figure
+from ..base.files import save_figure
 from .failures import reports_failures
 from .plot import require_plotting
 from .screen import print_json, say

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..files.writing import write_whole
+from ..base.files import write_whole
 from .failures import reports_failures
 from .screen import print_json, say
 from .sections import verb_command

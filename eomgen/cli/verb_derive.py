@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files.writing import write_whole
+from ..base.files import write_whole
 from ..targets import FORMATS
 from .failures import reports_failures
 from .screen import print_heading, print_json, print_table, say, stage

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import click
 
+from ..base.files import shipped
+from ..base.limits.constraints import UNMOVED
+from ..base.texts import visible
 from ..errors import EomgenError
-from ..limits.constraints import UNMOVED
-from ..shipped import shipped
-from ..texts import visible
 from .failures import TOOLCHAIN, reports_failures
 from .screen import print_json, readable_size, say
 from .sections import verb_command

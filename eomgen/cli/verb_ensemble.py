@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..base.files import open_plain, save_figure, write_whole
 from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
-from ..files.reading import open_plain
-from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
 from ..runtime.room import require_room
 from ..runtime.storage import split_head, write_netcdf

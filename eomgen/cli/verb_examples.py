@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..base.files import example_files, find_example, write_whole
+from ..base.names import hint
 from ..errors import at_odds, bad_file, no_such
-from ..files.writing import write_whole
-from ..shipped import example_files, find_example
-from ..suggestions import hint
 from ..syntax_trees import parse_module
 from .failures import reports_failures
 from .screen import print_json, print_table, say, stage

@@ -8,9 +8,9 @@ from typing import Any
 import click
 import numpy as np
 
+from ..base.files import whole_file
+from ..base.limits.numbers import SHOWN_FORCE
 from ..errors import bad_file
-from ..files.writing import whole_file
-from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .number_option import Number
 from .screen import print_heading, print_json, print_table, say, stage

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..analysis.tables import without_noise
+from ..base.limits.numbers import RESTING
+from ..base.names import place_of_marker
 from ..errors import bad_file, incomplete
-from ..limits.descriptions import RESTING
-from ..marker_places import place_of_marker
 from ..runtime.near_names import unknown
 from ..runtime.storage import RUNS
 from .failures import after_integration, reports_failures

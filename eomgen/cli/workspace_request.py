@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.files import save_figure
 from ..errors import at_odds, ill_typed, incomplete, no_number
-from ..files.writing import save_figure
 from .screen import finite
 from .shared_options import parse_number
 

@@ -5,7 +5,7 @@ A build works in a private directory under ``attempts/``, writes its manifest la
 processes that build the same thing the second to finish takes the first one's entry.
 
 What an entry holds is loaded as code. It counts only while every file is as its sealed manifest says, and while nobody
-but this user and root could have written it, or any folder above it; see :mod:`eomgen.files.ownership`.
+but this user and root could have written it, or any folder above it; see :mod:`eomgen.base.files`.
 """
 
 from __future__ import annotations
@@ -21,11 +21,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..base.files import (
+    MANIFEST,
+    OTHERS_WRITE,
+    Kept,
+    digest,
+    hold,
+    locked,
+    make_private,
+    read_entry,
+    read_manifest,
+    require_trusted,
+    sealed,
+)
 from ..errors import ToolchainError, bad_cache
-from ..files.build_folder import MANIFEST, digest, read_entry, read_manifest, sealed
-from ..files.kept import Kept
-from ..files.locks import hold, locked
-from ..files.ownership import OTHERS_WRITE, make_private, require_trusted
 from .commands import unwound_by_sigterm
 
 #: Layout of keys, entries and manifests; part of every key.

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..files.build_folder import MANIFEST, digest
+from ..base.files import MANIFEST, digest
 
 FOLDER = Path(__file__).parents[1] / "built"
 

@@ -17,9 +17,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ..base.files import read_manifest, require_trusted
 from ..errors import EomgenError, bad_cache
-from ..files.build_folder import read_manifest
-from ..files.ownership import require_trusted
 from ..layer import read_header, read_layer
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..base.files import read_manifest
 from ..errors import ToolchainError, bad_cache
-from ..files.build_folder import read_manifest
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, find_compiler

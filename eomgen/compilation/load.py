@@ -10,8 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ..base.files import require_trusted
 from ..errors import ToolchainError, bad_cache
-from ..files.ownership import require_trusted
 from .build import Artifact
 from .cache import Cache
 

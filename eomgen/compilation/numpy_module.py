@@ -7,8 +7,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ..base.files import find_module, load_source
 from ..errors import ToolchainError
-from ..files.source import find_module, load_source
 from .cache import Cache, cache_directory, compute_key
 
 SOURCE = "_core.py"

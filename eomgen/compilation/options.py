@@ -6,9 +6,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ..base.texts import shown
 from ..errors import ill_typed, no_choice
 from ..numeric.counts import as_count, read_count
-from ..texts import shown
 from .compiler import CompilerInfo
 from .processor import NEEDS, lane_width
 

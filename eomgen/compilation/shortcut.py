@@ -14,7 +14,7 @@ from dataclasses import asdict
 from functools import cache
 
 from .. import _STARTED
-from ..shipped import shipped
+from ..base.files import shipped
 from .build import Artifact
 from .cache import Cache, cache_directory, compute_key
 from .compiler import find_compiler
@@ -23,7 +23,7 @@ from .options import Options
 from .processor import lane_width
 
 #: What sources, layer and flags follow from, apart from the program and the templates: of eomgen.
-WRITERS = ("graph", "program", "emit", "compilation", "limits", "numeric", "kernel_table.py", "layer.py", "texts.py")
+WRITERS = ("graph", "program", "emit", "compilation", "base", "numeric", "layer.py")
 
 
 class Shortcut:

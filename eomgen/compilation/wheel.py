@@ -12,10 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from ..base.files import as_path, open_plain, write_whole
 from ..errors import MissingDependencyError, UsageError, at_odds, bad_data, cannot
-from ..files.path_names import as_path
-from ..files.reading import open_plain
-from ..files.writing import write_whole
 from ..targets import TARGETS
 from .commands import COMPILE, allowed, raise_failure, run
 from .compiler import find_compiler

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from ..base.limits.numbers import ZERO
 from ..graph.core import Expr, atan2, cos, sin
 from ..graph.differentiate import jvp
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
-from ..limits.descriptions import ZERO
 from ..records import dataclass
 
 TRIALS = 5

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.limits.numbers import TENSOR
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.shown import quoted, shown
 from ..graph.substitute import substitute, symbols_of
-from ..limits.descriptions import TENSOR
 from .checks import check_keys
 from .description import Faults, items
 from .fields import EQUATIONS, MOTION

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import APART, PERIODIC
 from ..graph.functions import Function
-from ..limits.descriptions import APART, PERIODIC
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
 from ..numeric.user_functions import Curve, Surface, Twin
 from .build_native import build_native

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.names import place_of_marker
 from ..constraints import CONSTRAINTS
 from ..errors import ModelError
 from ..forces import FORCES, Force
@@ -12,7 +13,6 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
-from ..marker_places import place_of_marker
 from .body_shapes import read_shapes
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements

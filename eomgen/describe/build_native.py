@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..base.files import open_plain
 from ..errors import UsageError
-from ..files.reading import open_plain
 from ..graph.functions import Function, NativeCode
 from ..numeric.user_functions import Orders, Twin, up_to
 from ..records import dataclass

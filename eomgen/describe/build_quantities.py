@@ -6,11 +6,11 @@ import math
 import sys
 from dataclasses import replace
 
+from ..base.operations import OPERATIONS
 from ..elements.dimensions import NONE
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
-from ..operations import OPERATIONS
 from .checks import check_keys
 from .description import DescribedEntry
 from .fields import INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, Fields

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
+from ..base.names import hint
 from ..constraints import CONSTRAINTS
 from ..errors import UnavailableError
 from ..forces import FORCES
 from ..joints import JOINTS
-from ..suggestions import hint
 from .build_mechanism import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
@@ -347,7 +347,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the model to a model file; if writing fails, a file that already exists stays unchanged."""
-        from ..files.writing import write_whole
+        from ..base.files import write_whole
 
         write_whole(path, self.to_yaml())
 

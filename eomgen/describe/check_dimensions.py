@@ -13,11 +13,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from ..base.names import place_of_marker
+from ..base.operations import OPERATIONS
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
 from ..graph.core import Expr, Graph
 from ..graph.traverse import reachable
-from ..marker_places import place_of_marker
-from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
 from .mechanism import TURNING, JointSpec, Output

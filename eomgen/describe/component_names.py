@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..base.notation import with_instance
 from ..errors import UsageError
 from ..joints import JOINTS
-from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_clocks import COUNTER, EVENT
 from .build_joints import coordinate_names, sketch

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..base.limits.constraints import GIVEN as SMALL
+from ..base.limits.numbers import ROUNDED
 from ..errors import ExpressionError, ModelError, Problem
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
 from ..graph.rounding_bounds import with_bounds
 from ..graph.substitute import substitute, symbols_of
-from ..limits.constraints import GIVEN as SMALL
-from ..limits.rounding import ROUNDED
 from .input_names import rate_of
 from .sympy_face import lower_sympy, name_of
 from .sympy_forms import Forms

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.operations import OPERATIONS
 from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, reachable
-from ..operations import OPERATIONS
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism

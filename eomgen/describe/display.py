@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..base.texts import html_text
 from ..graph.shown import shown
-from ..texts import html_text
 from .description import DescribedEntry, Description, items, label_of, text_of
 
 LONG = 40  #: rows of a table more than which it is folded up

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..instance_names import undotted as undotted_name
+from ..base.names import undotted as undotted_name
 from .description import Description
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .rewritten_texts import rewritten

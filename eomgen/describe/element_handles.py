@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
+from ..base.texts import shown
 from ..errors import ill_typed
-from ..texts import shown
 from .described import Described
 from .description import DescribedEntry
 from .marker_quantities import ElementQuantity

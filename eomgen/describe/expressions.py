@@ -13,9 +13,9 @@ import math
 import re
 from collections.abc import Callable
 
+from ..base.operations import OPERATIONS
 from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
-from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WRENCH, function_words, nearest

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..notation.latex_of_names import rate_of as rate_of
-from ..notation.latex_of_names import split_rate as split_rate
+from ..base.notation import rate_of as rate_of
+from ..base.notation import split_rate as split_rate
 
 
 def chains(names: Iterable[str]) -> dict[str, list[str]]:

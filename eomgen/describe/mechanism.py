@@ -12,12 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..base.limits.runs import ATOL, RTOL
 from ..elements import dimensions
 from ..errors import ModelError, Problem
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
-from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
 from .names import ACCELERATIONS, VELOCITIES

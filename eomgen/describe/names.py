@@ -7,9 +7,9 @@ import re
 import sys
 from collections.abc import Collection, Iterable
 
+from ..base.names import hint, joined
+from ..base.operations import OPERATIONS
 from ..graph.shown import quoted
-from ..operations import OPERATIONS
-from ..suggestions import hint, joined
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..base.files import beside
 from ..errors import UsageError
-from ..files.path_names import beside
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
 from ..frames import GROUND
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
-from ..limits.descriptions import TENSOR, TENSOR_TERMS
-from ..limits.inertia import COMPUTED
 from ..numeric.rigid_inertia import EXCESS, SWITCH, inertia_scales, longest_within
 from ..numeric.scales import Array
 from ..numeric.value_ranges import NOT_NEGATIVE

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.latex import NotationError, read_latex, spaced
 from ..graph.shown import quoted, shown
-from ..notation import NotationError, read_latex
-from ..notation.latex_tree import spaced
 from .description import Description, items
 from .names import nearest
 from .sympy_face import name_of, named

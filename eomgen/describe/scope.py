@@ -5,11 +5,11 @@ from __future__ import annotations
 import keyword
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
+from ..base.names import joined
 from ..errors import ExpressionError
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
-from ..suggestions import joined
 from .description import Faults
 from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..base.texts import shown
 from ..errors import ExpressionError, ModelError, Problem, ill_typed
 from ..graph.shown import parts_of, quoted, shortened
-from ..texts import shown
 from .description import items
 
 if TYPE_CHECKING:

@@ -7,10 +7,9 @@ from contextlib import suppress
 from typing import Any
 from unicodedata import normalize
 
+from ..base.latex import GREEK, NotationError, read_latex
+from ..base.notation import split_rate
 from ..graph.shown import parts_of
-from ..notation import NotationError, read_latex
-from ..notation.latex_of_names import split_rate
-from ..notation.signs import GREEK
 from .description import Description, items
 from .names import fault_of_name, unique
 from .scope import RATES

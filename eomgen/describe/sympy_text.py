@@ -6,10 +6,10 @@ from collections.abc import Collection
 from functools import partialmethod
 from typing import Any
 
+from ..base.operations import OPERATIONS
 from ..errors import ExpressionError, cannot
 from ..graph.core import Expr, Graph
 from ..graph.functions import Function
-from ..operations import OPERATIONS
 from .expressions import parse
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .scope import RATES

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.operations import CONDITION, operations_with
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..operations import CONDITION, operations_with
 
 TRIES = 5  #: random places at which a change is looked at
 

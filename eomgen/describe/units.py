@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..base.names import closest
 from ..elements import dimensions
 from ..elements.dimensions import Dimension
 from ..graph.shown import quoted
-from ..suggestions import closest
 
 if TYPE_CHECKING:
     import pint

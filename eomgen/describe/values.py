@@ -12,18 +12,18 @@ import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..base.files import usable_name
+from ..base.limits.numbers import PERPENDICULAR
+from ..base.names import hint
+from ..base.texts import WHOLE, join_surrogates, lone_surrogate
 from ..errors import ExpressionError
-from ..files.path_names import usable_name
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3, Vec3
-from ..limits.descriptions import PERPENDICULAR
 from ..numeric.rigid_inertia import word_of_check
 from ..numeric.value_rules import ROTATION
-from ..suggestions import hint
-from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse

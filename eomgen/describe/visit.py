@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ..marker_places import place_of_marker
+from ..base.names import place_of_marker
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MARKER, Field, Fields, fields_of
 

@@ -8,8 +8,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from ..base.texts import comment_text, yaml_quoted
 from ..errors import cannot
-from ..texts import comment_text, yaml_quoted
 from .description import SECTIONS, Description, is_zero, items
 from .dotted_names import undotted
 from .fields import MODEL, SHORT

@@ -6,9 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from ..base.files import as_name, beside, open_plain
 from ..errors import ModelError, Problem, UsageError
-from ..files.path_names import as_name, beside
-from ..files.reading import open_plain
 from .components import Components
 from .description import SECTIONS, Description, Faults
 from .dotted_names import undotted

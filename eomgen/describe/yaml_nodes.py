@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from ..base.texts import WHOLE, join_surrogates, lone_surrogate, visible
 from ..errors import ModelError, Problem
-from ..texts import WHOLE, join_surrogates, lone_surrogate, visible
 
 SIZE = 1_000_000  #: bytes of a file
 DEPTH = 12  #: nesting

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..limits.descriptions import POWERS
+from ..base.limits.numbers import POWERS
 
 
 class Dimension(NamedTuple):

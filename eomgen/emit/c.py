@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import accumulate
 from typing import Any
 
-from ..limits.in_c import definitions
+from ..base.limits.in_c import definitions
 from ..program import KERNELS, Block, Program
 from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError

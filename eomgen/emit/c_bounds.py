@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from math import floor, log2, prod
 
+from ..base.limits.crossings import REACH, SHORTEST
 from ..graph.count import Operations
-from ..limits.crossings import REACH, SHORTEST
 from ..numeric.passing import PAIRS
 from ..program import Block, Program
 

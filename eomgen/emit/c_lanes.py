@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..limits.in_c import definitions
+from ..base.limits.in_c import definitions
 from ..program import Block, Program
 from ..program.block_groups import REGULAR, USUAL
 from .c_functions import declarations, used_calls

@@ -10,7 +10,7 @@ from collections.abc import Container
 from math import inf
 from typing import NamedTuple
 
-from ..operations import CONDITION, OPERATIONS
+from ..base.operations import CONDITION, OPERATIONS
 from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, behind, make_series
 from .angles import print_angles

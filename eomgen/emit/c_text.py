@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
+from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..graph.core import Expr
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
-from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name

@@ -13,9 +13,8 @@ from importlib.resources import files
 
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
-ALONE = ("errors", "instance_names", "kernel_table", "marker_places", "suggestions", "targets", "texts", "analysis",
-         "api", "device", "ensembles", "files", "identification", "limits", "notation", "numeric", "operations",
-         "runtime", "show", "simulation", "verification")  # fmt: skip
+ALONE = ("errors", "targets", "analysis", "api", "base", "base/limits", "device", "ensembles", "identification",
+         "numeric", "runtime", "show", "simulation", "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
@@ -45,7 +44,7 @@ def carry(package: Mapping[str, str]) -> dict[str, str]:
         found.add(name)
         todo += [home for home, _ in _reached(name)]
     texts = {f"{name}.py": _text(name) for name in sorted(found)}
-    folders = sorted({name.partition("/")[0] for name in found if "/" in name})
+    folders = sorted({name.rpartition("/")[0] for name in found if "/" in name})
     return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..base.operations import CONDITION, OPERATIONS
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..graph.pair_kinds import PairPart
 from ..graph.slopes import square_under_root
 from ..graph.substitute import symbols_of
-from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
 from .straight import Pieces, PrintedFunction, cut, references
 

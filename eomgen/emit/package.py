@@ -8,12 +8,12 @@ from dataclasses import replace
 from textwrap import fill
 from typing import Any
 
+from ..base.texts import summary_text
 from ..errors import UsageError, cannot, no_choice
 from ..layer import read_layer
 from ..program import Program
 from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
-from ..texts import summary_text
 from .c import emit_c
 from .c_lanes import DERIVATIVES
 from .carried import carry
@@ -114,7 +114,9 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
     names = ("__init__.py", "__init__.pyi", "selftest.py")
     own = {name: render(f"python/{name}.j2", context) for name in names}
     found = carry({**core, **own})
-    context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
+    context = context | {
+        "folders": sorted({name.rpartition("/")[0].replace("/", ".") for name in found if "/" in name})
+    }
     names = ("pyproject.toml", "README.md", "tests/test_recorded.py")
     about = {name: render(f"python/{name}.j2", context) for name in names}
     return {"py.typed": "", **own, **about, **found}

@@ -10,10 +10,10 @@ import re
 from collections.abc import Mapping
 from math import log
 
+from ..base.limits.in_c import KINDS
+from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
+from ..base.operations import FUNCTION, OPERATIONS
 from ..errors import cannot
-from ..limits.in_c import KINDS
-from ..limits.rounding import EPS, SINGLE_COARSE, SINGLE_FAR
-from ..operations import FUNCTION, OPERATIONS
 from ..program import Program
 from .c_functions import used_calls
 from .pair_sums_used import refuse_sums

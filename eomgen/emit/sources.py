@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from .. import texts
-from ..files.kept import Kept
+from ..base import texts
+from ..base.files import Kept, shipped
 from ..program import Program
-from ..shipped import shipped
 
 if TYPE_CHECKING:
     from jinja2 import Environment

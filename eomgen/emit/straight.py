@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 
+from ..base.operations import CONDITION, operations_with
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
 from ..graph.traverse import LEAVES
-from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
 from .alike_branches import Pairs

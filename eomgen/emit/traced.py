@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ..base.kernel_table import NAMED
+from ..base.limits.constraints import ACCEPTED, DIFFERENTIATED
 from ..errors import cannot
 from ..graph.functions import Function
-from ..kernel_table import NAMED
-from ..limits.constraints import ACCEPTED, DIFFERENTIATED
 from ..numeric.scales import Space
 from ..numeric.user_functions import Curve, Surface
 from ..program import Program

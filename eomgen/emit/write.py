@@ -11,9 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..base.files import open_plain, refuse_link
 from ..errors import UsageError, bad_file
-from ..files.reading import open_plain
-from ..files.writing import refuse_link
 
 MANIFEST = "model.json"  #: lists the files of the package under "files"
 

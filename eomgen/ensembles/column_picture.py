@@ -6,8 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..notation.labels import TIME, label
-from ..notation.notation import Notation
+from ..base.notation import TIME, Notation, label
 from ..numeric.counts import read_count
 from ..runtime.near_names import require
 

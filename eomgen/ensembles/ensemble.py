@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.files import as_path, whole_file
+from ..base.notation import Notation
 from ..errors import bad_file, cannot, off_range
-from ..files.path_names import as_path
-from ..files.writing import whole_file
-from ..notation.notation import Notation
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..base.inline_pictures import picture_html, side_by_side
+from ..base.texts import html_table, html_text
 from ..errors import UsageError
-from ..files.inline_pictures import picture_html, side_by_side
 from ..runtime.near_names import require
-from ..texts import html_table, html_text
 
 PANELS = 3  #: columns that are drawn
 ROWS = 12  #: columns whose numbers are listed

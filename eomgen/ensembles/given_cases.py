@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.names import place_of_marker
 from ..errors import AssemblyError, EomgenError, UsageError, ill_shaped, no_number
-from ..marker_places import place_of_marker
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of

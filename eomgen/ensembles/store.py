@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.files import as_path, open_plain, remove_parts, write_whole
 from ..errors import UsageError, bad_data, bad_file
-from ..files.path_names import as_path
-from ..files.reading import open_plain
-from ..files.writing import remove_parts, write_whole
 from ..runtime.arrays import BROKEN, read_arrays, sealed
 from .run_blocks import LARGEST
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..base.limits.constraints import UNMOVED
 from ..errors import Problem
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
-from ..limits.constraints import UNMOVED
 from ..records import dataclass
 
 FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of a message

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.limits.numbers import LEAST, TINY
 from ..describe.mechanism import Mechanism
 from ..errors import EvaluationError, ModelError, PartitionError, Problem
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import ConstraintFunctions
 from ..kinematics.mobility import Mobility
-from ..limits.inertia import LEAST
-from ..limits.rounding import TINY
 from ..numeric import algebra
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition

@@ -1,7 +1,7 @@
 """Stage explain: derived equations -> the worked solution as HTML, Markdown, LaTeX or PDF.
 
-Every formula comes from :mod:`eomgen.reading`, is printed by :mod:`eomgen.notation`, and is compared with the compiled
-module at the end.
+Every formula comes from :mod:`eomgen.reading`, is printed by :mod:`eomgen.base.notation`, and is compared with the
+compiled module at the end.
 """
 
 from __future__ import annotations

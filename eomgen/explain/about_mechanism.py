@@ -7,10 +7,10 @@ from typing import Any
 
 import sympy
 
+from ..base.inline_pictures import trimmed_png
 from ..describe.mechanism import JointSpec
 from ..describe.placement import axis_word
 from ..errors import EomgenError
-from ..files.inline_pictures import trimmed_png
 from ..frames import GROUND
 from ..graph.core import Expr
 from .author import Author

@@ -8,10 +8,10 @@ from typing import Any
 
 import sympy
 
+from ..base.notation import dotted
 from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
-from ..notation import dotted
 from ..reading import Quantities
 from ..reading.written import needed
 from .author import Author, Shown

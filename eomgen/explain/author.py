@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 import sympy
 
+from ..base.notation import literal, with_instance
 from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
-from ..notation import with_instance
-from ..notation.latex_of_names import literal
 from ..reading import Quantities, ReadingView
 from ..reading.written import Written, needed, write
 from .document import Folded, FormulaLine, Piece, PutIn, Sentence

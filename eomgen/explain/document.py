@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from ..base.texts import visible
 from ..records import dataclass
-from ..texts import visible
 
 _PARTS = re.compile(r"(\$[^$]+\$|`[^`]+`)")
 

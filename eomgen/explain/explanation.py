@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.files import write_whole
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
-from ..files.writing import write_whole
 from ..graph.pair_calls import opaque_names
 from .document import DrawnPicture, Folded, Piece, Section
 from .printer import Printer

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import sympy
 
+from ..base.limits.numbers import ALIKE, ROUNDED
 from ..errors import EomgenError
 from ..kinematics.state import acceleration_name
-from ..limits.rounding import ALIKE, ROUNDED
 
 
 def evaluate(named: Sequence[tuple[Any, Any]], flat: Sequence[Any], values: Mapping[str, float]) -> np.ndarray:

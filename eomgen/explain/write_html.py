@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..files.inline_pictures import image_html
+from ..base.inline_pictures import image_html
+from ..base.texts import html_text
 from ..printing import given_mathml
-from ..texts import html_text
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
 from .printer import Printer
 

@@ -6,7 +6,7 @@ import re
 from base64 import b64encode
 from collections.abc import Sequence
 
-from ..texts import html_text
+from ..base.texts import html_text
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
 from .printer import Printer
 from .write_tex import formula_body

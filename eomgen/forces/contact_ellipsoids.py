@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ..base.limits.contacts import COMMON, FOCAL, NEAREST, TWICE
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
-from ..limits.contacts import COMMON, FOCAL, NEAREST, TWICE
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch

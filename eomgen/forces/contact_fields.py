@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.contacts import ASTRAY, FOOT, STEEP
+from ..base.limits.runs import BEYOND, UP_TO
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, sqrt
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..graph.vectors import Mat3, Vec3
-from ..limits.contacts import ASTRAY, FOOT, STEEP
-from ..limits.runs import BEYOND, UP_TO
 from ..numeric.user_functions import Surface
 from ..records import dataclass
 from .branches import where

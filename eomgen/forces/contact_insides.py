@@ -22,9 +22,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.limits.contacts import EVEN, FLAT_CORNER, ROOM
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
-from ..limits.contacts import EVEN, FLAT_CORNER, ROOM
 from ..numeric.outline_pieces import PIECE
 from ..records import dataclass
 from .branches import where

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
 
+from ..base.limits.contacts import SHARED
 from ..graph.core import Expr, cos, sin, sqrt
-from ..limits.contacts import SHARED
 from .branches import where
 from .contact_insides import notch
 from .contact_profiles import (

@@ -11,6 +11,7 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple, cast
 
+from ..base.limits.contacts import NOWHERE
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -19,7 +20,6 @@ from ..graph.pair_kinds import PairKind
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
-from ..limits.contacts import NOWHERE
 from ..numeric.outline_pieces import CHOSEN, PIECE
 from ..numeric.pair_sums import POSE
 from ..numeric.polygon_edges import EDGE, OTHER, OWN

@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..base.limits.contacts import FLAT_CORNER, NOWHERE
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import FLAT_CORNER, NOWHERE
 from ..numeric.polygon_edges import FACING, OWN
 from ..records import dataclass
 from .branches import where

@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
+from ..base.limits.contacts import PARALLEL
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.differentiate import jvp
 from ..graph.vectors import Vec3
-from ..limits.contacts import PARALLEL
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch

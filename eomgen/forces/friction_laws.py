@@ -6,13 +6,13 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from ..base.limits.contacts import AT_REST
 from ..elements.dimensions import NONE, RATE, REACH
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
-from ..limits.contacts import AT_REST
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..numeric.value_rules import LIMITS
 from ..records import dataclass

@@ -10,10 +10,10 @@ from functools import partial
 from operator import truediv
 from typing import NamedTuple
 
+from ..base.limits.contacts import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch

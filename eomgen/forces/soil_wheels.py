@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.contacts import FOREMOST, SHORT_WAY
 from ..graph import vectors as vec
 from ..graph.core import Expr, cos, sin, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import FOREMOST, SHORT_WAY
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch

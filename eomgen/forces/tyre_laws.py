@@ -9,8 +9,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
+from ..base.limits.contacts import NO_SLIP
 from ..graph.core import Expr, sqrt
-from ..limits.contacts import NO_SLIP
 from ..records import dataclass
 from .branches import where
 

@@ -4,7 +4,7 @@ A :class:`Graph` is a growing table of nodes ``(operation, operand ids...)``.  A
 again, and constants, signs, zeros and ones are folded as nodes are made, so common subexpressions merge at birth and
 derivation code cannot swell.  :class:`Expr` is a handle on one node with Python's operators.
 
-Operations: ``const``, ``sym``, those of the table :mod:`eomgen.operations`, and calls of declared functions
+Operations: ``const``, ``sym``, those of the table :mod:`eomgen.base.operations`, and calls of declared functions
 (:mod:`.functions`).  ``select(c, x, y)`` is x where c is true (non-zero) and y elsewhere.  Comparisons give 1.0 or 0.0.
 """
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
-from ..operations import ARITHMETIC, operations_with
+from ..base.operations import ARITHMETIC, operations_with
 from ..records import dataclass
 from .core import Expr, Graph
 from .pair_calls import pair_call

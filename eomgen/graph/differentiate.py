@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..operations import OPERATIONS, operations_with
+from ..base.operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .pair_calls import is_pair_item, pair_call, push_pairs
 from .slopes import half_power_slope, hides, multiply, partials, roots_in

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.operations import OPERATIONS
 from ..errors import ill_shaped, incomplete
-from ..operations import OPERATIONS
 from .core import Expr
 from .substitute import symbols_of
 from .traverse import common_graph, reachable

@@ -9,12 +9,11 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..limits.rounding import NORMAL, TINY
-from ..operations import OPERATIONS
-from ..operations.row import ODD
+from ..base.limits.numbers import NORMAL, TINY
+from ..base.operations import ODD, OPERATIONS
 
 if TYPE_CHECKING:
-    from ..operations import Operation
+    from ..base.operations import Operation
     from .functions import Function
 
 Part = TypeVar("Part")

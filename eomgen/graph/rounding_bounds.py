@@ -12,9 +12,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..limits.rounding import CHANCE, ROUNDED
-from ..operations import OPERATIONS, operations_with
-from ..operations.table import unit
+from ..base.limits.numbers import CHANCE, ROUNDED
+from ..base.operations import OPERATIONS, operations_with, unit
 from .core import Expr, Graph
 from .differentiate import gradient
 from .evaluate import Evaluator, Value

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from .. import texts
+from ..base import texts
 
 LONGEST = 120  #: characters of a value in a message
 EXPONENT = 10_000  #: of a number that SymPy may work out

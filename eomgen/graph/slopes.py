@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Container, Sequence
 from typing import Any
 
-from ..operations import OPERATIONS
+from ..base.operations import OPERATIONS
 from .core import Graph
 from .functions import raised
 from .traverse import LEAVES

@@ -1,7 +1,7 @@
 """Stage graph: a SymPy expression -> the same expression in a graph.
 
 All quantities are real.  What has a meaning: real numbers; ``+ * **``; the classes that rows of
-:mod:`eomgen.operations` name; sec csc cot sech csch coth Heaviside re im conjugate; Piecewise ending with ``True``;
+:mod:`~..base.operations` name; sec csc cot sech csch coth Heaviside re im conjugate; Piecewise ending with ``True``;
 ``> >= Ne Xor ITE Implies Equivalent``; and whatever the caller resolves: symbols, functions of time ``q(t)``, their
 derivatives; and the functions that the graph declares, with their derivatives.
 """
@@ -20,8 +20,8 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.matrixbase import MatrixBase
 
+from ..base.operations import OPERATIONS
 from ..errors import EomgenError
-from ..operations import OPERATIONS
 from .core import Expr, Graph
 from .shown import is_tower, parts_of, shortened
 

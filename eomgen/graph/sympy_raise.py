@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy
 
-from ..operations import CONDITION, OPERATIONS, operations_with
+from ..base.operations import CONDITION, OPERATIONS, operations_with
 from .core import Expr, Graph
 from .pair_calls import PairCall, pair_call
 from .traverse import LEAVES, common_graph, reachable

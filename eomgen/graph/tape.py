@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..base.operations import OPERATIONS
 from ..errors import cannot
-from ..operations import OPERATIONS
 from .core import Expr
 from .traverse import reachable
 

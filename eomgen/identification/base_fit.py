@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
+from ..base.limits.analyses import IDENTIFIED, LINEAR, MEASURED, ROUNDS
 from ..errors import cannot, ill_shaped, off_range
-from ..limits.identification import IDENTIFIED, LINEAR, MEASURED, ROUNDS
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.near_names import read_names, unknown

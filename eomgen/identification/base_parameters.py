@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
+from ..base.limits.analyses import EFFECT, ROUNDED_COEFFICIENT
 from ..errors import ProjectionError, off_range
-from ..limits.identification import EFFECT, ROUNDED_COEFFICIENT
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.texts import shown
 from ..errors import ill_typed, incomplete, off_range
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_numbers
 from ..runtime.storage import split_head
-from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.analyses import MEASURED, ROUNDS
+from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..errors import (
     ParameterError,
     SimulationError,
@@ -22,8 +24,6 @@ from ..errors import (
     no_choice,
     off_range,
 )
-from ..limits.identification import MEASURED, ROUNDS
-from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
 from ..runtime.allowed_parameters import bounds_of
 from ..runtime.late_start import fixed_told, tell_fixed

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.tables import as_html
-from ..files.terminal import aligned_rows
-from ..limits.identification import IDENTIFIED
+from ..base.limits.analyses import IDENTIFIED
+from ..base.texts import aligned_rows
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.near_names import require

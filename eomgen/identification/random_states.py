@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError
-from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array
 

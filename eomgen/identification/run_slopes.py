@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.linear import output_derivatives
-from ..limits.identification import QUADRATURE
+from ..base.limits.analyses import QUADRATURE
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed, Tabulated

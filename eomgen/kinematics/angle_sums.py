@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.limits.numbers import PLANE
 from ..graph.core import Expr, Graph, atan2
 from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3
-from ..limits.descriptions import PLANE
 
 Turns = tuple[Expr, list[tuple[int, float]]]  #: an angle, and the coordinates in it with their factors
 TRIALS = 3  #: random points at which an identity is tried

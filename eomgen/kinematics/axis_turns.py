@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import ROUNDED
 from ..describe.mechanism import Mechanism
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Mat3
-from ..limits.rounding import ROUNDED
 from .topology import Branch, Topology
 
 #: What an entry costs that is neither 0, nor 1 in its own place, also one of a centre of mass, which enters no equation

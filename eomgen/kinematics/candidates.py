@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.constraints import CHOSEN
+from ..base.limits.constraints import CHOSEN
 from ..numeric import conditioning
 
 Array = NDArray[np.float64]

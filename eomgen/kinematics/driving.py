@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.limits.constraints import CONTRADICTION
 from ..constraints import Driver
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..graph.substitute import symbols_of
-from ..limits.constraints import CONTRADICTION
 from ..numeric import Assembly, rank
 from ..numeric.constraint_system import ConstraintSystem
 from ..numeric.continuation import Continuation

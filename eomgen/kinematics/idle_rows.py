@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..base.limits.constraints import BESIDE, FLAT
 from ..constraints import RollingDisc
 from ..constraints.rolling import LYING
 from ..errors import AssemblyError, ModelError
 from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
-from ..limits.constraints import BESIDE, FLAT
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .undefined_rows import place_of

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ..base.limits.numbers import HAIR, NO_LENGTH
 from ..describe.mechanism import Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -13,7 +14,6 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.rounding_bounds import settled_vector, size_of
 from ..graph.vectors import Vec3
 from ..joints.rods import Distance, RevoluteSpherical
-from ..limits.descriptions import HAIR, NO_LENGTH
 
 PAIRS = 12  #: joints of a body up to which all distances between them count, beyond it those from the first to all
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import ROUNDED
 from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -15,7 +16,6 @@ from ..graph.evaluate import evaluate
 from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Vec3
-from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .state import MotionSymbols
 from .tree import Poses

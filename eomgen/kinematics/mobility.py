@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.limits.constraints import CHOSEN
+from ..base.names import hint, joined
 from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
-from ..limits.constraints import CHOSEN
 from ..numeric import choose_independent, independent_rows
 from ..numeric.nearest_branch import differences
 from ..numeric.row_chains import SparseRows
 from ..records import dataclass
-from ..suggestions import hint, joined
 from .candidates import rate_candidates
 from .constraint_functions import Array, ConstraintFunctions
 from .driving import close_driven, follow_drivers

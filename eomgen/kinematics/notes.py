@@ -6,6 +6,10 @@ from collections import Counter
 
 import numpy as np
 
+from ..base.limits.analyses import MOST_ANGLE, SLACK
+from ..base.limits.numbers import ACROSS
+from ..base.operations import CHOICE, OPERATIONS
+from ..base.texts import angle_in_degrees
 from ..constraints import Driver
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -13,10 +17,6 @@ from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
-from ..limits.inertia import ACROSS
-from ..limits.motions import MOST_ANGLE, SLACK
-from ..operations import CHOICE, OPERATIONS
-from ..texts import angle_in_degrees
 from .kinematics import Kinematics
 from .mobility import Mobility, initial_values
 

@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 
-from ..limits.motions import BESIDE
+from ..base.limits.analyses import BESIDE
 from ..numeric.closure import close, closed
 from ..numeric.projection import largest
 from ..numeric.starts import starts

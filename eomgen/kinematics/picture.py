@@ -6,9 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from ..base.files import as_path, save_figure
 from ..errors import MissingDependencyError, bad_file
-from ..files.path_names import as_path
-from ..files.writing import save_figure
 
 TREE, CUT, ELEMENT, BODY = "#1f4e79", "#c0392b", "#7d5ba6", "#eaf1f8"
 WIDE, HIGH = 1.5, 1.35  #: inches for a body beside and above another

@@ -7,16 +7,15 @@ from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..files.inline_pictures import picture_html, side_by_side
-from ..files.terminal import fold, terminal_width
+from ..base.inline_pictures import picture_html, side_by_side
+from ..base.limits.analyses import BESIDE
+from ..base.limits.constraints import MEASURED
+from ..base.texts import fold, html_text, terminal_width
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
-from ..limits.constraints import MEASURED
-from ..limits.motions import BESIDE
 from ..records import dataclass
-from ..texts import html_text
 from .kinematics import Kinematics
 from .mobility import Mobility
 from .notes import find_notes

@@ -17,12 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import BY_CHANCE, LARGE_LOOP, ROUNDED, SMALL_LOOP, TINY_ROOT
 from ..graph.core import Expr
 from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds, with_likely_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..limits.descriptions import BY_CHANCE, LARGE_LOOP, SMALL_LOOP
-from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
 from .row_groups import row_groups
 

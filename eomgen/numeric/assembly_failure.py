@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import CONTRADICTION, MEASURED
+from ..base.limits.constraints import CONTRADICTION, MEASURED
 from . import algebra
 from .closure import FAR, ClosureSystem, close, closed, remoteness
 from .projection import largest

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.constraints import CONTRADICTION, GIVEN
 from ..errors import AssemblyError
-from ..limits.constraints import CONTRADICTION, GIVEN
 from . import algebra
 from .scales import Array, Indices, Scales
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
-from ..limits.motions import NULL
+from ..base.limits.analyses import NULL
+from ..base.limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
 from . import algebra
 from .projection import largest, within
 from .scales import Array, Position, Scales

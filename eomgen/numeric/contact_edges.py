@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.rigid_contacts import FIRM, PIVOTS, RENEWED, SLIPPERY, VAIN
+from ..base.limits.contacts import FIRM, PIVOTS, RENEWED, SLIPPERY, VAIN
 from . import algebra
 from .contact_problem import ContactProblem
 from .space import Array

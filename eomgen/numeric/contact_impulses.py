@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.contacts import MANY, PATIENT, SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED, WARM
 from ..errors import EvaluationError
-from ..limits.rigid_contacts import MANY, PATIENT, SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED, WARM
 from .contact_edges import solve_edges
 from .contact_problem import ContactProblem
 from .space import Array

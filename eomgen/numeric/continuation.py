@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.motions import BLOCKED, UNJUDGED
+from ..base.limits.analyses import BLOCKED, UNJUDGED
 from .curves import OFF, TURNED, Point, predict
 from .projection import largest
 from .scales import Array

@@ -5,8 +5,8 @@ from __future__ import annotations
 from operator import index
 from typing import Any
 
+from ..base.texts import shown
 from ..errors import off_range
-from ..texts import shown
 
 MOST = 10**15  #: all whole numbers up to here are doubles, and their products with sizes of models no infinities
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.limits.numbers import FAINT, NOTHING, SINGULAR, STILL
 from ..errors import NonFiniteError, SingularMassMatrixError
-from ..limits.inertia import FAINT, NOTHING, SINGULAR, STILL
 from . import algebra
 from .scales import Array
 

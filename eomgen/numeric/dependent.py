@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.limits.constraints import ACCEPTED, EXACT, SETTLED
 from ..errors import NonFiniteError, ProjectionError
-from ..limits.constraints import ACCEPTED, EXACT, SETTLED
 from .partitions import Partition, partition
 from .projection import DAMPING, largest, within
 from .scales import Array, Indices, Position, Rate, Scales

@@ -20,9 +20,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base.limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
+from ..base.limits.numbers import SUMMED
 from ..errors import NonFiniteError, ProjectionError
-from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
-from ..limits.rounding import SUMMED
 from . import algebra
 from .space import Array
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..base.limits.analyses import DRIFTED, NULL
 from ..errors import AssemblyError
-from ..limits.motions import DRIFTED, NULL
 from . import algebra
 from .closure import DAMPING, ClosureSystem, close, closed
 from .constraint_system import ConstraintSystem

@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 
-from ..limits.constraints import PREFERENCE
+from ..base.limits.constraints import PREFERENCE
 from .row_chains import SparseRows
 from .scales import Array, Indices
 

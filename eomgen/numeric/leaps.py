@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..limits.motions import LEAPS
+from ..base.limits.analyses import LEAPS
 from .curves import OFF, TURNED, Point, PositionCurve, predict
 from .projection import largest
 

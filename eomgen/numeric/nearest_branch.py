@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import MEASURED
-from ..limits.motions import BESIDE
+from ..base.limits.analyses import BESIDE
+from ..base.limits.constraints import MEASURED
 from .closure import ClosureSystem, WantedValues, close, closed
 from .constraint_system import Assembly, ConstraintSystem
 from .projection import largest

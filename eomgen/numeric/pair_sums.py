@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
+from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from .pair_vectors import across, cross, dot, flat, parts, product, times
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.

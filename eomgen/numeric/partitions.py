@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.constraints import CHOSEN as STRICT
+from ..base.limits.constraints import PREFERENCE
+from ..base.limits.constraints import STATE as RANK
 from ..errors import PartitionError
-from ..limits.constraints import CHOSEN as STRICT
-from ..limits.constraints import PREFERENCE
-from ..limits.constraints import STATE as RANK
 from . import algebra
 from .scales import Array, Indices
 

@@ -24,8 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import EvaluationError
-from ..limits.crossings import (
+from ..base.limits.crossings import (
     ARRIVED,
     CLOSED,
     ENOUGH,
@@ -39,6 +38,7 @@ from ..limits.crossings import (
     STILL,
     WEAKEST,
 )
+from ..errors import EvaluationError
 from . import algebra
 from .partitions import Partition, partition
 from .projection import correct_position, largest, within

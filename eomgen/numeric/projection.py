@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT, TIKHONOV
+from ..base.limits.numbers import EPS, ROUNDED
 from ..errors import NonFiniteError, ProjectionError
-from ..limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT, TIKHONOV
-from ..limits.rounding import EPS, ROUNDED
 from .gram import gram_solver, least, smaller, weakness
 from .scales import Array, GivenRates, Position, Rate, Scales
 

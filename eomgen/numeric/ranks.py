@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import PREFERENCE, UNMOVED
-from ..limits.constraints import STRUCTURE as TOLERANCE
+from ..base.limits.constraints import PREFERENCE, UNMOVED
+from ..base.limits.constraints import STRUCTURE as TOLERANCE
 from . import algebra
 from .scales import Array, Indices
 

@@ -13,8 +13,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
-from ..limits.rounding import ROUNDED
+from ..base.limits.numbers import COMPUTED, DIGITS, MOMENT, ROUNDED, TRIANGLE
 from . import algebra
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.

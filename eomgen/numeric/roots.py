@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from math import isnan
 from typing import TypeVar
 
-from ..limits.rounding import EPS
+from ..base.limits.numbers import EPS
 
 STEPS = 100  #: of one search for a root
 GOLDEN = 0.3819660112501051

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..limits.rounding import QUARTER
+from ..base.limits.numbers import QUARTER
 from .scales import Array
 
 Numbers = Sequence[float]

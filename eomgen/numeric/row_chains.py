@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import STRUCTURE, UNMOVED
+from ..base.limits.constraints import STRUCTURE, UNMOVED
 from . import algebra
 from .ranks import rank
 from .scales import Array, Indices

@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.crossings import SMALL
-from ..limits.rounding import ROUNDED
+from ..base.limits.crossings import SMALL
+from ..base.limits.numbers import ROUNDED
 from .given_rates import GivenRates
 from .space import Array, Indices, Space
 

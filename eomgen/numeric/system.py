@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.systems import BALANCED, FAINT, FIRST, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
 from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
-from ..limits.systems import BALANCED, FAINT, FIRST, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
 from .scales import Array, Indices
 
 STEPS = 30

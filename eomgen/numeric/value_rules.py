@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.descriptions import CLOSING, EDGE, LAW, PERPENDICULAR, SHARP, TENSOR, ZERO
+from ..base.limits.numbers import CLOSING, EDGE, LAW, PERPENDICULAR, SHARP, TENSOR, ZERO
 from .outline_rules import judge_outline, judge_rising, judge_sprocket
 from .rigid_inertia import fault_of_inertia, inertia_scales, longest_within
 from .space import Array

@@ -2,8 +2,7 @@ r"""Printing, LaTeX: a formula -> LaTeX without dollars, such as ``m_2 l_1 l_2 \
 
 from __future__ import annotations
 
-from ..notation.latex_of_names import literal
-from ..notation.notation import Notation
+from ..base.notation import Notation, literal
 from . import formula_tree as tree
 from .formula_writer import FormulaWriter
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..notation.notation import Notation
-from ..texts import html_text
+from ..base.notation import Notation
+from ..base.texts import html_text
 from . import formula_tree as tree
 from .formula_writer import FormulaWriter
 from .given_latex import given_mathml

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from ..notation import read_latex
-from ..notation.notation import Notation
-from ..notation.printing import text_form
-from ..notation.signs import SUPERSCRIPTS
+from ..base.latex import SUPERSCRIPTS, read_latex, text_form
+from ..base.notation import Notation
 from . import formula_tree as tree
 from .formula_writer import FormulaWriter
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import unicodedata
 
-from ..notation.notation import Notation
-from ..notation.signs import SUPERSCRIPTS
+from ..base.latex import SUPERSCRIPTS
+from ..base.notation import Notation
 from . import formula_tree as tree
 from .formula_text import text
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from ..notation.notation import Notation
+from ..base.notation import Notation
 from . import formula_tree as tree
 
 

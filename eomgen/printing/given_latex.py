@@ -1,15 +1,14 @@
 """Printing, given LaTeX: short formulas that are written as LaTeX -> MathML.
 
-The pieces between spaces outside braces are symbols and signs of :mod:`eomgen.notation`.
+The pieces between spaces outside braces are symbols and signs of :mod:`eomgen.base.notation`.
 """
 
 from __future__ import annotations
 
 from functools import cache
 
-from ..notation import NotationError, read_latex
-from ..notation.printing import mathml_form
-from ..texts import html_text
+from ..base.latex import NotationError, mathml_form, read_latex
+from ..base.texts import html_text
 
 
 @cache

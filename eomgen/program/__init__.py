@@ -1,6 +1,6 @@
 """Stage program: SystemTerms -> Program (functions with typed ports, hoisted and counted)."""
 
-from ..kernel_table import KERNELS, Kernel, Sizes
+from ..base.kernel_table import KERNELS, Kernel, Sizes
 from .build_program import ABI, build_program
 from .program import Block, KernelDriver, Limits, Port, Program
 from .terms import SystemTerms

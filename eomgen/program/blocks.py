@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
+from ..base.kernel_table import DAE, NAMED, Sizes
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
 from ..graph.pair_calls import pairs_of_bodies, without_pairs
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..kernel_table import DAE, NAMED, Sizes
 from .block_groups import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ..base.kernel_table import KERNELS, Kernel, Sizes
+from ..base.names import hint, joined
 from ..errors import UnavailableError, UsageError, ill_placed, no_such
 from ..graph.count import count
 from ..graph.pair_calls import has_pair_sums
 from ..graph.substitute import symbols_of
-from ..kernel_table import KERNELS, Kernel, Sizes
-from ..suggestions import hint, joined
 from .block_groups import SHIFTS
 from .blocks import BlockMaker
 from .held_columns import HELD

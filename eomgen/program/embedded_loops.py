@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..base.limits.constraints import ROUNDED, TIKHONOV
+from ..base.limits.crossings import NEAR_SQUARE
+from ..base.limits.numbers import STILL
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import ROUNDED, TIKHONOV
-from ..limits.crossings import NEAR_SQUARE
-from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
 from .leg_motions import Motions

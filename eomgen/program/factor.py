@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..base.limits.numbers import NOTHING, SINGULAR
 from ..graph.core import Expr
-from ..limits.inertia import NOTHING, SINGULAR
 from ..records import dataclass
 
 LONG = 24  #: velocities on the way to ground, on average, with which a mass matrix is written out

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..base.limits.constraints import HELD_STEP
+from ..base.limits.numbers import SINGULAR
 from ..forces.branches import where
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
@@ -16,8 +18,6 @@ from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.eliminate import Matrix, total
 from ..kinematics.switched import SwitchedRow
-from ..limits.constraints import HELD_STEP
-from ..limits.inertia import SINGULAR
 
 
 class LinearValues(NamedTuple):

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..base.operations import CONDITION, operations_with
 from ..graph.core import Expr, Graph
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
-from ..operations import CONDITION, operations_with
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64

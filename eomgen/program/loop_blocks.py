@@ -12,11 +12,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 
+from ..base.limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
+from ..base.limits.crossings import NEAR_SQUARE, SMALL
+from ..base.limits.numbers import ROW
 from ..graph.core import Expr
 from ..kinematics.row_groups import ALL, UNIT
-from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
-from ..limits.crossings import NEAR_SQUARE, SMALL
-from ..limits.rounding import ROW
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, in_parts, rows_of, times, transpose
 from .terms import SystemTerms
 

@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 
+from ..base.limits.constraints import TIKHONOV
 from ..equations.articulated import ConstraintRow
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.pair_calls import list_operands
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
-from ..limits.constraints import TIKHONOV
 from .body_loops import BodyLoops
 from .program import Block, Port
 from .residuals import acceleration_residual, force_residual

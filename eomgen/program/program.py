@@ -8,10 +8,10 @@ from functools import cached_property
 from math import prod
 from typing import Any
 
+from ..base.kernel_table import Sizes
 from ..equations.tree_equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
-from ..kernel_table import Sizes
 from ..records import dataclass
 from .block_groups import REGULAR, USUAL
 from .held_columns import HeldColumns

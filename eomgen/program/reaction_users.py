@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import SINGULAR
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError, Problem
 from ..forces import JointCoordinate, ReactionFriction
@@ -15,7 +16,6 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..limits.inertia import SINGULAR
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from .law_pieces import MANY

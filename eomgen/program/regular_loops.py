@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+from ..base.limits.constraints import LOST
+from ..base.limits.crossings import NEAR_SQUARE
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import LOST
-from ..limits.crossings import NEAR_SQUARE
 from .embedded_loops import SPREAD, embedded_accelerations
 from .leg_motions import Leg, Motions
 from .loop_blocks import LoopBlocks, largest, total_magnitude

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ..base.limits.constraints import MEASURED
 from ..describe.mechanism import Event
 from ..forces.branches import where
 from ..graph.core import Expr
@@ -20,7 +21,6 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.eliminate import Matrix, total
 from ..kinematics.switched import SwitchedRow
-from ..limits.constraints import MEASURED
 from .held_constraints import closed, solve_switched, switched_matrix
 
 #: Equations of a mechanism onto which velocities are brought together with closed ones; of more they are judged only.

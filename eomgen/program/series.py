@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
+from ..base.operations import CONDITION, OPERATIONS
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
-from ..operations import CONDITION, OPERATIONS
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.

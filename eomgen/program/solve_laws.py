@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from ..base.limits.systems import FIXED
 from ..graph.core import Expr, sqrt
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics.eliminate import Matrix, eliminate, total
-from ..limits.systems import FIXED
 from .law_pieces import dependent_on, pieces_of
 from .linear_laws import grows_from_zero, solve_by_largest_pivots
 

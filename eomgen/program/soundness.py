@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ..base.operations import operations_with
 from ..graph.core import Expr
 from ..graph.traverse import reachable
 from ..kinematics import Kinematics
 from ..kinematics.kinematics import ForceTerms
-from ..operations import operations_with
 
 LARGEST = 1e300
 

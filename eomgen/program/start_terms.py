@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+from ..base.operations import OPERATIONS
 from ..errors import TO_BE_FINITE, ModelError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
@@ -13,7 +14,6 @@ from ..graph.tape import record_tape
 from ..graph.traverse import reachable
 from ..kinematics import Kinematics
 from ..kinematics.mobility import initial_values
-from ..operations import OPERATIONS
 
 
 def describe_start(kinematics: Kinematics) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..base.limits.constraints import DIFFERENTIATED, TIKHONOV
 from ..graph.count import count
-from ..limits.constraints import DIFFERENTIATED, TIKHONOV
 from .body_loops import BodyLoops
 from .embedded_loops import EmbeddedLoops
 from .loop_blocks import LoopBlocks, estimate

@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..base.limits.systems import UNTOUCHED
+from ..base.operations import CONDITION, OPERATIONS
 from ..errors import ModelError, Problem
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
@@ -20,8 +22,6 @@ from ..graph.traverse import operands, reachable
 from ..kinematics import Kinematics
 from ..kinematics.reaction_parts import force_and_moment
 from ..kinematics.wrenches import Row6
-from ..limits.systems import UNTOUCHED
-from ..operations import CONDITION, OPERATIONS
 from .reaction_users import Users
 
 PROBES = 3  #: states at which components are looked at

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..notation.notation import Notation
+from ..base.notation import Notation
+from ..base.texts import html_text
 from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row, sum_line
 from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
-from ..texts import html_text
 from .printed_equations import SAMPLED, STILL, PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..notation.notation import Notation
+from ..base.notation import Notation
 from ..printing import latex, sums_in_lines
 from ..printing.formula_of import DIGITS, ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, is_group

@@ -5,15 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from ..files.terminal import fold
-from ..notation import read_latex
-from ..notation.printing import text_form
-from ..notation.signs import SUPERSCRIPTS
+from ..base.latex import SUPERSCRIPTS, read_latex, text_form
+from ..base.texts import fold, visible
 from ..printing import text
 from ..printing.formula_of import ROUNDED
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import MatrixOf, times
-from ..texts import visible
 from .printed_equations import SAMPLED, STILL, PrintedEntry, PrintedEquations, plain
 from .printed_parts import SHORT, PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable

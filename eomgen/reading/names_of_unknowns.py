@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from ..base.notation import Notation
 from ..describe.printed_names import MULTIPLIERS, numbered
 from ..kinematics import Kinematics
 from ..kinematics.state import acceleration_name
-from ..notation.notation import Notation
 
 
 def model_notation(kinematics: Kinematics, more: Iterable[str] = ()) -> Notation:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from ..base.notation import Notation
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..kinematics.state import acceleration_name
-from ..notation.notation import Notation
 from ..printing import PAGE, Formulas, Order, number, text, width
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
 from ..printing.formula_of import DIGITS

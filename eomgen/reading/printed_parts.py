@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 
 import sympy
 
+from ..base.notation import Notation, dotted, raised
 from ..frames import GROUND
 from ..kinematics.state import acceleration_name
-from ..notation import dotted, raised
-from ..notation.notation import Notation
 from ..printing import text
 from ..printing.formula_tree import Formula, Letter, MatrixOf, Name, NumberPart, Product, SumOf, Words
 from .matrix_blocks import find_blocks

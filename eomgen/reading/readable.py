@@ -11,9 +11,9 @@ from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
+from ..base.notation import Notation
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
-from ..notation.notation import Notation
 from .names_of_unknowns import model_notation
 from .quantities import PointMotion, Quantities, require_bodies
 from .quantities_of_methods import QuantitiesOfMethods

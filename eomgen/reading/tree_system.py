@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.operations import operations_with
 from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import LEAVES, reachable
-from ..operations import operations_with
 from .quantities import Quantities, Row, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..base.names import hint
 from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, at_odds, incomplete
@@ -18,7 +19,6 @@ from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
 from ..runtime.near_names import UnknownNameError
-from ..suggestions import hint
 from .names_of_unknowns import momentum_names
 from .put_in import put_in, read_value, read_values
 from .quantities import Quantities

@@ -9,9 +9,9 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 
+from ..base.files import open_plain
+from ..base.limits.numbers import NAME
 from ..errors import ModelError, Problem, UsageError
-from ..files.reading import open_plain
-from ..limits.files import NAME
 from .xml_text import XmlElement
 
 _ELSEWHERE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:/")  # a drive, or the scheme of a URL

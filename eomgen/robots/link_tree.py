@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import SINGULAR
 from ..describe.names import nearest
 from ..errors import ModelError
-from ..limits.inertia import SINGULAR
 from ..numeric.rigid_inertia import EXCESS, fault_of_inertia, inertia_scales, longest_within
 from ..numeric.rotation_matrices import about
 from .robot import Loop, Robot, RobotJoint, RobotLink, RobotOptions

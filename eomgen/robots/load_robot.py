@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.files import as_name
+from ..base.limits.numbers import LARGEST
 from ..describe.constant_texts import constant
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, ill_typed, no_choice, no_such
-from ..files.path_names import as_name
-from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
 from .robot import CONVERTED, RobotOptions

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import MEMORY, SECONDS, WAIT
 from ..errors import MissingDependencyError, ModelError
-from ..limits.files import MEMORY, SECONDS, WAIT
 from .mjcf_text import Text
 from .xml_text import XmlElement
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import LARGEST
 from ..errors import ModelError
-from ..limits.files import LARGEST
 from .mjcf_files import Lines
 from .robot import Place, Robot
 from .xml_text import XmlElement

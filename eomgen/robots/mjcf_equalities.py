@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.files import IMPEDANCE
+from ..base.limits.numbers import IMPEDANCE
 from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
 from .robot import Loop, Sum, Tie

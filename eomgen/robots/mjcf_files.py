@@ -11,8 +11,8 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+from ..base.limits.numbers import COPIES, DEPTH, ELEMENTS, ENTRIES, FILES, PIXELS, SIZE
 from ..errors import ModelError, Problem
-from ..limits.files import COPIES, DEPTH, ELEMENTS, ENTRIES, FILES, PIXELS, SIZE
 from .constructs import Met, count_all, is_whole
 from .contained import Folder
 from .mjcf_constructs import find_mjcf, path_of

@@ -11,8 +11,8 @@ import os
 import re
 from xml.sax.saxutils import quoteattr
 
+from ..base.limits.numbers import MESHES
 from ..errors import ModelError, Problem
-from ..limits.files import MESHES
 from .contained import Folder, plain, stem
 from .mjcf_files import Trees
 from .xml_text import XmlElement

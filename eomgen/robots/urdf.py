@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import LARGEST
 from ..describe.joint_data import limits_nothing
 from ..errors import ModelError
-from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import SWITCH
 from .robot import CONVERTED, Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base.files import open_plain
+from ..base.limits.numbers import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 from ..errors import MissingDependencyError, ModelError, Problem
-from ..files.reading import open_plain
-from ..limits.files import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 
 
 @dataclass

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..limits.rounding import TINY
+from ..base.limits.numbers import TINY
 from .scalars import (
     Scalar,
     atan2,

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.numbers import UNIT
 from ..graph.core import Expr
-from ..limits.descriptions import UNIT
 from ..numeric.rotation_matrices import quarter_turns
 
 Scalar = Any  #: a number, an :class:`~eomgen.graph.Expr` or a SymPy expression

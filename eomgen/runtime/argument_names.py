@@ -7,8 +7,8 @@ from functools import wraps
 from inspect import signature
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ..base.kernel_table import argument
 from ..errors import at_odds
-from ..kernel_table import argument
 
 if TYPE_CHECKING:
     from .layout import Layout

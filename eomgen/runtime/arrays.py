@@ -17,7 +17,7 @@ from zipfile import ZIP_STORED, ZipFile, ZipInfo
 import numpy as np
 from numpy.lib import format as npy
 
-from ..files.reading import open_plain
+from ..base.files import open_plain
 
 #: Bytes that any file may unfold to, and how many for each of its own: columns of zeros shrink a lot, these do not.
 SMALL, UNFOLDED = 2**28, 100

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.constraints import STATE
+from ..base.limits.numbers import SINGULAR
 from ..errors import UnavailableError, ill_shaped
-from ..limits.constraints import STATE
-from ..limits.inertia import SINGULAR
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.projection import correct_position

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.limits.constraints import GONE
+from ..base.limits.constraints import PASSED as SINGULAR
+from ..base.limits.numbers import TINY
 from ..errors import EvaluationError
-from ..limits.constraints import GONE
-from ..limits.constraints import PASSED as SINGULAR
-from ..limits.rounding import TINY
 from ..numeric import algebra
 from ..numeric.scales import Array
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..limits.inertia import SINGULAR
+from ..base.limits.numbers import SINGULAR
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array

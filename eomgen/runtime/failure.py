@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.kernel_table import NAMED
+from ..base.limits.analyses import FLAT, LOCKED
+from ..base.limits.numbers import LARGE_ROOT, TINY_ROOT
 from ..errors import STATUS, EvaluationError
-from ..kernel_table import NAMED
-from ..limits.motions import FLAT, LOCKED
-from ..limits.rounding import LARGE_ROOT, TINY_ROOT
 from ..numeric.scales import Array
 from .layout import Layout
 

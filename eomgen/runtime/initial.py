@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..errors import AssemblyError, calls_within
-from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed

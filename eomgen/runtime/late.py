@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..kernel_table import NAMED
+from ..base.kernel_table import NAMED
 from ..numeric.scales import Array
 from .argument_names import both_names
 
@@ -27,7 +27,7 @@ class LateCore:
     late : sequence of str
         Names of the further kernels.
     load : callable
-        Makes a core of those that are late together: of :attr:`~..kernel_table.Kernel.late` of the table.
+        Makes a core of those that are late together: of :attr:`~..base.kernel_table.Kernel.late` of the table.
 
     Attributes
     ----------

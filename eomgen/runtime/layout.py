@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.kernel_table import NAMED, Sizes
 from ..errors import bad_data, cannot, ill_shaped
-from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
 from .allowed_parameters import require_allowed
 from .near_names import check_names, plain_name, without_dots

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from ..base.files import as_path
 from ..errors import bad_data
-from ..files.path_names import as_path
 from .arrays import BROKEN, read_arrays
 from .storage import FORMAT, RUNS, Stored
 from .trajectory import Trajectory

@@ -7,9 +7,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from ..base.names import undotted
+from ..base.texts import shown
 from ..errors import MissingDependencyError, UnavailableError, UsageError, at_odds, ill_typed
-from ..instance_names import undotted
-from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
 
@@ -62,7 +62,7 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     choice = list(dict.fromkeys(allowed))
-    if near := import_module("..suggestions", __package__).closest(name, choice, 3):
+    if near := import_module("..base.names", __package__).closest(name, choice, 3):
         return f"did you mean {' or '.join(near)}?"
     if not choice:
         return "there are none"

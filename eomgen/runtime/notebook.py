@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
-from ..files.inline_pictures import picture_html, side_by_side
-from ..kernel_table import KERNELS
-from ..notation.notation import Notation
-from ..texts import html_table, html_text
+from ..base.inline_pictures import picture_html, side_by_side
+from ..base.kernel_table import KERNELS
+from ..base.notation import Notation
+from ..base.texts import html_table, html_text
 from .near_names import require
 from .plotting import choose, height, stack
 from .show_parts import load_show

@@ -14,10 +14,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.kernel_table import NAMED, argument
+from ..base.texts import shown
 from ..errors import STATUS, EvaluationError, NonFiniteError
-from ..kernel_table import NAMED, argument
 from ..numeric.scales import Array
-from ..texts import shown
 from .argument_names import both_names
 from .layout import Layout
 from .numpy_drivers import Drivers
@@ -45,8 +45,8 @@ class NumpyCore:
     metadata : str or mapping
         The JSON text of model.json, or what it holds.
     blocks : mapping of str to callable
-        ``f(t, x, u, c) -> (n_out, ...)``: kernels of :data:`~..kernel_table.KERNELS`, and the inner blocks ``terms``,
-        ``position``, ``rate``, ``residual_jacobian`` or ``residual_tangent``, ``accelerated_outputs``.
+        ``f(t, x, u, c) -> (n_out, ...)``: kernels of :data:`~..base.kernel_table.KERNELS`, and the inner blocks
+        ``terms``, ``position``, ``rate``, ``residual_jacobian`` or ``residual_tangent``, ``accelerated_outputs``.
     precompute : callable, optional
         ``p -> c``, constants that follow from the parameters, c[:n_p] = p; without it c = p.
 

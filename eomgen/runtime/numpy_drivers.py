@@ -12,9 +12,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..base.limits.crossings import NEAR, UNTOLD
+from ..base.limits.numbers import SINGULAR
 from ..errors import PartitionError, SingularMassMatrixError, UnsolvedError
-from ..limits.crossings import NEAR, UNTOLD
-from ..limits.inertia import SINGULAR
 from ..numeric import algebra, embedded, passing, projection
 from ..numeric.definite import correlated
 from ..numeric.dependent import kinematics as kinematics_of

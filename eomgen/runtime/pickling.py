@@ -16,11 +16,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ..base.files import MANIFEST, find_module, load_source, read_entry, read_trusted, require_trusted
+from ..base.kernel_table import NAMED
 from ..errors import ToolchainError, cannot
-from ..files.build_folder import MANIFEST, read_entry
-from ..files.ownership import read_trusted, require_trusted
-from ..files.source import find_module, load_source
-from ..kernel_table import NAMED
 from ..numeric.scales import Array
 from .late import LateCore, eager
 

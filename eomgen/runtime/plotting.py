@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.pictures import FAINT
+from ..base.notation import TIME, Notation, label
 from ..errors import at_odds, cannot, incomplete
-from ..limits.pictures import FAINT
-from ..notation.labels import TIME, label
-from ..notation.notation import Notation
 from ..numeric.scales import Array
 from .near_names import plain_name, read_names, require, unknown
 from .refined import FINE, refined, refined_energy, states_at

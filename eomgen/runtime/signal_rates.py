@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.numbers import TINY
+from ..base.limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..errors import UsageError, cannot, incomplete
-from ..limits.rounding import TINY
-from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
 from .input_kinds import Expressed, Tabulated, of_time
 from .layout import Layout

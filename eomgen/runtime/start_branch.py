@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..base.limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH, PASSED
 from ..errors import AssemblyError
-from ..limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH, PASSED
 from ..numeric import algebra
 from ..numeric.closure import ClosureSystem
 from ..numeric.projection import largest

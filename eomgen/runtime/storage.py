@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.files import as_path, whole_file
+from ..base.texts import visible
 from ..errors import bad_file, cannot
-from ..files.path_names import as_path
-from ..files.writing import whole_file
 from ..numeric.scales import Array
-from ..texts import visible
 from .arrays import sealed
 from .near_names import require
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..texts import visible
+from ..base.texts import visible
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

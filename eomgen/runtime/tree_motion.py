@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.analyses import FOLLOWED
 from ..errors import EvaluationError, ProjectionError, ill_shaped, no_number, too_large
-from ..limits.motions import FOLLOWED
 from ..numeric.continuation import Continuation
 from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
 from ..numeric.scales import Array

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.runs import DIFFERENCE, WIDE_DIFFERENCE
+from ..base.names import place_of_marker
 from ..errors import cannot
-from ..limits.runs import DIFFERENCE, WIDE_DIFFERENCE
-from ..marker_places import place_of_marker
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from ..numeric.scales import Array
 from .initial import Given, Initial

@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..base.files import as_path, whole_file
+from ..base.notation import Notation
+from ..base.texts import shown
 from ..errors import ill_typed, off_range
-from ..files.path_names import as_path
-from ..files.writing import whole_file
-from ..notation.notation import Notation
-from ..texts import shown
 from .film_frames import DPI, MOST_DOTS, Frames
 from .force_arrows import with_arrows
 from .player import InlineFilm, InlinePage

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..limits.pictures import NOTHING, SEEN
+from ..base.limits.pictures import NOTHING, SEEN
 from .data import Array
 from .plane import page_axes
 from .scene import Scene

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..texts import html_text
+from ..base.texts import html_text
 from .colors import color_of, style_of
 from .data import Array
 from .label_places import offsets_within

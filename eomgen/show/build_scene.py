@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.pictures import ROUNDED, SAME
+from ..base.names import hint
 from ..errors import no_such, not_finite
-from ..limits.pictures import ROUNDED, SAME
-from ..suggestions import hint
 from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData
 from .joints import move_frame
 from .scene import Item, attachments, placed

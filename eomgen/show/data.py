@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.operations import OPERATIONS
 from ..errors import cannot
-from ..operations.table import OPERATIONS
 
 Array = NDArray[np.float64]
 GROUND = -1

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import NOTHING, ROUNDED, SAME
+from ..base.limits.pictures import NOTHING, ROUNDED, SAME
 from .cam_curves import contour_items, lift_items
 from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame

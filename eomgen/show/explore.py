@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.pictures import HELD, SAME
+from ..base.texts import html_text
 from ..errors import EomgenError
-from ..limits.pictures import HELD, SAME
-from ..texts import html_text
 from .browser import move_objects, scene_plot
 from .build_scene import build_scene
 from .data import Array

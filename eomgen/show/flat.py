@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
 from .label_places import NAME_STYLE, NAMES, name_offsets

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.pictures import NOTHING, SAME, STEP
 from ..errors import no_such
-from ..limits.pictures import NOTHING, SAME, STEP
 from .data import GROUND, Array, PlacedFrame, read_picture
 from .scene import Item, Scene, placed
 from .shown_motion import ShownMotion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from ..numeric import algebra
 from .data import Array, PictureData
 from .solids import Mesh

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
 from .scene import BAR, Item, _is_block, attached, placed, symbol_mesh
 from .solids import Mesh, cone, turned

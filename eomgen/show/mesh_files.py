@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.files import as_name, beside, open_plain
+from ..base.limits.numbers import MESH
+from ..base.limits.pictures import NOTHING
+from ..base.texts import shown, visible
 from ..errors import UsageError, bad_data, bad_file, too_large
-from ..files.path_names import as_name, beside
-from ..files.reading import open_plain
-from ..limits.files import MESH
-from ..limits.pictures import NOTHING
-from ..texts import shown, visible
 from .data import Array
 from .solids import Mesh, Triangles
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.pictures import STEP
 from ..errors import EvaluationError
-from ..limits.pictures import STEP
 from .animate import write
 from .build_scene import build_scene
 from .data import Array, read_picture

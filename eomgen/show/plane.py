@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..limits.pictures import NOTHING, SAME
+from ..base.limits.pictures import NOTHING, SAME
 from ..numeric import algebra
 from .data import Array
 

@@ -8,7 +8,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 
-from ..texts import html_text
+from ..base.texts import html_text
 from .optional import matplotlib
 from .shown_motion import ShownMotion
 from .unit_panels import ShownColumn, by_unit, draw_curves

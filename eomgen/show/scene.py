@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
 from .hollow_plates import hollow_lines, hollow_plate
 from .mesh_files import mesh_of

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.pictures import NOTHING, SAME
+from ..base.limits.pictures import NOTHING, SAME
 from ..numeric import algebra
 from .colors import color_of, style_of
 from .data import Array

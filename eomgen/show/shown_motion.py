@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.pictures import ROUNDED
+from ..base.notation import TIME, Notation, label
 from ..errors import cannot, off_range, too_large
-from ..limits.pictures import ROUNDED
-from ..notation.labels import TIME, label
-from ..notation.notation import Notation
 from .build_scene import build_scene
 from .data import Array
 from .scene import Scene

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.pictures import SAME
+from ..base.limits.pictures import SAME
 from ..numeric import algebra
 from .data import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..notation.labels import label
+from ..base.notation import label
 from .data import Array
 from .shown_motion import ShownMotion
 

@@ -10,10 +10,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..base.files import as_path, refuse_link, whole_file
+from ..base.texts import shown
 from ..errors import MissingDependencyError, at_odds, bad_file, no_choice
-from ..files.path_names import as_path
-from ..files.writing import refuse_link, whole_file
-from ..texts import shown
 from .film_frames import Frames
 from .optional import k3d, matplotlib
 from .palettes import COLORS, indices_in, palette_of

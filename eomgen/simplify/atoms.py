@@ -29,7 +29,7 @@ class Atom(NamedTuple):
     ----------
     kind : str
         ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
-        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.operations`, or a
+        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.base.operations`, or a
         declared function.
     what : Any
         The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.

@@ -12,11 +12,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..base.limits.numbers import ALIKE
 from ..graph.core import Expr, Graph
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute
 from ..graph.traverse import LEAVES, operands, reachable
-from ..limits.rounding import ALIKE
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone

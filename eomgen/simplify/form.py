@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import field
 from typing import Any
 
+from ..base.operations import CONDITION, operations_with
 from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, common_graph, operands, reachable
-from ..operations import CONDITION, operations_with
 from ..records import dataclass
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .exact_quotients import without_exact_quotients

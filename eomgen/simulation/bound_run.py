@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.runs import SCIPY_ATOL
 from ..errors import EvaluationError, SimulationError
-from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .stalled import Crawling

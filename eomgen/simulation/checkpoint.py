@@ -13,16 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.files import as_path, remove_parts, whole_file
+from ..base.texts import shown
 from ..errors import UsageError, bad_data, bad_file, no_choice, off_range
-from ..files.path_names import as_path
-from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays, sealed
 from ..runtime.identity import code_digest, differences, digest
 from ..runtime.input_kinds import Expressed
 from ..runtime.room import read_number
 from ..runtime.tapes import DeclaredSignal
-from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.constraints import MEASURED
+from ..base.limits.runs import MOST_STEPS, WHOLE
 from ..errors import UsageError, cannot, off_range, untrue
-from ..limits.constraints import MEASURED
-from ..limits.runs import MOST_STEPS, WHOLE
 from ..numeric.scales import Array
 from ..runtime.refusals import require_switched
 from .events import instant

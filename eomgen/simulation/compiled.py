@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..errors import cannot, ill_shaped
-from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names
 from ..runtime.signals import Forcing

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.runs import ATOL, RTOL
 from ..errors import SimulationError, at_odds, calls_within, cannot, no_choice
-from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
 from ..runtime.given_start import Span, Start

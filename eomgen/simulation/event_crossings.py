@@ -13,8 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.limits.runs import (
+    ASIDE,
+    CROWDED,
+    HALVED,
+    INSTANT,
+    LATE,
+    MOMENTARY,
+    RESTING,
+    SAMPLED,
+    TOUCHED,
+    TOUCHING,
+    TURNING,
+)
 from ..errors import ZenoError
-from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
 from ..numeric.roots import Found, Search, search_least, search_root
 from ..numeric.scales import Array
 from .event_values import EventValues

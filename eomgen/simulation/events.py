@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.limits.numbers import TINY
+from ..base.limits.runs import CROWD, EARLIEST, INSTANT
+from ..base.texts import shown
 from ..errors import ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range
-from ..limits.rounding import TINY
-from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state
 from ..runtime.room import as_real
-from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

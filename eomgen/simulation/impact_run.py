@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..analysis.impact import Impact, strike_run
 from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..analysis.impact_sliding import Rough, check_friction
+from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
+from ..base.limits.runs import INSTANT
 from ..errors import SimulationError, cannot, no_such, off_range
-from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
-from ..limits.runs import INSTANT
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of

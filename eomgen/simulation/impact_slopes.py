@@ -18,8 +18,8 @@ import numpy as np
 
 from ..analysis.closed_rows import closed_rows, with_closed_rows
 from ..analysis.constrained import free_motions, solve_multipliers
+from ..base.limits.impacts import OFF
 from ..errors import NoDerivativeError
-from ..limits.impacts import OFF
 from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array

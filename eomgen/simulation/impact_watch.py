@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.impact_gaps import Gaps
-from ..limits.impacts import FOUND, STARTED
-from ..limits.runs import INSTANT
+from ..base.limits.impacts import FOUND, STARTED
+from ..base.limits.runs import INSTANT
 from ..numeric.roots import carry_out, find_root, search_least
 from ..numeric.scales import Array
 

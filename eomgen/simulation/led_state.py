@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.limits.constraints import ALIKE
 from ..errors import AssemblyError
-from ..limits.constraints import ALIKE
 from ..numeric import algebra
 from ..numeric.scales import Array
 

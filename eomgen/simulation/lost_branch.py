@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.balance import assembly_jacobian
+from ..base.limits.constraints import PASSED
+from ..base.limits.impacts import OPENS
 from ..errors import NoDerivativeError
-from ..limits.constraints import PASSED
-from ..limits.impacts import OPENS
 from ..numeric import algebra
 from ..runtime.change_points import scaled_jacobians
 from .sensitivity_start import Differentiated

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.runs import SUNK, UNHURRIED
 from ..errors import EvaluationError, calls_within
-from ..limits.runs import SUNK, UNHURRIED
 from ..numeric.scales import Array
 from .events import is_told_by_the_caller
 

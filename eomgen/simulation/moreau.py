@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.contacts import ITERATIONS, SOLVED
+from ..base.limits.runs import SAME
+from ..base.texts import shown
 from ..errors import (
     EvaluationError,
     SimulationError,
@@ -20,15 +23,12 @@ from ..errors import (
     off_range,
     untrue,
 )
-from ..limits.rigid_contacts import ITERATIONS, SOLVED
-from ..limits.runs import SAME
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.room import read_number, require_room, require_steps
 from ..runtime.signals import Forcing
-from ..texts import shown
 from .bound_run import watch_run
 from .contact_forces import ContactForces, ForceSums
 from .events import Events, is_told_by_the_caller

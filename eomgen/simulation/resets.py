@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.limits.runs import AHEAD, CROWDED, TOUCHING
 from ..errors import ZenoError
-from ..limits.runs import AHEAD, CROWDED, TOUCHING
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, WAIT, Events, RunEvent, crowd_of
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.rigid_contacts import LINKED
+from ..base.limits.contacts import LINKED
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .rigid_rows import RigidRows

@@ -33,8 +33,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SimulationError
-from ..limits.rigid_contacts import (
+from ..base.limits.contacts import (
     APART,
     CLOSINGS,
     GENTLER,
@@ -47,6 +46,7 @@ from ..limits.rigid_contacts import (
     UNSOLVED,
     YIELDING,
 )
+from ..errors import SimulationError
 from ..numeric.contact_impulses import ContactImpulses, solve_contacts
 from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.runs import ATOL, RTOL
+from ..base.texts import shown
 from ..errors import ill_shaped, ill_typed, incomplete, no_choice, off_range
-from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
 from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
-from ..texts import shown
 from .integrate import NAMES
 from .tolerances import check_step
 

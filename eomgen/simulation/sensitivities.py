@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.analyses import SINGULAR
+from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..errors import NoDerivativeError, SimulationError
-from ..limits.motions import SINGULAR
-from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place

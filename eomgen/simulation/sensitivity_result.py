@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.files import whole_file
 from ..errors import ill_typed
-from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.run_parts import Named

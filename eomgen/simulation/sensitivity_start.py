@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..analysis.balance import assembly_jacobian
+from ..base.limits.constraints import CONTRADICTION, STATE
+from ..base.names import place_of_marker
 from ..errors import at_odds, ill_placed, incomplete, untrue
-from ..limits.constraints import CONTRADICTION, STATE
-from ..marker_places import place_of_marker
 from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array

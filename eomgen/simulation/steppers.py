@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..errors import UnavailableError, UsageError, cannot
-from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.near_names import require

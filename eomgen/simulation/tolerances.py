@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.limits.runs import LEAST_RTOL
+from ..base.texts import shown
 from ..errors import ill_shaped, no_number, off_range
-from ..limits.runs import LEAST_RTOL
 from ..runtime.room import as_real, read_flag, read_number
-from ..texts import shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 

@@ -8,9 +8,9 @@ from stat import S_ISREG
 
 import numpy as np
 
+from ..base.files import as_name
+from ..base.limits.numbers import MESH
 from ..errors import UsageError, bad_data, bad_file, off_range, too_large
-from ..files.path_names import as_name
-from ..limits.files import MESH
 from ..records import dataclass
 
 

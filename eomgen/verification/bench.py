@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.kernel_table import NAMED
+from ..base.limits.analyses import NUDGE
+from ..base.limits.constraints import EXACT
+from ..base.limits.numbers import TINY
 from ..graph.core import Expr
-from ..kernel_table import NAMED
-from ..limits.constraints import EXACT
-from ..limits.rounding import TINY
-from ..limits.verification import NUDGE
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..program.collect import collect_terms

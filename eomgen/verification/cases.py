@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.limits.analyses import CLOSED, REGULAR
 from ..errors import EomgenError
-from ..limits.verification import CLOSED, REGULAR
 from ..numeric import algebra
 from ..numeric.scales import Array
 

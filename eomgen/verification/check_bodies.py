@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.rounding import EPS, TINY
+from ..base.limits.numbers import EPS, TINY
 from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers

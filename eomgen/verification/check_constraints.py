@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..limits.verification import FIRST_DIFFERENCE, NO_FORCE, SECOND_DIFFERENCE
+from ..base.limits.analyses import FIRST_DIFFERENCE, NO_FORCE, SECOND_DIFFERENCE
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base.limits.analyses import OFF_CONSTRAINTS
+from ..base.limits.numbers import EPS, TINY
 from ..errors import EomgenError
-from ..limits.rounding import EPS, TINY
-from ..limits.verification import OFF_CONSTRAINTS
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .bench import Bench, numbers

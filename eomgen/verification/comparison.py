@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..limits.verification import ROUNDED
+from ..base.limits.analyses import ROUNDED
 from ..numeric.scales import Array
 from .finding import Finding
 

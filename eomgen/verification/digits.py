@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.operations import OPERATIONS
 from ..errors import MissingDependencyError
 from ..graph.core import Expr
 from ..graph.pair_calls import PairCall
 from ..graph.traverse import common_graph, reachable
-from ..operations import OPERATIONS
 
 DIGITS = 60
 FIRST = "1e-16"  #: step of first differences: truncation 1e-32, rounding 1e-44

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite, isnan, nan
 from typing import Any, NamedTuple
 
-from ..files.terminal import fold, terminal_width
+from ..base.texts import fold, terminal_width
 
 WIDTH = 118  #: of the table
 NOT_REACHED = "not reached"  #: how the note of a check begins for which no time was left

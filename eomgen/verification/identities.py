@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.limits.analyses import CLOSED
+from ..base.limits.numbers import EPS
 from ..errors import EomgenError
-from ..limits.rounding import EPS
-from ..limits.verification import CLOSED
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array

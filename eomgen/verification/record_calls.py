@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.limits.analyses import BUILDS, SPREAD_OF_ROUNDING, ZERO
+from ..base.limits.numbers import EPS
 from ..errors import EomgenError
-from ..limits.rounding import EPS
-from ..limits.verification import BUILDS, SPREAD_OF_ROUNDING, ZERO
 from ..numeric.scales import Array
 from .cases import Case, random_cases
 
@@ -43,8 +43,8 @@ TIMED = ("rhs", "jacobian", "outputs")  #: take t first; the others by name
 def record_calls(module: BoundModel | None) -> str:
     """The text of ``tests/recorded.json``: calls, their arguments, results, and the most by which a result may differ.
 
-    The bound is :data:`~..limits.verification.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
-    changes, :data:`~..limits.verification.BUILDS` of the largest number, and :data:`~..limits.verification.ZERO`.
+    The bound is :data:`~..base.limits.analyses.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
+    changes, :data:`~..base.limits.analyses.BUILDS` of the largest number, and :data:`~..base.limits.analyses.ZERO`.
 
     Parameters
     ----------

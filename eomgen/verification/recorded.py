@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.kernel_table import NAMED
 from ..errors import EomgenError
-from ..kernel_table import NAMED
 from ..numeric.scales import Array
 from .comparison import FAILED, Comparison, size_of
 from .finding import Finding

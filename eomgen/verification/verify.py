@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.limits.numbers import EPS
+from ..base.limits.runs import MOST_STATES
+from ..base.texts import shown
 from ..errors import EomgenError, off_range
-from ..limits.rounding import EPS
-from ..limits.runs import MOST_STATES
 from ..numeric.counts import read_count
 from ..simulation.events import told_by_the_caller
-from ..texts import shown
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification

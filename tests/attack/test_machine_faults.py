@@ -309,7 +309,7 @@ def test_two_versions_on_one_cache(target: str, tmp_path: Path) -> None:
     for file, old, new in (
         ("eomgen/__init__.py", '__version__ = "', '__version__ = "9.'),
         ("eomgen/templates/c/eomgen_sincos.h", "*sine = (pack)(", "*sine = -(pack)("),
-        ("eomgen/operations/table.py", 'c="sine_of({})"', 'c="sine_of({})", numpy="(-np.sin({}))"'),
+        ("eomgen/base/operations.py", 'c="sine_of({})"', 'c="sine_of({})", numpy="(-np.sin({}))"'),
     ):
         text = (tmp_path / file).read_text(encoding="utf-8")
         assert old in text, file

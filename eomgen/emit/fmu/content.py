@@ -8,10 +8,10 @@ from dataclasses import replace
 from hashlib import sha256
 from typing import Any, NamedTuple
 
+from ...base.limits.in_c import definitions
+from ...base.texts import html_text
 from ...layer import read_layer
-from ...limits.in_c import definitions
 from ...program import Program
-from ...texts import html_text
 from ..c import emit_c
 from ..sources import read_template, render
 from .model_description import describe_build, describe_model

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree
 
 from ... import __version__
+from ...base.texts import one_line
 from ...describe.units import read_unit
 from ...program import Program
-from ...texts import one_line
 from .variables import Variable
 
 TOOL = f"eomgen {__version__}"

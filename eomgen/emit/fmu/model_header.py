@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ...limits import runs
+from ...base.limits import runs
 from ...program import Program
 from ..sources import number_texts
 from .variables import coordinate_of, find_exact

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .rounding import EPS
+from .numbers import EPS
 
 #: Scaled distance from the constraints up to which coordinates of a reset count as on them.
 OFF = 1e-9

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 
-from . import constraints, crossings, inertia, rigid_contacts, rounding, runs, systems
+from . import constraints, contacts, crossings, numbers, runs, systems
 
 KINDS = {
-    "ROUNDING": rounding,
+    "ROUNDING": numbers,
     "CONSTRAINTS": constraints,
     "CROSSINGS": crossings,
-    "INERTIA": inertia,
+    "INERTIA": numbers,
     "SYSTEMS": systems,
-    "RIGID": rigid_contacts,
+    "RIGID": contacts,
     "RUNS": runs,
 }
 _USED = re.compile(rf"\b({'|'.join(KINDS)})_([A-Z][A-Z_]*)\b")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import EomgenError
-from ..texts import html_text
+from .texts import html_text
 
 DPI = 110  #: dots of a picture in an inch of its figure
 MARGIN = 0.06  #: around what is drawn (inch)

@@ -1,8 +1,9 @@
-"""A name that is not known -> the names that were probably meant."""
+"""Names: one that is not known -> those that were probably meant; parts of dotted names; places of markers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 
 #: What other programs and textbooks call it -> what eomgen does, of which those are suggested that there are.
 SYNONYMS = {
@@ -146,3 +147,35 @@ def hint(name: object, known: Iterable[str], quoted: bool = True) -> str:
 def joined(*parts: str, by: str = "; ") -> str:
     """The parts that are not empty."""
     return by.join(part for part in parts if part)
+
+
+# -- names of instances: ``leg1.hip``, as people write it, -> ``leg1_hip``, as the model has it ------------------------
+
+
+def undotted(name: str, instances: Mapping[str, str]) -> str:
+    """A name whose first part is an instance: its prefix and the rest, instances within instances too.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``leg1.hip``, or ``leg1.shin.end`` of a marker.
+    instances : mapping of str to str
+        Name of an instance -> its prefix.
+    """
+    head, _, rest = name.partition(".")
+    while rest and head in instances:
+        name = instances[head] + rest
+        head, _, rest = name.partition(".")
+    return name
+
+
+# -- place and velocity of a marker, in ground axes: ``x(rod.tip)`` and ``vx(rod.tip)`` --------------------------------
+
+
+_PLACE = re.compile(r"(v?[xyz])\((\w+(?:\.\w+)*)\)")
+
+
+def place_of_marker(name: object) -> tuple[str, str] | None:
+    """``x`` or ``vx`` and the marker of a name such as ``x(rod.tip)``; None for other names."""
+    found = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
+    return (found[1], found[2]) if found else None

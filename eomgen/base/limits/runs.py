@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .rounding import EPS
+from .numbers import EPS
 
 # -- tolerances ------------------------------------------------------------------------------------------------------
 RTOL, ATOL = 1e-8, 1e-10  #: of a run, where nothing is said
