@@ -175,30 +175,23 @@ def inverse_dynamics(robot: Robot, a: Any) -> Any:
 def write_derivatives(model: Any) -> dict[str, Text]:
     """Texts of one argument: by what they differentiate.
 
-    ``inverse_dynamics_derivatives`` and ``inverse_dynamics_hessian_product`` of [q; v; a (w; d)], ``jacobian`` of
-    [q; v; tau] and ``rhs_hessian_product`` of [q; v; tau; w; d], by whichever recursion is shorter then.
+    ``inverse_dynamics_derivatives`` of [q; v; a], ``jacobian`` of [q; v; tau] by whichever recursion is shorter then.
     """
     n_q, n = model.nq, model.nv
-    z, w, d = ca.SX.sym("z", n_q + 2 * n), ca.SX.sym("w", n), ca.SX.sym("d", n_q + 2 * n)
+    z = ca.SX.sym("z", n_q + 2 * n)
     drag = ca.SX(ca.DM(np.asarray(model.damping)))
     robot = Robot(model, z[:n_q], z[n_q : n_q + n])
     tau = inverse_dynamics(robot, z[n_q + n :]) + drag * robot.v
-    bent = ca.jtimes(ca.gradient(ca.dot(w, tau), z), z, d)
-    found = {
-        "inverse_dynamics_derivatives": _text("", [z], ca.jacobian(tau, z)),
-        "inverse_dynamics_hessian_product": _text("", [z, w, d], bent),
-    }
-    ways: dict[str, list[Text]] = {"jacobian": [], "rhs_hessian_product": []}
+    ways: list[Text] = []
     for method, solve in (("articulated bodies", articulated), ("composite bodies", composite)):
         x, u = ca.SX.sym("x", n_q + n), ca.SX.sym("u", n)
         robot = Robot(model, x[:n_q], x[n_q:])
         rates = ca.vertcat(robot.rates(), solve(robot, u - drag * robot.v))
-        w, d = ca.SX.sym("w", n_q + n), ca.SX.sym("d", n_q + 2 * n)
-        both = ca.vertcat(x, u)
-        ways["jacobian"].append(_text(method, [x, u], ca.jacobian(rates, x)))
-        bent = ca.jtimes(ca.gradient(ca.dot(w, rates), both), both, d)
-        ways["rhs_hessian_product"].append(_text(method, [x, u, w, d], bent))
-    return found | {name: min(texts, key=lambda text: text.operations) for name, texts in ways.items()}
+        ways.append(_text(method, [x, u], ca.jacobian(rates, x)))
+    return {
+        "inverse_dynamics_derivatives": _text("", [z], ca.jacobian(tau, z)),
+        "jacobian": min(ways, key=lambda text: text.operations),
+    }
 
 
 def _text(method: str, symbols: list[Any], result: Any) -> Text:

@@ -31,8 +31,7 @@ ROBOTS = (
     Robot("Talos", "talos_data/robots/talos_reduced.urdf", True),
 )
 WITH_CASADI = ("Panda", "ANYmal")  #: compiling CasADi's text of the others takes minutes
-FIRST = ("inverse_dynamics_derivatives", "jacobian")
-SECOND = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
+KERNELS = ("inverse_dynamics_derivatives", "jacobian")
 AGREED = 1e-9  #: largest difference from a peer, relative to the largest number
 
 
@@ -93,34 +92,27 @@ def arguments(model: Any, seed: int = 0) -> dict[str, np.ndarray]:
     random = np.random.default_rng(seed)
     n_q, n = model.nq, model.nv
     q = random.uniform(-1, 1, n_q)
-    v, a, w = random.uniform(-1, 1, (3, n))
-    d, rates = random.uniform(-1, 1, n_q + 2 * n), random.uniform(-1, 1, n_q + n)
-    return {
-        FIRST[0]: np.concatenate([q, v, a]),
-        FIRST[1]: np.concatenate([q, v]),
-        SECOND[0]: np.concatenate([q, v, a, w, d]),
-        SECOND[1]: np.concatenate([q, v, rates, d]),
-    }
+    v, a = random.uniform(-1, 1, (2, n))
+    return {KERNELS[0]: np.concatenate([q, v, a]), KERNELS[1]: np.concatenate([q, v])}
 
 
 def contest(robot: Robot, loop: Any, folder: Path, rounds: int, burst: float) -> dict[str, Any]:
     """By kernel operations, nanoseconds of each contestant, and the largest difference from CasADi."""
     theirs, beside = load_pinocchio(robot), robot.name in WITH_CASADI
     equations = load(robot, mimic="independent").derive()
-    kernels = (*FIRST, *SECOND) if beside else FIRST
-    counts = pipeline.build(equations, "c", list(kernels)).counts
-    module = equations.compile(kernels=[*kernels, "rhs", "mass_matrix"])
+    counts = pipeline.build(equations, "c", list(KERNELS)).counts
+    module = equations.compile(kernels=[*KERNELS, "rhs", "mass_matrix"])
     given, texts = arguments(theirs), write_derivatives(theirs) if beside else {}
     peers, empty = of_pinocchio(theirs, theirs.nv), of_pinocchio(pin.Model(), 0)
     found: dict[str, Any] = {"n": module.n_v, "floating": robot.floating}
-    for kernel in kernels:
+    for kernel in KERNELS:
         contestants: dict[str, Timed] = {}
         x = np.resize(given[kernel], module.layout.inputs(kernel))
         contestants["eomgen"], mine = ours(loop, module, kernel, x)
         entry = found[kernel] = {"operations": counts[kernel].total if kernel in counts else None}
         if kernel in texts:
             z, n_x = given[kernel], theirs.nq + theirs.nv
-            if kernel in (FIRST[1], SECOND[1]):
+            if kernel == KERNELS[1]:
                 z = np.concatenate([z[:n_x], np.zeros(theirs.nv), z[n_x:]])
             made = folder / f"{robot.name}_{kernel}"
             contestants["CasADi"], other = of_casadi(loop, made, texts[kernel].source, z, 2 * len(mine) + 64)
@@ -159,7 +151,7 @@ def run(quick: bool) -> Report:
     """Robots of example-robot-data, then loops."""
     rounds, burst = (3, 2e-4) if quick else (40, 1e-3)
     robots = ROBOTS[:1] if quick else ROBOTS
-    rows: dict[str, list[list[Any]]] = {kernel: [] for kernel in (*FIRST, *SECOND)}
+    rows: dict[str, list[list[Any]]] = {kernel: [] for kernel in KERNELS}
     details: dict[str, Any] = {}
     with TemporaryDirectory() as folder:
         loop = compile_call_loop(Path(folder))
@@ -167,28 +159,24 @@ def run(quick: bool) -> Report:
             name = robot.name
             found = details[name] = contest(robot, loop, Path(folder), rounds, burst)
             for kernel, table in rows.items():
-                if kernel not in found:
-                    continue
                 one = found[kernel]
                 times, own = one["times"], one["times"]["eomgen"]
                 row = [name + "*" * found["floating"], found["n"], one["operations"], own]
                 row += [one.get("CasADi operations"), times.get("CasADi")]
-                if kernel in FIRST:
-                    row += [times["Pinocchio"], times["Pinocchio"] / own]
+                row += [times["Pinocchio"], times["Pinocchio"] / own]
                 row.append(times["CasADi"] / own if "CasADi" in times else None)
                 table.append(row)
         loops = of_loops(quick, loop, rounds, burst)
     head: tuple[str, ...] = ("robot", "n", "operations", "ns", "CasADi, operations", "CasADi, ns")
     tables = [
-        Table(f"{k}, ns", (*head, "Pinocchio, ns", "Pinocchio over ours", "CasADi over ours"), rows[k]) for k in FIRST
+        Table(f"{k}, ns", (*head, "Pinocchio, ns", "Pinocchio over ours", "CasADi over ours"), rows[k]) for k in KERNELS
     ]
-    tables += [Table(f"{k}, ns", (*head, "CasADi over ours"), rows[k]) for k in SECOND]
     columns = ("mechanism", "n", "freedoms", "state", "column of q", "column of v", "rhs, ns", "jacobian, ns")
     tables.append(Table("Jacobians of loops: operations of the state once and of a column, ns", columns, loops))
     notes = (
         "Least of many bursts in turns: ours and CasADi's text in a loop in C, same compiler and flags; of Pinocchio",
         "the wheel from Python, less the same call of a model without joints.  * floats.  Jacobians without operations",
-        "are solved in loops with the factor of M.  CasADi: Newton-Euler and recursions in link axes, SX, its cse; of",
-        "second derivatives jtimes of the gradient.  Of the Panda CasADi's numbers are compared, to 1e-9.",
+        "are solved in loops with the factor of M.  CasADi: Newton-Euler and recursions in link axes, SX, its cse.",
+        "Of the Panda CasADi's numbers are compared, to 1e-9.",
     )
     return Report(tuple(tables), (), notes, details)

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from ..identification.regressor import standard_parameters as _standard_parameters
     from ..runtime.canonical import Canonical
     from ..runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
-    from ..runtime.derivative_calls import inverse_dynamics_hessian_product as _inverse_dynamics_hessian_product
-    from ..runtime.derivative_calls import rhs_hessian_product as _rhs_hessian_product
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.drawing import explore as _explore
@@ -81,8 +79,6 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
     "inverse_dynamics_derivatives": "runtime.derivative_calls",
-    "inverse_dynamics_hessian_product": "runtime.derivative_calls",
-    "rhs_hessian_product": "runtime.derivative_calls",
     "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
@@ -216,8 +212,6 @@ class Module(BoundModel):
         motion_range = _motion_range
         workspace = _workspace
         inverse_dynamics_derivatives = _inverse_dynamics_derivatives
-        inverse_dynamics_hessian_product = _inverse_dynamics_hessian_product
-        rhs_hessian_product = _rhs_hessian_product
         report = _report
         draw = _draw
         draw_branches = _draw_branches

@@ -67,8 +67,7 @@ class Kernel(NamedTuple):
         each |= dict.fromkeys(("v_i", "a_i"), sizes.n_dof) | {"q_i": sizes.n_dof - sizes.n_states}
         each |= {"impulses": sizes.n_events, "held_impulses": sizes.n_held // 2}
         each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
-        each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h) | {"rate_weights": sizes.n_x}
-        each |= {"dq": sizes.n_q, "du": sizes.n_u} | dict.fromkeys(("dv", "da", "weights"), sizes.n_v)
+        each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h)
         return sum(each[port] for port in self.inputs)
 
 
@@ -81,7 +80,6 @@ DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates"
 
 #: velocities, their change, impulses of the constraint rows, of the gaps and of what closes and opens
 STRIKE = ("q", "v", "a", "multipliers", "impulses", "held_impulses")
-BENT = ("q", "v", "a", "weights", "dq", "dv", "da")  #: a motion, weights of its forces, a direction
 
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
@@ -90,13 +88,8 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("embedded_mass_matrix", ("q",), lambda s: (s.n_dof, s.n_dof), "M of the independent coordinates, row-major"),
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
-    Kernel("inverse_dynamics_derivatives", BENT[:3], lambda s: (s.n_v, s.n_q + 2 * s.n_v),
+    Kernel("inverse_dynamics_derivatives", ("q", "v", "a"), lambda s: (s.n_v, s.n_q + 2 * s.n_v),
            "M a + h by [q, v, a], each at fixed others; by a it is M", late="inverse dynamics"),
-    Kernel("inverse_dynamics_hessian_product", BENT, lambda s: (s.n_q + 2 * s.n_v,),
-           "sum of weights times Hessians of M a + h by [q, v, a], times the direction", late="its Hessians"),
-    Kernel("rhs_hessian_product", ("q", "v", "rate_weights", "dq", "dv", "du"),
-           lambda s: (s.n_x + s.n_u,), late="Hessians of rhs",
-           result="sum of weights times Hessians of x' by [x, u], times the direction, at a state on the constraints"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
     Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),

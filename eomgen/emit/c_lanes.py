@@ -21,7 +21,7 @@ from .sources import read_template, render
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
 #: Likewise, in modules that are made of them alone: they are long, and few who have the others in batches want these.
-DERIVATIVES = ("inverse_dynamics_derivatives", "inverse_dynamics_hessian_product", "rhs_hessian_product")
+DERIVATIVES = ("inverse_dynamics_derivatives",)
 
 #: Width -> instructions it needs on x86-64 beyond those that every such processor has, and their name in
 #: eomgen_processor.h.

@@ -36,11 +36,6 @@ def describe_calls(program: Program) -> list[Call]:
             ", ".join(_shape(s.n_v, n) for n in (s.n_q, s.n_v, s.n_v)),
             "derivatives of inverse_dynamics by q, v and a",
         ),
-        Call(
-            "inverse_dynamics_hessian_product(q, v, a, w, d)",
-            _shape(s.n_q + 2 * s.n_v),
-            "sum of w times its Hessians, times d = [dq; dv; da]",
-        ),
         Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
         Call("center_of_mass(q)", _shape(3), "centre of mass of all bodies, ground axes (m)"),
         Call("com_jacobian(q)", _shape(3, s.n_v), "velocity of the centre of mass = com_jacobian v"),

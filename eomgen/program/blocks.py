@@ -25,9 +25,7 @@ from .port_symbols import port_symbols
 from .program import Block, Limits, Port
 from .regular_loops import RegularLoops
 from .residuals import acceleration_residual, force_residual
-from .second_order import TreeHessian, hessian_product
-from .second_order_loops import LoopHessian
-from .straight_loops import curved_loops, regular_loops, straight_loops
+from .straight_loops import regular_loops, straight_loops
 from .terms import SystemTerms
 
 
@@ -60,11 +58,6 @@ class BlockMaker:
     def _regular(self) -> RegularLoops | None:
         """The shorter form that is tried before that one."""
         return regular_loops(self._loops, self.limits.unrolled_loops)
-
-    @cached_property
-    def curved_loops(self) -> LoopBlocks | None:
-        """The form of a right-hand side with loops that is differentiated twice, also where drivers compute it."""
-        return curved_loops(self.terms, Limits.unrolled_loops, self._loops)
 
     @cached_property
     def _loop_slopes(self) -> LoopSlopes | None:
@@ -155,15 +148,6 @@ class BlockMaker:
         outputs = tuple(jvp(self._dae_residual, seeds))
         return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
 
-    def _rhs_hessian_product(self) -> tuple[list[Expr], list[Expr]]:
-        """Of the right-hand side by q, v, u, and checks of the mass matrix."""
-        given = self._through("rate_weights"), self._through("dq dv du")
-        if self.curved_loops is not None:
-            outputs, sound = LoopHessian(self.curved_loops, *given).product()
-            return outputs, [*self._turned, *sound]
-        accelerations, checks = self._accelerations
-        return TreeHessian(self.terms, accelerations, *given).shortest(), checks
-
     def _through(self, ports: str) -> list[Expr]:
         return self._symbols([symbol for name in ports.split() for symbol in self.port(name).symbols])
 
@@ -231,9 +215,6 @@ class BlockMaker:
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "inertial_terms": lambda: terms.inertial() if terms.inertial else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
-            "inverse_dynamics_hessian_product": lambda: hessian_product(
-                terms.inverse_dynamics, *map(self._through, ("weights", "q v a", "dq dv da"))
-            ),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
             "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
@@ -251,8 +232,6 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*terms.q_dot, *accelerations]
-        elif name == "rhs_hessian_product":
-            outputs, checks = self._rhs_hessian_product()
         elif (found := written_derivative(terms, self.slopes, name, self.unrolled, self._touching)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:

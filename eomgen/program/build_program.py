@@ -12,9 +12,7 @@ from typing import Any
 
 from ..base.kernel_table import KERNELS, Kernel, Sizes
 from ..base.names import hint, joined
-from ..errors import UnavailableError, UsageError, ill_placed, no_such
-from ..graph.count import count
-from ..graph.pair_calls import has_pair_sums
+from ..errors import UsageError, ill_placed, no_such
 from ..graph.substitute import symbols_of
 from .block_groups import SHIFTS
 from .blocks import BlockMaker
@@ -28,17 +26,6 @@ from .terms import SystemTerms
 ABI = 1
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
-#: Kernels that are left out where they would be long, unless they are named.
-LONG = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
-CURVED = LONG[1]
-#: With loops it takes more operations than the accelerations, at least this many times: 10 to 13 times in examples.
-CURVED_LEAST = 8
-#: Why there is none.
-NOT_CURVED = (
-    "second derivatives of the right-hand side of {!r} are not derived: they follow from a solution without pivots, "
-    "which the methods augmented, newton_euler and amalgamated do not have, nor mechanisms without a degree of freedom "
-    "or with given rates; derive by another method, or take mixed differences of rhs"
-)
 
 
 def build_program(
@@ -70,8 +57,6 @@ def build_program(
     ------
     UsageError
         Sizes contradict each other, an unknown kernel, or a name that is no C identifier.
-    UnavailableError
-        Second derivatives are named, and the equations have none.
     """
     terms.check_shapes()
     name = str(metadata["name"])
@@ -89,30 +74,18 @@ def build_program(
     has["held_errors"] = bool(terms.held_errors)
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
-    if terms.given_rates or metadata.get("no_inertia") or metadata.get("indefinite"):
-        has["rhs_hessian_product"] = False
-    if kernels is None and has_pair_sums(terms.graph):  # second derivatives of these are not made
-        has |= dict.fromkeys(LONG, False)
     if terms.given_rates:
         has |= {"dae_residual": False, "dae_jacobian": False}
     if kernels is not None and "rhs" in kernels and terms.meeting_times:  # no run goes without
         kernels = [*kernels, "meeting_time"]
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
-    if maker.has_loops and any(k.name == CURVED for k in wanted):
-        loops = maker.curved_loops
-        if loops is None and kernels is not None:
-            raise UnavailableError(NOT_CURVED.format(name))
-        longest = limits.second_order // CURVED_LEAST
-        if loops is None or (kernels is None and count(loops.dynamics()[0]).total > longest):
-            wanted = [k for k in wanted if k.name != CURVED]
     blocks: dict[str, Block] = {}
     drivers: list[KernelDriver] = []
     needed: dict[str, None] = {}
     for kernel in wanted:
         block = maker.public(kernel.name)
         if block is not None:
-            if kernels is not None or kernel.name not in LONG or count(block.outputs).total <= limits.second_order:
-                blocks[kernel.name] = block
+            blocks[kernel.name] = block
             continue
         behind = maker.drivers_need(kernel.name)
         needed.update(dict.fromkeys(behind))

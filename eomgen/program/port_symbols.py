@@ -32,6 +32,4 @@ def port_symbols(terms: SystemTerms, n_h: int) -> Mapping[str, tuple[str, ...]]:
         "du": tuple(f"d({u})" for u in terms.u),
         "dp": tuple(f"d({p})" for p in terms.p),
         "da": tuple(f"d({a})" for a in terms.a),
-        "weights": tuple(f"weight({v})" for v in terms.v),
-        "rate_weights": tuple(f"weight({x})" for x in (*terms.q, *terms.v)),
     }

@@ -33,8 +33,6 @@ class Limits:
     #: pairs of bodies in contacts between groups above which derivatives are made direction by direction: each pair has
     #: up to 36 entries, which as text take some 10 kB, against 1 kB a body of one direction
     jacobian_pairs: int = 64
-    #: second derivatives of more operations are generated only where they are named
-    second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
     #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open
     #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at

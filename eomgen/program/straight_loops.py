@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..base.limits.constraints import DIFFERENTIATED, TIKHONOV
 from ..graph.count import count
 from .body_loops import BodyLoops
 from .embedded_loops import EmbeddedLoops
@@ -10,7 +9,6 @@ from .loop_blocks import LoopBlocks, estimate
 from .regular_loops import RegularLoops
 from .terms import SystemTerms
 
-SOLUTIONS = 4  #: that leave no trace of DIFFERENTIATED
 SAVED = 0.7  #: part of the operations of the usual blocks that others take at most which are tried before them
 LONGER = 4  #: times as many multiplications as usual blocks these may take: 320 four-bars in a row take 0.6 of the time
 
@@ -33,26 +31,16 @@ def _operations(blocks: LoopBlocks | RegularLoops) -> int:
     return count(blocks.closing()).total + count([*outputs, *checks]).total
 
 
-def curved_loops(terms: SystemTerms, longest: int, usual: LoopBlocks | None) -> LoopBlocks | None:
-    """The form that is differentiated twice: the usual one, but for a larger term in redundant rows."""
-    if usual is not None and not usual.redundant:
-        return usual
-    return straight_loops(terms, longest, DIFFERENTIATED, SOLUTIONS)
-
-
-def straight_loops(terms: SystemTerms, longest: int, term: float = TIKHONOV, solutions: int = 2) -> LoopBlocks | None:
-    """The form that takes no pivots, if there is one whose factors take at most so many multiplications.
-
-    Redundant rows take a term in so many solutions.
-    """
+def straight_loops(terms: SystemTerms, longest: int) -> LoopBlocks | None:
+    """The form that takes no pivots, if there is one whose factors take at most so many multiplications."""
     if not terms.n_c or not terms.n_dof or not (terms.mass_matrix or terms.by_columns):
         return None
     if terms.given_rates or terms.system is not None or not terms.projects:
         return None
-    bodies = BodyLoops(terms, term, solutions)
+    bodies = BodyLoops(terms)
     if bodies.motion is not None or terms.by_columns:
         return bodies if bodies.motion is not None else None
     if estimate(terms.constraint_jacobian, terms.n_dof) > longest:
         return None
-    loops = EmbeddedLoops(terms, term, solutions)
+    loops = EmbeddedLoops(terms)
     return loops if loops.determined else None

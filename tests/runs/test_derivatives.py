@@ -1,4 +1,4 @@
-"""Calls of derivatives: jacobian by x, u and p, of inverse dynamics, Hessians times directions, cells of soil."""
+"""Calls of derivatives: jacobian by x, u and p, of inverse dynamics, cells of soil."""
 
 from __future__ import annotations
 
@@ -49,11 +49,6 @@ def slope(f: Any, h: float = 1e-3) -> np.ndarray:
     return np.asarray((16 * first[0] - first[1]) / 15)
 
 
-def joined(module: Any, z: np.ndarray) -> np.ndarray:
-    n_q, n_v = module.n_q, module.n_v
-    return np.hstack(module.inverse_dynamics_derivatives(z[:n_q], z[n_q : n_q + n_v], z[n_q + n_v :]))
-
-
 @pytest.mark.parametrize("target", TARGETS)
 def test_derivatives_are_slopes_of_the_calls(target: str) -> None:
     module = arm().compile(target=target)
@@ -70,22 +65,6 @@ def test_derivatives_are_slopes_of_the_calls(target: str) -> None:
                 return np.asarray(module.inverse_dynamics(*moved))
 
             np.testing.assert_allclose(column, slope(along), atol=1e-9)
-    random = np.random.default_rng(3)
-    w, d = random.uniform(-1, 1, 4), random.uniform(-1, 1, 13)
-    z = np.concatenate([q, v, a])
-    bent = module.inverse_dynamics_hessian_product(q, v, a, w, d)
-    np.testing.assert_allclose(bent, slope(lambda e: joined(module, z + e * d).T @ w), atol=1e-9)
-    x, w, d = z[: module.n_x], random.uniform(-1, 1, module.n_x), random.uniform(-1, 1, module.n_x + 1)
-
-    def both(e: float) -> np.ndarray:
-        at = {"t": 0.0, "x": x + e * d[:-1], "u": module.u + e * d[-1:]}
-        return np.hstack([module.jacobian(**at), module.jacobian(**at, wrt="u")]).T @ w
-
-    np.testing.assert_allclose(module.rhs_hessian_product(0.0, x, w, d), slope(both), rtol=1e-7, atol=1e-7)
-    d[-1] = 0.0
-    np.testing.assert_array_equal(
-        module.rhs_hessian_product(0.0, x, w, d[:-1]), module.rhs_hessian_product(0.0, x, w, d)[:-1]
-    )
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -110,42 +89,10 @@ def test_states_side_by_side_have_the_bits_of_one_alone(name: str) -> None:
     random = np.random.default_rng(5)
     x = module.project(module.x0()[:, None] + 0.1 * random.uniform(-1, 1, (module.n_x, 11)))
     q, v, a = x[: module.n_q], x[module.n_q :], random.uniform(-1, 1, (module.n_v, 11))
-    w, d = random.uniform(-1, 1, (module.n_x, 11)), random.uniform(-1, 1, (module.n_q + 2 * module.n_v, 11))
     first = module.inverse_dynamics_derivatives(q, v, a)
-    bent = module.inverse_dynamics_hessian_product(q, v, a, w[: module.n_v], d)
-    curved = module.rhs_hessian_product(0.0, x, w, d[: module.n_x])
     for k in range(11):
         for mine, theirs in zip(first, module.inverse_dynamics_derivatives(q[:, k], v[:, k], a[:, k]), strict=True):
             np.testing.assert_array_equal(mine[..., k], theirs)
-        alone = module.inverse_dynamics_hessian_product(q[:, k], v[:, k], a[:, k], w[: module.n_v, k], d[:, k])
-        np.testing.assert_array_equal(bent[:, k], alone)
-        alone = module.rhs_hessian_product(0.0, x[:, k], w[:, k], d[: module.n_x, k])
-        np.testing.assert_array_equal(curved[:, k], alone)
-
-
-@pytest.mark.parametrize(
-    ("name", "method", "target"),
-    [
-        ("slider_crank", "embedding", "cython"),
-        ("slider_crank", "embedding", "numpy"),
-        ("bricard", "recursive", "numpy"),
-    ],
-)
-def test_products_of_loops_are_slopes_of_the_jacobian(name: str, method: str, target: str) -> None:
-    """Along the constraints, which the linkage of Bricard has one too many of, and symmetric in all directions."""
-    module = eg.load(EXAMPLES / f"{name}.yaml").derive(method).compile(target=target)
-    random = np.random.default_rng(7)
-    x = module.project(module.x0() + 0.05 * random.uniform(-1, 1, module.n_x))
-    w, d, e = random.uniform(-1, 1, (3, module.n_x))
-    d = slope(lambda h: module.project(x + h * d), 1e-4)
-    found = module.rhs_hessian_product(0.0, x, w, d)
-    along = slope(lambda h: module.jacobian(0.0, x + h * d).T @ w)
-    np.testing.assert_allclose(found, along, atol=1e-8 * np.abs(found).max())
-    crosswise = module.rhs_hessian_product(0.0, x, w, np.array([d, e]).T)
-    assert abs(crosswise[:, 0] @ e - crosswise[:, 1] @ d) < 1e-7 * np.abs(crosswise).max()
-    off = module.rhs_hessian_product(0.0, x + 1e-3 * e, w, d)
-    there = module.project(x + 1e-3 * e)
-    np.testing.assert_array_equal(off, module.rhs_hessian_product(0.0, there, w, d))
 
 
 def strip(cells: int) -> eg.Model:
