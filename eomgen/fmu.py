@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import pipeline
+from .base.algebra import Array
 from .base.files import as_path, refuse_link, write_whole
 from .compilation.build import compile_c_library
 from .compilation.options import Options
 from .emit.fmu import emit_fmu
 from .emit.fmu.versions import KERNELS, check_version, refuse_impacts
 from .errors import bad_file
-from .numeric.scales import Array
 from .program import Program
 from .runtime.bound_model import BoundModel
 from .runtime.signals import Forcing

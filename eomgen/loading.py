@@ -10,9 +10,9 @@ from .api.model import Model
 from .base.files import as_name, example_files, find_example
 from .base.names import hint
 from .base.texts import shown
+from .base.value_rules import CHECKS, word_of_check
 from .describe import describe_yaml_file
 from .errors import ModelError, at_odds, bad_file, no_choice, no_such
-from .numeric.rigid_inertia import CHECKS, word_of_check
 
 if TYPE_CHECKING:
     from .runtime.option_types import LoadOptions, RobotKeywords

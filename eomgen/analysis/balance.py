@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.analyses import DISPLACED
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
-from ..numeric import algebra
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
-from ..numeric.scales import Array, Indices
 from .tangent import find_tangent
 
 if TYPE_CHECKING:

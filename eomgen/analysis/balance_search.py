@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import MOVING
 from ..errors import EquilibriumError
-from ..numeric.scales import Array
 from .newton import marquardt, newton
 from .search import Search, SearchPoint
 from .viscous_descent import creep

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import DIFFERENCES
 from ..base.limits.constraints import STATE
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.constraint_kernels import constraint_system
 from ..runtime.near_names import unknown
 from .balance import Balance, balance_forces, force_slopes

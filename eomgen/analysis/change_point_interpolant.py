@@ -11,10 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import ASTRAY
 from ..numeric.curves import Point
 from ..numeric.projection import largest
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Scales
 from .driven_coordinates import DrivenContinuation
 
 REACH = 0.05  #: scaled motion from the middle of an interpolant to its inner supports

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..numeric.scales import Array, Scales
+from ..base.algebra import Array
+from ..numeric.scales import Scales
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

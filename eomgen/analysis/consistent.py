@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import NEAREST
 from ..base.limits.constraints import ACCEPTED, EXACT, GENTLE
 from ..base.limits.constraints import STATE as RANK
 from ..base.names import hint, joined
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
-from ..numeric import algebra
 from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.room import read_number, read_numbers

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..base.texts import shown
 from ..errors import UsageError, ill_shaped, no_number
-from ..numeric import algebra
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Scales
 from ..runtime.room import as_real, read_number, read_numbers, with_numbers
 
 if TYPE_CHECKING:

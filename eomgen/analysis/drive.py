@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
-from ..numeric import algebra
 from ..numeric.partitions import partition
-from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.refusals import refuse_reaction_laws, refuse_states

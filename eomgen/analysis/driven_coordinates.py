@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import NULL
 from ..errors import EomgenError
-from ..numeric import algebra
 from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.constraint_system import ConstraintSystem
 from ..numeric.continuation import Continuation
 from ..numeric.curves import Point, Tangent
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Scales
 from ..runtime.constraint_kernels import constraint_system
 
 if TYPE_CHECKING:

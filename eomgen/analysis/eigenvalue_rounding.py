@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.numbers import EPS, TINY
-from ..numeric import algebra
-from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import AssemblyError, ill_placed, ill_shaped
-from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown

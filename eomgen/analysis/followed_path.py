@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import ALIGNED, POOR, SAME
 from ..numeric.curves import ASTRAY, Point, interpolate
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
 from .driven_coordinates import DrivenContinuation, DrivenPath
 from .singular import Singular, find_change_points, find_stop, name_singular

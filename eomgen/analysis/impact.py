@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array, definite_factor
 from ..base.limits.constraints import MEASURED
 from ..base.limits.impacts import BEYOND, HELD, ROUNDED, TOUCHING
 from ..errors import UsageError, at_odds, cannot, ill_shaped, no_such, untrue
-from ..numeric import algebra
-from ..numeric.definite import definite_factor
-from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs

@@ -28,11 +28,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.algebra import Array
 from ..base.limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
 from ..errors import untrue
 from ..numeric.contact_impulses import solve_contacts
 from ..numeric.contact_problem import ContactProblem
-from ..numeric.scales import Array
 from .impact_law import collide
 from .sliding_direction import impulses_in_space
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.impacts import ELSEWHERE
 from ..base.names import hint, joined
 from ..errors import cannot, ill_typed, incomplete, no_such, off_range
-from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
 from ..runtime.near_names import without_dots

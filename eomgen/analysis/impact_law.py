@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
 from ..errors import untrue
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 ROUNDS = 1000  #: impacts that may follow each other at one instant
 FARTHEST = 1e5  #: change of the velocities, relative to the fastest approach, beyond which gaps cannot open together

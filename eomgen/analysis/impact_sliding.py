@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.impacts import ROUNDED
 from ..base.names import hint, joined
 from ..errors import UsageError, ill_placed, ill_typed, no_such, off_range
-from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import without_dots
 from ..runtime.room import read_number

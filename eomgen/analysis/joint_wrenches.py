@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import UNMOVED
 from ..errors import cannot
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .constrained import ProjectedStates
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.analyses import ALIGNED, SINGULAR
 from ..base.limits.constraints import EXACT, UNMOVED
 from ..base.texts import shown
@@ -26,7 +27,6 @@ from ..errors import (
     too_large,
 )
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import SLACK
 from ..errors import cannot
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.run_parts import Residuals
 from ..runtime.trajectory import Trajectory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 
 class KnownRange:

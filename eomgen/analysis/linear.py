@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import cannot, ill_shaped, no_choice
-from ..numeric.scales import Array
 from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
 from ..runtime.room import read_number, read_numbers
 from .eigenvalue_rounding import own_accelerations

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..errors import cannot, ill_chosen
 from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
-from ..numeric.scales import Array, Indices
 from ..runtime.near_names import read_names, unknown
 from .balance import assembly_jacobian
 from .tangent import TangentSpace

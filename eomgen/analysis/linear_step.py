@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import ARRIVED, CLOSE
 from ..base.limits.numbers import EPS
-from ..numeric import algebra
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from .eigenvalue_rounding import BALANCED
 
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding

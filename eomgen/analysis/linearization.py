@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import COUPLED, STILL
 from ..errors import cannot
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .eigenvalue_rounding import BALANCED
 from .stability import MARGIN, SecondOrder, stiffness_errors, verdict

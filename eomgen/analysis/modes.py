@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array, definite_factor
 from ..base.inline_pictures import image_html
 from ..base.limits.analyses import SYMMETRIC
 from ..base.limits.numbers import SHOWN_COMPLEX
 from ..base.notation import Notation
 from ..base.texts import html_text
 from ..errors import EomgenError, cannot, off_range
-from ..numeric import algebra
-from ..numeric.definite import definite_factor
-from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.room import read_numbers
 from ..runtime.show_parts import load_show

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import ARRIVED, DAMPING, GAINED, SHORTEST
 from ..base.limits.numbers import TINY
-from ..numeric import algebra
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from .linear_step import Solver
 
 if TYPE_CHECKING:

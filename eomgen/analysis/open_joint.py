@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.constraints import CONTRADICTION
 from ..errors import TO_BE_FINITE
 from ..numeric.closure import close
-from ..numeric.scales import Array
 from .driven_coordinates import DrivenCoordinates
 
 

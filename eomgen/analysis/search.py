@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.analyses import DIFFERENCES, LEAST_UNKNOWN
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
-from ..numeric import algebra
 from ..numeric.projection import largest
-from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
 from .balance import Balance, assembly_jacobian, balance_forces, force_slopes, slopes

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import SEEN
 from ..base.limits.constraints import BALANCE as RANK
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .constrained import ProjectedStates
 from .joint_wrenches import GROUND, Geometry, along_free, free_of, shift, transmitted
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.curves import Point, Tangent
 from ..numeric.projection import largest
 from ..numeric.roots import SECTIONS, carry_out, find_root, search_least
-from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant, build_interpolant
 from .driven_coordinates import DrivenContinuation, DrivenCoordinates
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.numbers import EPS
-from ..numeric import algebra
 from ..numeric.contact_problem import ContactProblem
-from ..numeric.scales import Array
 
 SAMPLES = 8  #: of a sum of waves up to those of 2 a: 5 or more determine it
 ORDERS = np.array([2, 1, 0, -1, -2])  #: of its waves exp(i n a)

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.numbers import EPS
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .eigenvalue_rounding import ROUNDING, graded_modes, stability_of_matrix
 
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..errors import ill_chosen
 from ..numeric.partitions import partition
 from ..numeric.projection import tangent_projector
 from ..numeric.ranks import rank
-from ..numeric.scales import Array, Indices, Scales
+from ..numeric.scales import Scales
 from ..runtime.near_names import read_names, unknown
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import MEASURED
 from ..errors import cannot
-from ..numeric import algebra
 from ..numeric.ranks import rank
-from ..numeric.scales import Array
 from .impact_friction import Sliding
 
 if TYPE_CHECKING:

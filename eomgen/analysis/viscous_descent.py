@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import CLOSE
 from ..base.limits.numbers import EPS
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.files import whole_file
 from ..base.inline_pictures import picture_html
 from ..base.notation import Notation
+from ..base.value_rules import read_count
 from ..errors import ill_shaped
-from ..numeric import algebra
-from ..numeric.counts import read_count
-from ..numeric.scales import Array
 from ..runtime.given_start import Start
 from ..runtime.near_names import require, unknown
 from ..runtime.refusals import refuse_states, require_velocities

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..errors import cannot
-from ..numeric import algebra
 from ..numeric.roots import find_root
-from ..numeric.scales import Array
 from .singular import SHARE, Singular
 from .workspace_flood import OUT, Flood, Stage
 from .workspace_grid import Index

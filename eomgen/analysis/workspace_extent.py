@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import FLAT_CELL, SLACK
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 CHUNK = 2_000_000  #: raster cells looked at in one go
 

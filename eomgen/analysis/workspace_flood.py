@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import SLACK
 from ..errors import AssemblyError, PartitionError
 from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from ..runtime.given_start import Start
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
+from ..base.value_rules import as_count, read_count
 from ..errors import ill_chosen, ill_placed, ill_typed, incomplete, no_choice, off_range, too_large
-from ..numeric.counts import as_count, read_count
-from ..numeric.scales import Array
 from ..runtime.near_names import read_names, unknown
 from ..runtime.room import as_real, read_number, read_numbers
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..base.texts import shown
+from ..base.value_rules import as_count, read_count
 from ..errors import ill_typed, no_choice
-from ..numeric.counts import as_count, read_count
 from .compiler import CompilerInfo
 from .processor import NEEDS, lane_width
 

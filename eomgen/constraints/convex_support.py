@@ -8,11 +8,11 @@ turn; where one does it has an edge, on which it rolls as a thin disc does.
 
 from __future__ import annotations
 
+from ..base.value_rules import SUPPORT
 from ..elements.entry import Entry
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
 from ..graph.vectors import Vec3
-from ..numeric.value_rules import SUPPORT
 
 
 def require_convex(e: Entry, support: Expr, local: Vec3) -> None:

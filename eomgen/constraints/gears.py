@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..base.value_rules import POSITIVE
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
 from ..elements.looks import PitchCircles, RackAndPinion, Seen
 from ..graph.core import Expr, sin
-from ..numeric.value_ranges import POSITIVE
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from ..base.value_rules import WHEELS as WHEELS_FIT
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry, Found
 from ..elements.field import Field
 from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr
-from ..numeric.value_rules import WHEELS as WHEELS_FIT
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ..base.value_rules import POSITIVE
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..numeric.value_ranges import POSITIVE
 from .constraint import Constraint, on_two_bodies
 from .convex_rolling import NORMAL, RollingConvex, ellipsoid_support
 from .convex_support import require_convex

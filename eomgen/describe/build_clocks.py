@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ..base.value_rules import POSITIVE
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..numeric.value_ranges import POSITIVE
 from .description import DescribedEntry
 from .mechanism import Clock, Event
 from .values import Reader

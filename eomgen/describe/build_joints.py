@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -13,7 +14,6 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
-from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .checks import check_names, unknown_key
 from .description import DescribedEntry, items

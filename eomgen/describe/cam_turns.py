@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields
 
+from ..base.value_rules import TURN
 from ..constraints import Constraint
 from ..constraints.profiles import Profile
 from ..errors import ModelError
 from ..graph.substitute import symbols_of
-from ..numeric.value_rules import TURN
 from .requirements import Requirements
 
 

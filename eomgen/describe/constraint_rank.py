@@ -35,7 +35,7 @@ def independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence
     """
     import numpy as np
 
-    from ..numeric import algebra
+    from ..base import algebra
 
     graph = Graph()
     names = {name_of(x): graph.symbol(name_of(x)) for x in (*forms.q, *forms.v)}

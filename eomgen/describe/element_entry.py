@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ..base.value_rules import POSITIVE, Allowed
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.field import Fields
@@ -13,7 +14,6 @@ from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import POSITIVE, Allowed
 from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys

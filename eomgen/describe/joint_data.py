@@ -10,8 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..graph.core import Expr
-from ..numeric.value_ranges import NOT_NEGATIVE
 from .checks import check_keys
 from .description import items
 from .fields import DISPLAY, LIMITS

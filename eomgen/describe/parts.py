@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..base.files import beside
+from ..base.value_rules import NOT_NEGATIVE
 from ..errors import UsageError
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.tensors import rotate_symmetric
-from ..numeric.value_ranges import NOT_NEGATIVE
 from ..solids import SOLIDS, MassProperties, point
 from ..solids.mesh import measure_mesh
 from .checks import check_keys, unknown_key

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
+from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_scales, judge_bodies, longest_within
 from ..frames import GROUND
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
-from ..numeric.rigid_inertia import EXCESS, SWITCH, inertia_scales, longest_within
-from ..numeric.scales import Array
-from ..numeric.value_ranges import NOT_NEGATIVE
-from ..numeric.value_rules import BODIES, judge_bodies
 from .mechanism import Body, JointSpec
 from .requirements import Requirements
 
@@ -84,7 +82,7 @@ def _numbers_of(body: Body, points: Sequence[Vec3]) -> list[Sequence[Expr]]:
 
 
 def _described(body: Body, numbers: Sequence[Sequence[Expr]], judged: bool) -> tuple[str, bool, int, bool]:
-    """What :func:`~..numeric.value_rules.judge_bodies` takes beside the numbers."""
+    """What :func:`~..base.value_rules.judge_bodies` takes beside the numbers."""
     return body.name, body.plane is not None, len(numbers) - 3, judged
 
 

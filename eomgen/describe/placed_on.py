@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import from_roll_pitch_yaw, roll_pitch_yaw
 from ..errors import cannot, off_range
-from ..numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
 from .description import items
 from .names import function_words
 from .placement import TURNS, Numbers, axis_columns, complete_axes

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.value_rules import SPROCKET
 from ..forces.contact_outlines import half_gap, half_tooth
 from ..forces.contact_states import TEETH, teeth_of_sprocket
 from ..graph.core import Expr
 from ..graph.shown import shown
-from ..numeric.value_rules import SPROCKET
 from .values import Reader
 
 SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees

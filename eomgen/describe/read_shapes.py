@@ -8,15 +8,13 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any
 
+from ..base.value_rules import BELOW, OUTLINE, RISING, Flaw, sense_of_outline
 from ..forces.contact_fields import PLACES
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
-from ..numeric.outline_rules import sense_of_outline
-from ..numeric.value_ranges import Flaw
-from ..numeric.value_rules import BELOW, OUTLINE, RISING
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items

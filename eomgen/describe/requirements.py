@@ -1,6 +1,6 @@
 """Stage describe, requirements of numbers: expressions and a rule -> faults now, and what late values must keep too.
 
-Each rule of :mod:`..numeric.value_rules` is the only home of its condition: here it judges the declared values of
+Each rule of :mod:`..base.value_rules` is the only home of its condition: here it judges the declared values of
 parameters, and a compiled module judges by it what parameters are given later.
 """
 
@@ -11,19 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
+from ..base.value_rules import LIMITS, NOT_NEGATIVE, NOT_ZERO, POINTS, POSITIVE, RANGE, RULES, Allowed
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from ..numeric.scales import Array
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, RANGE, Allowed
-from ..numeric.value_rules import LIMITS, NOT_ZERO, POINTS, RULES
 
 
 class Requirement(NamedTuple):
     """A rule that numbers of an element keep, whatever the parameters are."""
 
     path: str  #: dotted place in the model
-    rule: str  #: a name of :data:`~..numeric.value_rules.RULES`
+    rule: str  #: a name of :data:`~..base.value_rules.RULES`
     expressions: tuple[Expr, ...]  #: the numbers, of parameters and of local names
     data: tuple[Any, ...] = ()  #: what else the rule takes
     local: tuple[str, ...] = ()  #: names that stand for the points at which the rule looks

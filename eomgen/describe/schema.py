@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..base.value_rules import CHECKS
 from ..constraints import CONSTRAINTS
 from ..constraints.planetary import WHEELS
 from ..elements.element_type import Types
 from ..forces import FORCES
 from ..forces.contact_shape_fields import CORNERS, FIELD_SHAPE, SHAPE_FIELDS
 from ..joints import JOINTS
-from ..numeric.rigid_inertia import CHECKS
 from .fields import (
     ADDED,
     AXES,

@@ -16,14 +16,13 @@ from ..base.files import usable_name
 from ..base.limits.numbers import PERPENDICULAR
 from ..base.names import hint
 from ..base.texts import WHOLE, join_surrogates, lone_surrogate
+from ..base.value_rules import ROTATION, word_of_check
 from ..errors import ExpressionError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3, Vec3
-from ..numeric.rigid_inertia import word_of_check
-from ..numeric.value_rules import ROTATION
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse

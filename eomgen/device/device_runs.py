@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.value_rules import read_count
 from ..errors import cannot, ill_shaped, no_choice
-from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+from ..base.value_rules import Allowed
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
-from ..numeric.value_ranges import Allowed
 from .field import Fields
 
 
@@ -84,7 +84,7 @@ class Entry(Protocol):
     def judge(
         self, key: str, rule: str, values: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
     ) -> None:
-        """Require that expressions keep a rule of :mod:`~eomgen.numeric.value_rules`, in the same way.
+        """Require that expressions keep a rule of :mod:`~eomgen.base.value_rules`, in the same way.
 
         ``data`` is what the rule takes beside them, ``local`` the names that stand for the points at which it looks.
         """

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..errors import EomgenError
 from ..graph.evaluate import compile_evaluator
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..program.program import Program
 
 RATE = 1.0  #: of an independent coordinate whose initial rate is not declared (m/s or rad/s)

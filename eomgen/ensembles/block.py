@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import EomgenError, MissingDependencyError, UsageError, cannot
-from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.signals import Forcing
 from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options

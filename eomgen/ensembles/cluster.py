@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.value_rules import as_count
 from ..errors import UsageError, bad_file, ill_typed
-from ..numeric.counts import as_count
 from ..runtime.near_names import require
 from .block import LOST, MEANING, Plan, RunBlock, find_events
 from .given_cases import Cases

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base.notation import TIME, Notation, label
-from ..numeric.counts import read_count
+from ..base.value_rules import read_count
 from ..runtime.near_names import require
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import as_path, whole_file
 from ..base.notation import Notation
 from ..errors import bad_file, cannot, off_range
-from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
 from ..simulation.simulate import simulate

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.names import place_of_marker
+from ..base.value_rules import read_count
 from ..errors import AssemblyError, EomgenError, UsageError, ill_shaped, no_number
-from ..numeric.counts import read_count
-from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
 from ..runtime.late_start import fixed_told, late_values, tell_fixed

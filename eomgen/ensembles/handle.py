@@ -9,9 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..base.algebra import Array
 from ..base.files import MANIFEST, read_entry
 from ..errors import MissingDependencyError, ToolchainError, cannot
-from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.pickling import processor_features, restore
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import ill_typed, no_choice
-from ..numeric.scales import Array
 from .block import EVENT, Plan, RunBlock, inputs_at
 from .given_cases import Cases
 

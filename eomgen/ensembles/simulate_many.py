@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.value_rules import read_count
 from ..errors import bad_data, ill_typed, no_choice, untrue
-from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..runtime.near_names import check_names, without_dots
 from ..runtime.refusals import refuse_moreau, refuse_rigid

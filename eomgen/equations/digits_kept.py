@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
 from ..base.limits.numbers import EPS, TINY, WORTH_A_WORD
 from ..errors import EvaluationError
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import ConstraintFunctions
 from ..kinematics.mobility import Mobility
-from ..numeric import algebra
 from ..numeric.partitions import partition
 from .tree_equations import TreeEquations
 

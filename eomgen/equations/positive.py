@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import correlated, safely_positive
 from ..base.limits.numbers import LEAST, TINY
 from ..describe.mechanism import Mechanism
 from ..errors import EvaluationError, ModelError, PartitionError, Problem
@@ -11,8 +13,6 @@ from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import ConstraintFunctions
 from ..kinematics.mobility import Mobility
-from ..numeric import algebra
-from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
 from .idle import IdleMotion
 from .tree_equations import TreeEquations

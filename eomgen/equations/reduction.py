@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from typing import NamedTuple
 
+from ..base.algebra import diagonal_blocks
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..numeric.triangular import diagonal_blocks
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]

@@ -9,12 +9,12 @@ import numpy as np
 import sympy
 
 from ..analysis.constrained import multipliers
+from ..base import algebra
 from ..base.limits.numbers import EPS
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
 from ..graph.substitute import symbols_of
-from ..numeric import algebra
 from .author import Author
 from .shown_values import evaluate, random_state, state_values
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import ClassVar, cast
 
+from ..base.value_rules import Allowed
 from ..elements.dimensions import ENERGY, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -15,7 +16,6 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import Allowed
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN

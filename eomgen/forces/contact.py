@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -15,7 +16,6 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .bristles import UNIT, LuGre
 from .dry_friction import DryFriction, Slip

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from .bristles import UNIT
 from .contact import CURVED
 from .contact_groups import ContactGroups

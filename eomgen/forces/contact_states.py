@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any, NamedTuple
 
-from ..numeric.counts import as_count
+from ..base.value_rules import as_count
 
 MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
 PLATE = 2  #: points of a plate unless given

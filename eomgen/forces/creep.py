@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -13,7 +14,6 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .force import Force, Load, MarkerLoad, View

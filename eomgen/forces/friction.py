@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..elements.dimensions import DAMPING, PUSH, RATE, STIFFNESS
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
 from ..graph.core import Expr
-from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .dry_friction import LineFriction
 from .force import Force, Load, View

@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from ..base.limits.contacts import AT_REST
+from ..base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import NONE, RATE, REACH
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
-from ..numeric.value_rules import LIMITS
 from ..records import dataclass
 from .bristles import LuGre
 from .dry_friction import LineFriction, Slip, stribeck_level

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from ..base.value_rules import Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
-from ..numeric.value_ranges import Allowed
 from ..records import dataclass
 from .force import Force, Load, View
 from .paths import BETWEEN, Path

@@ -6,11 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar
 
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..elements.entry import Entry
 from ..elements.field import EXPONENT, LINEAR, Field, Fields
 from ..graph.core import Expr, sqrt
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph.core import Expr, sqrt
-from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .branches import beyond_zero
 from .force import Force, Load, View

@@ -12,13 +12,13 @@ from dataclasses import replace
 from typing import ClassVar
 
 from ..base.limits.contacts import CAUGHT_UP
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
 from ..elements.entry import Entry
 from ..elements.field import Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact_states import WHEEL, cells_of, given_groups

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..base.value_rules import POSITIVE
 from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
 from ..elements.looks import STOP, Seen
 from ..graph.core import Expr
-from ..numeric.value_ranges import POSITIVE
 from ..records import dataclass
 from .force import Force, Load, View
 from .normal_laws import NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law

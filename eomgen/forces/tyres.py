@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -14,7 +15,6 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .branches import where
 from .force import Force, Load, MarkerLoad, Measured, View

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import IDENTIFIED, LINEAR, MEASURED, ROUNDS
 from ..errors import cannot, ill_shaped, off_range
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.near_names import read_names, unknown
 from ..runtime.room import read_numbers
 from .regressor import inertial_remainder, regressor

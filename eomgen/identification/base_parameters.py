@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import EFFECT, ROUNDED_COEFFICIENT
 from ..errors import ProjectionError, off_range
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states
 from ..runtime.room import read_number

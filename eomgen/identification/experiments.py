@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import ill_typed, incomplete, off_range
-from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_numbers
 from ..runtime.storage import split_head

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import MEASURED, ROUNDS
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..errors import (
@@ -24,7 +25,6 @@ from ..errors import (
     no_choice,
     off_range,
 )
-from ..numeric.scales import Array
 from ..runtime.allowed_parameters import bounds_of
 from ..runtime.late_start import fixed_told, tell_fixed
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown

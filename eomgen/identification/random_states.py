@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

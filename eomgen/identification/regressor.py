@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import cannot, ill_shaped
-from ..numeric.scales import Array
 from ..runtime.kernels import into
 from ..runtime.refusals import refuse_states
 from ..runtime.room import read_numbers

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.linear import output_derivatives
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import QUADRATURE
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed, Tabulated
 from ..runtime.late_start import start_slopes
 from ..runtime.signals import Forcing

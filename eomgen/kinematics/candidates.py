@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.limits.constraints import CHOSEN
-from ..numeric import conditioning
+from ..numeric.ranks import conditioning
 
 Array = NDArray[np.float64]
 LARGEST = 120  #: coordinates up to which every one is judged

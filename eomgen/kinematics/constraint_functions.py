@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
-from ..numeric import Assembly, Scales
 from ..numeric.closure import close
-from ..numeric.constraint_system import RESTARTS, ConstraintSystem, CutJoints
+from ..numeric.constraint_system import RESTARTS, Assembly, ConstraintSystem, CutJoints
 from ..numeric.nearest_branch import close_nearest
-from ..numeric.scales import Space
+from ..numeric.scales import Scales, Space
 from .kinematics import Kinematics
 from .row_scales import row_scales
 

@@ -16,10 +16,10 @@ from ..base.limits.constraints import CONTRADICTION
 from ..constraints import Driver
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..graph.substitute import symbols_of
-from ..numeric import Assembly, rank
-from ..numeric.constraint_system import ConstraintSystem
+from ..numeric.constraint_system import Assembly, ConstraintSystem
 from ..numeric.continuation import Continuation
 from ..numeric.held_path import HeldPath
+from ..numeric.ranks import rank
 
 if TYPE_CHECKING:
     from .constraint_functions import ConstraintFunctions

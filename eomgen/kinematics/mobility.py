@@ -12,8 +12,9 @@ from ..base.names import hint, joined
 from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
-from ..numeric import choose_independent, independent_rows
+from ..numeric.independent_columns import choose_independent
 from ..numeric.nearest_branch import differences
+from ..numeric.ranks import independent_rows
 from ..numeric.row_chains import SparseRows
 from ..records import dataclass
 from .candidates import rate_candidates

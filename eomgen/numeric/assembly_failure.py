@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import CONTRADICTION, MEASURED
-from . import algebra
 from .closure import FAR, ClosureSystem, close, closed, remoteness
 from .projection import largest
 from .ranks import rank
-from .scales import Array, Indices
 from .starts import starts
 
 

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import CONTRADICTION, GIVEN
 from ..errors import AssemblyError
-from . import algebra
-from .scales import Array, Indices, Scales
+from .scales import Scales
 
 
 class VelocityEquations(NamedTuple):

@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import NULL
 from ..base.limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
-from . import algebra
 from .projection import largest, within
-from .scales import Array, Position, Scales
+from .scales import Position, Scales
 
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..errors import AssemblyError
 from .closure import ClosureSystem, WantedValues, close, closed
 from .projection import largest
-from .scales import Array, Indices, Scales
+from .scales import Scales
 from .space import settle
 from .starts import starts
 

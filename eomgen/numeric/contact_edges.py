@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.contacts import FIRM, PIVOTS, RENEWED, SLIPPERY, VAIN
-from . import algebra
 from .contact_problem import ContactProblem
-from .space import Array
 
 
 class Edges:

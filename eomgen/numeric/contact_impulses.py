@@ -26,11 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.contacts import MANY, PATIENT, SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED, WARM
 from ..errors import EvaluationError
 from .contact_edges import solve_edges
 from .contact_problem import ContactProblem
-from .space import Array
 
 
 class ContactImpulses(NamedTuple):

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import algebra
-from .space import Array
+from ..base import algebra
+from ..base.algebra import Array
 
 
 class ContactProblem:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import BLOCKED, UNJUDGED
 from .curves import OFF, TURNED, Point, predict
 from .projection import largest
-from .scales import Array
 
 if TYPE_CHECKING:
     from .curves import PositionCurve

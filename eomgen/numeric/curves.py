@@ -7,7 +7,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .scales import Array, Scales
+from ..base.algebra import Array
+from .scales import Scales
 
 OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction

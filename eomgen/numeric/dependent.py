@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import ACCEPTED, EXACT, SETTLED
 from ..errors import NonFiniteError, ProjectionError
 from .partitions import Partition, partition
 from .projection import DAMPING, largest, within
-from .scales import Array, Indices, Position, Rate, Scales
+from .scales import Position, Rate, Scales
 
 STEPS = 50  #: Newton steps at most
 

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices, indefinite_factor, moves_inertia, safely_positive
 from ..errors import NonFiniteError, SingularMassMatrixError
-from . import algebra
-from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
 from .projection import beyond_velocities, minimum_norm, project, tangent_projector
-from .scales import Array, GivenRates, Indices, Position, Rate, Scales
+from .scales import GivenRates, Position, Rate, Scales
 
 
 class Terms(NamedTuple):
@@ -75,7 +75,7 @@ def embed(
     Raises
     ------
     SingularMassMatrixError
-        A pivot is not above 1e-13 of the terms that its own diagonal entry is the sum of; see :mod:`.definite`.
+        A pivot is not above 1e-13 of the terms that its own diagonal entry is the sum of; see :mod:`~..base.algebra`.
     PartitionError
         As :func:`~.partitions.partition`.
     """

@@ -20,11 +20,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
 from ..base.limits.numbers import SUMMED
 from ..errors import NonFiniteError, ProjectionError
-from . import algebra
-from .space import Array
 
 PASSES = 50  #: at most
 

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import DRIFTED, NULL
 from ..errors import AssemblyError
-from . import algebra
 from .closure import DAMPING, ClosureSystem, close, closed
 from .constraint_system import ConstraintSystem
 from .continuation import FEWEST, Continuation
 from .curves import Point, Tangent
 from .projection import largest
-from .scales import Array
 
 LONGEST = 200.0  #: scaled distance too long to follow
 TRIALS = 5000  #: steps at most, those taken back included

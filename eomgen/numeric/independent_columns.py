@@ -8,9 +8,9 @@ from math import comb
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import PREFERENCE
 from .row_chains import SparseRows
-from .scales import Array, Indices
 
 #: At most so many sets of coordinates are compared one by one, where that takes at most so many singular values.
 ENUMERATED, DECOMPOSED = 500, 20_000

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..base.limits.analyses import BESIDE
 from ..base.limits.constraints import MEASURED
 from .closure import ClosureSystem, WantedValues, close, closed
 from .constraint_system import Assembly, ConstraintSystem
 from .projection import largest
 from .ranks import rank
-from .scales import Array, Indices
 from .starts import starts
 
 TURNED = 16  #: places of what is not guessed, besides the first

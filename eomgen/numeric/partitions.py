@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import CHOSEN as STRICT
 from ..base.limits.constraints import PREFERENCE
 from ..base.limits.constraints import STATE as RANK
 from ..errors import PartitionError
-from . import algebra
-from .scales import Array, Indices
 
 
 class Partition(NamedTuple):

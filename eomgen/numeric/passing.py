@@ -24,6 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.crossings import (
     ARRIVED,
     CLOSED,
@@ -39,10 +41,9 @@ from ..base.limits.crossings import (
     WEAKEST,
 )
 from ..errors import EvaluationError
-from . import algebra
 from .partitions import Partition, partition
 from .projection import correct_position, largest, within
-from .scales import Array, Indices, Position, Scales
+from .scales import Position, Scales
 
 PAIRS = 5
 

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT, TIKHONOV
 from ..base.limits.numbers import EPS, ROUNDED
 from ..errors import NonFiniteError, ProjectionError
 from .gram import gram_solver, least, smaller, weakness
-from .scales import Array, GivenRates, Position, Rate, Scales
+from .scales import GivenRates, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
 DAMPING = 0.5  #: largest scaled Newton step

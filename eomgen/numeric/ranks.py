@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import PREFERENCE, UNMOVED
 from ..base.limits.constraints import STRUCTURE as TOLERANCE
-from . import algebra
-from .scales import Array, Indices
 
 
 class Rank(NamedTuple):

@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import STRUCTURE, UNMOVED
-from . import algebra
 from .ranks import rank
-from .scales import Array, Indices
 
 SMALL = 20_000  #: entries up to which all singular values of a matrix are found at once
 WIDTH = 16  #: rows of a level at least: smaller ones are joined

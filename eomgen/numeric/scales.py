@@ -8,12 +8,13 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.algebra import Array, Indices
 from ..base.limits.crossings import SMALL
 from ..base.limits.numbers import ROUNDED
 from .given_rates import GivenRates
-from .space import Array, Indices, Space
+from .space import Space
 
-__all__ = ["Array", "GivenRates", "Indices", "Position", "Rate", "Scales", "Space"]
+__all__ = ["GivenRates", "Position", "Rate", "Scales", "Space"]
 
 #: q (n_q,) -> C (h,) of the holonomic rows, C_q (m, n) of all rows, the holonomic ones first
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]

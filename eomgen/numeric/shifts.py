@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..errors import NonFiniteError
 from .embedded import DynamicsSlopes, Terms, accelerate, embed
 from .projection import minimum_norm, project
-from .scales import Array, Indices, Position, Rate, Scales
+from .scales import Position, Rate, Scales
 
 
 class Shifts(NamedTuple):

@@ -9,16 +9,13 @@ of e is kept by every step and means nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.algebra import Array, Indices
 from ..base.limits.numbers import UNIT
 from ..errors import AssemblyError
-
-Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.intp]
 
 
 class Space(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import algebra
+from ..base import algebra
 
 Array = np.ndarray
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .scales import Array, Scales
+from ..base.algebra import Array
+from .scales import Scales
 
 RADII = (0.05, 0.2, 0.5, 1.0, 1.6, 2.4)  #: scaled distance of the starts, each used for a few
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array, Indices
 from ..base.limits.systems import BALANCED, FAINT, FIRST, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
 from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
-from .scales import Array, Indices
 
 STEPS = 30
 BALANCES = 40  #: of rows and columns in turn, at most

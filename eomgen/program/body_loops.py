@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from ..base.algebra import diagonal_blocks
 from ..base.limits.constraints import KEPT, LEFT
 from ..base.limits.crossings import NEAR_SQUARE
 from ..equations.articulated import ConstraintRow, TreeMotion
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..numeric.triangular import diagonal_blocks
 from .factor import outward
 from .loop_blocks import NOTHING, LoopBlocks, apart, largest, total_magnitude
 from .sparse import dot, times, transpose

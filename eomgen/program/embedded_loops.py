@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..base.algebra import DiagonalBlock, diagonal_blocks
 from ..base.limits.constraints import ROUNDED, TIKHONOV
 from ..base.limits.crossings import NEAR_SQUARE
 from ..base.limits.numbers import STILL
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
 from .leg_motions import Motions
 from .loop_blocks import LoopBlocks, apart, largest

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
+from ..base.value_rules import RANGE
 from ..describe.requirements import Requirement
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
 from ..graph.tape import record_tape
-from ..numeric.value_ranges import RANGE
 
 
 def keep_rules(requirements: Sequence[Requirement], names: Sequence[str]) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import correlated
 from ..base.limits.numbers import SINGULAR
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError, Problem
@@ -16,8 +18,6 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..numeric import algebra
-from ..numeric.definite import correlated
 from .law_pieces import MANY
 
 

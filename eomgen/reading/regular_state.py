@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import correlated
 from ..base.limits.numbers import LEAST, SINGULAR
 from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from ..numeric import algebra
-from ..numeric.definite import correlated
 from .quantities import Quantities
 
 

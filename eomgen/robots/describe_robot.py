@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..base.limits.numbers import FREEDOMS, LARGEST, LAWS, TIES
+from ..base.value_rules import EXCESS, fault_of_inertia
 from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
 from ..errors import ModelError, Problem
 from ..joints import JOINTS
-from ..numeric.rigid_inertia import EXCESS, fault_of_inertia
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
 from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import about
 from ..base.limits.numbers import SINGULAR
+from ..base.value_rules import EXCESS, fault_of_inertia, inertia_scales, longest_within
 from ..describe.names import nearest
 from ..errors import ModelError
-from ..numeric.rigid_inertia import EXCESS, fault_of_inertia, inertia_scales, longest_within
-from ..numeric.rotation_matrices import about
 from .robot import Loop, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, Inertia, Placement, moved, sum_inertias
 

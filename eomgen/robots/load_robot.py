@@ -12,11 +12,11 @@ import numpy as np
 
 from ..base.files import as_name
 from ..base.limits.numbers import LARGEST
+from ..base.value_rules import CHECKS, word_of_check
 from ..describe.constant_texts import constant
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, ill_typed, no_choice, no_such
-from ..numeric.rigid_inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
 from .robot import CONVERTED, RobotOptions
 from .urdf import read_urdf

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.algebra import about, from_quaternion
 from ..describe.joint_data import limits_nothing
 from ..errors import at_odds
-from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf

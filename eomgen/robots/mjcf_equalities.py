@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.algebra import from_quaternion
 from ..base.limits.numbers import IMPEDANCE
-from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
 from .robot import Loop, Sum, Tie
 from .robot_frames import Placement, moved

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..numeric.rotation_matrices import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
+from ..base.algebra import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..records import dataclass
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..base.limits.numbers import LARGEST
+from ..base.value_rules import SWITCH
 from ..describe.joint_data import limits_nothing
 from ..errors import ModelError
-from ..numeric.rigid_inertia import SWITCH
 from .robot import CONVERTED, Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
 from .urdf_constructs import LOOPS, note_urdf

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import quarter_turns
 from ..base.limits.numbers import UNIT
 from ..graph.core import Expr
-from ..numeric.rotation_matrices import quarter_turns
 
 Scalar = Any  #: a number, an :class:`~eomgen.graph.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
+from ..base.value_rules import Allowed, Flaw, judge_range
 from ..errors import ParameterError, Problem
-from ..numeric.scales import Array
-from ..numeric.value_ranges import Allowed, Flaw, judge_range
 
 
 def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:

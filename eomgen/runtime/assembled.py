@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.analyses import MOST_ANGLE
 from ..base.limits.constraints import CHOSEN
 from ..base.texts import angle_in_degrees
 from ..errors import calls_within, ill_placed, ill_shaped, no_number
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .initial import Given, Initial
 from .kernels import Kernels

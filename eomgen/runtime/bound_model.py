@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from .argument_names import both_names
 from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows

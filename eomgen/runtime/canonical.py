@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array, correlated
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import SINGULAR
 from ..errors import UnavailableError, ill_shaped
-from ..numeric import algebra
-from ..numeric.definite import correlated
 from ..numeric.projection import correct_position
-from ..numeric.scales import Array
 from .refusals import refuse_states
 from .room import read_numbers
 

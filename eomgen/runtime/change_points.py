@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import GONE
 from ..base.limits.constraints import PASSED as SINGULAR
 from ..base.limits.numbers import TINY
 from ..errors import EvaluationError
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

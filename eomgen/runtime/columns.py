@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import too_large
 from ..numeric.projection import largest
-from ..numeric.scales import Array
 from .layout import Layout
 from .run_parts import Residuals
 from .signals import Forcing

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
-from ..numeric.scales import Array
 from .kernels import Kernels
 
 

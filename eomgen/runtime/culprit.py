@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, correlated
 from ..base.limits.numbers import SINGULAR
-from ..numeric import algebra
-from ..numeric.definite import correlated
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .layout import Layout

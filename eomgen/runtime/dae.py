@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..errors import ill_shaped
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .kernels import into
 from .room import read_numbers
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from .refusals import refuse_reaction_laws, refuse_states
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED
 from ..base.limits.analyses import FLAT, LOCKED
 from ..base.limits.numbers import LARGE_ROOT, TINY_ROOT
 from ..errors import STATUS, EvaluationError
-from ..numeric.scales import Array
 from .layout import Layout
 
 Own = Array | None  #: p or u of a call; None for those that are bound

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..describe.expressions import parse
 from ..errors import ExpressionError, UsageError, cannot
 from ..graph.core import Expr, Graph
@@ -19,7 +20,6 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.tape import record_tape
 from ..graph.traverse import reachable
-from ..numeric.scales import Array
 from .input_kinds import Expressed
 from .layout import Layout
 from .near_names import unknown

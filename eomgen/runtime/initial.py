@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..errors import AssemblyError, calls_within
-from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
-from ..numeric.scales import Array
 from ..numeric.starts import starts
 from .constraint_kernels import constraint_system
 from .failure import place

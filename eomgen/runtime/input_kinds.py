@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 
 class Tabulated:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED
-from ..numeric.scales import Array
 from .argument_names import both_names
 
 if TYPE_CHECKING:

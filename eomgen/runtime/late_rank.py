@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..base.algebra import Array
 from ..errors import UsageError
 from ..numeric.ranks import rank
-from ..numeric.scales import Array
 from .kernels import Kernels
 
 

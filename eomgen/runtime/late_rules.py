@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..numeric.scales import Array
-from ..numeric.value_ranges import Flaw
-from ..numeric.value_rules import POINTS, RULES, surely_right
+from ..base.algebra import Array
+from ..base.value_rules import POINTS, RULES, Flaw, surely_right
 from .tapes import play_arrays
 
 

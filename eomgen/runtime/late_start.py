@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import TO_BE_FINITE, AssemblyError, calls_within, not_finite
-from ..numeric.scales import Array
 from .layout import Layout
 from .tapes import play_arrays
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
 from ..errors import bad_data, cannot, ill_shaped
-from ..numeric.scales import Array, Scales, Space
+from ..numeric.scales import Scales, Space
 from .allowed_parameters import require_allowed
 from .near_names import check_names, plain_name, without_dots
 from .room import read_number, read_numbers

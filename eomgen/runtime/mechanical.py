@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import ill_shaped
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .kernels import into
 from .room import read_numbers

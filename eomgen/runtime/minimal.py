@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import PartitionError, at_odds, ill_shaped, no_number
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .refusals import require_switched
 from .room import read_number, read_numbers

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import UsageError, ill_shaped
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .kernels import into
 from .room import read_numbers

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import ill_shaped, ill_typed, incomplete
-from ..numeric.scales import Array
 from .near_names import unknown
 from .refined import refined, states_at
 from .room import read_number

@@ -14,10 +14,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED, argument
 from ..base.texts import shown
 from ..errors import STATUS, EvaluationError, NonFiniteError
-from ..numeric.scales import Array
 from .argument_names import both_names
 from .layout import Layout
 from .numpy_drivers import Drivers

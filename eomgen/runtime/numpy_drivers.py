@@ -12,14 +12,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, correlated
 from ..base.limits.crossings import NEAR, UNTOLD
 from ..base.limits.numbers import SINGULAR
 from ..errors import PartitionError, SingularMassMatrixError, UnsolvedError
-from ..numeric import algebra, embedded, passing, projection
-from ..numeric.definite import correlated
+from ..numeric import embedded, passing, projection
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.partitions import partition
-from ..numeric.scales import Array, GivenRates, Scales
+from ..numeric.scales import GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian
 from ..numeric.system import Balanced, Pattern
 from .layout import Layout

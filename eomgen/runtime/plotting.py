@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import FAINT
 from ..base.notation import TIME, Notation, label
 from ..errors import at_odds, cannot, incomplete
-from ..numeric.scales import Array
 from .near_names import plain_name, read_names, require, unknown
 from .refined import FINE, refined, refined_energy, states_at
 

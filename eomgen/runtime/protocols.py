@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 if TYPE_CHECKING:
     from .layout import Layout

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE
 from ..errors import UsageError, untrue
-from ..numeric.scales import Array
 from .input_kinds import Expressed
 from .signal_rates import TableRate, find_jump
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UnavailableError, no_choice
 
 if TYPE_CHECKING:
-    from ..numeric.scales import Array
+    from ..base.algebra import Array
     from .layout import Layout
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..base.texts import shown
 from ..errors import UsageError, ill_shaped, ill_typed, no_number, too_large
-from ..numeric.scales import Array
 
 #: What Python or NumPy would make a float of, or NaN, though it is no real number.
 UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))

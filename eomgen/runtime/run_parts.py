@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, SupportsIndex, overload
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from .near_names import unknown
 
 

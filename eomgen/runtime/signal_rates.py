@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..errors import UsageError, cannot, incomplete
-from ..numeric.scales import Array
 from .input_kinds import Expressed, Tabulated, of_time
 from .layout import Layout
 from .room import read_number

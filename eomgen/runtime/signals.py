@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import CONTINUOUS, DIFFERENCE
 from ..base.texts import shown
 from ..errors import UsageError, ill_shaped, ill_typed, no_number, not_finite, off_range
-from ..numeric.scales import Array
 from .input_kinds import Expressed, Tabulated, of_time
 from .input_texts import is_formula, read_formula
 from .layout import Layout

@@ -11,13 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, Indices
 from ..base.limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH, PASSED
 from ..errors import AssemblyError
-from ..numeric import algebra
 from ..numeric.closure import ClosureSystem
 from ..numeric.projection import largest
 from ..numeric.row_chains import parts
-from ..numeric.scales import Array, Indices
 from .failure import place
 from .kernels import Kernels
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import as_path, whole_file
 from ..base.texts import visible
 from ..errors import bad_file, cannot
-from ..numeric.scales import Array
 from .arrays import sealed
 from .near_names import require
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.operations import OPERATIONS, operations_with
-from ..numeric.scales import Array
 from .input_kinds import Expressed
 
 #: (operation, operands) one after the other, the numbers among them, and the instructions handed out.

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import cannot, off_range
-from ..numeric.scales import Array
 from .near_names import find_lacking, plain_name, require, unknown
 from .room import read_numbers
 from .run_parts import Named, Residuals

@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.analyses import FOLLOWED
 from ..errors import EvaluationError, ProjectionError, ill_shaped, no_number, too_large
 from ..numeric.continuation import Continuation
 from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
-from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
 from .room import read_numbers

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import DIFFERENCE, WIDE_DIFFERENCE
 from ..base.names import place_of_marker
 from ..errors import cannot
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
-from ..numeric.scales import Array
 from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import algebra
 from ..base.limits.pictures import SAME
-from ..numeric import algebra
 from .data import Array, PictureData
 from .solids import Mesh
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base import algebra
 from ..base.limits.pictures import NOTHING, SAME
-from ..numeric import algebra
 from .data import Array
 
 TRIALS = 6  #: positions that are looked at

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import algebra
 from ..base.limits.pictures import NOTHING, SAME
-from ..numeric import algebra
 from .colors import color_of, style_of
 from .data import Array
 from .scene import Item, Scene, passed

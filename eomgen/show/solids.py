@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import algebra
 from ..base.limits.pictures import SAME
-from ..numeric import algebra
 from .data import Array
 
 Triangles = NDArray[np.int64]

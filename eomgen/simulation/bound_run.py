@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL
 from ..errors import EvaluationError, SimulationError
-from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .stalled import Crawling
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import as_path, remove_parts, whole_file
 from ..base.texts import shown
 from ..errors import UsageError, bad_data, bad_file, no_choice, off_range
-from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays, sealed
 from ..runtime.identity import code_digest, differences, digest
 from ..runtime.input_kinds import Expressed

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.constraints import MEASURED
 from ..base.limits.runs import MOST_STEPS, WHOLE
 from ..errors import UsageError, cannot, off_range, untrue
-from ..numeric.scales import Array
 from ..runtime.refusals import require_switched
 from .events import instant
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..errors import cannot, ill_shaped
-from ..numeric.scales import Array
 from ..runtime.near_names import check_names
 from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import cannot, off_range
-from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_number
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import SimulationError, at_odds, cannot, ill_typed
-from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_mapping, require_time_and_state, without_dots
 from ..runtime.room import as_real

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import ATOL, RTOL
 from ..errors import SimulationError, at_odds, calls_within, cannot, no_choice
-from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import require

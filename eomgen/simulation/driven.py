@@ -14,9 +14,9 @@ from ..analysis.followed_path import FollowedPath
 from ..analysis.kinematic import complete, follow_to_start, start_from
 from ..analysis.kinematic_motion import KinematicAnalysis, keep
 from ..analysis.open_joint import describe_gap
+from ..base.algebra import Array
 from ..errors import SimulationError, cannot, no_such
 from ..numeric.roots import find_root
-from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
 from ..runtime.signals import Forcing
 from .events import UNWATCHED, Events, RunEvent

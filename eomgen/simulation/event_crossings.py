@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import (
     ASIDE,
     CROWDED,
@@ -28,7 +29,6 @@ from ..base.limits.runs import (
 )
 from ..errors import ZenoError
 from ..numeric.roots import Found, Search, search_least, search_root
-from ..numeric.scales import Array
 from .event_values import EventValues
 from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of, instant
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from .events import RunEvent, Together
 
 AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CROWD, EARLIEST, INSTANT
 from ..base.texts import shown
+from ..base.value_rules import as_count
 from ..errors import ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range
-from ..numeric.counts import as_count
-from ..numeric.scales import Array
 from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..analysis.impact import Impact, strike_run
 from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..analysis.impact_sliding import Rough, check_friction
+from ..base.algebra import Array
 from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..base.limits.runs import INSTANT
+from ..base.value_rules import read_count
 from ..errors import SimulationError, cannot, no_such, off_range
-from ..numeric.counts import read_count
-from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.given_start import Span, Start
 from ..runtime.refusals import refuse_rigid

@@ -18,11 +18,11 @@ import numpy as np
 
 from ..analysis.closed_rows import closed_rows, with_closed_rows
 from ..analysis.constrained import free_motions, solve_multipliers
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.impacts import OFF
 from ..errors import NoDerivativeError
-from ..numeric import algebra
 from ..numeric.projection import minimum_norm
-from ..numeric.scales import Array
 from .sensitivity_start import assembly_rows
 from .variational import Move, Variational
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.impact import Impact
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from ..runtime.trajectory import Trajectory
 
 if TYPE_CHECKING:

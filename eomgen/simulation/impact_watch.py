@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.impact_gaps import Gaps
+from ..base.algebra import Array
 from ..base.limits.impacts import FOUND, STARTED
 from ..base.limits.runs import INSTANT
 from ..numeric.roots import carry_out, find_root, search_least
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import cannot
-from ..numeric.scales import Array
 from ..runtime.input_kinds import Tabulated
 from ..runtime.layout import Layout
 from ..runtime.signal_rates import rate_places

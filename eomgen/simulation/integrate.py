@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import SimulationError, no_choice
-from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
 from .events import RunEvent

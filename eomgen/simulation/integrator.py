@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..errors import EvaluationError, SimulationError, UsageError, cannot
-from ..numeric.scales import Array
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.constraints import ALIKE
 from ..errors import AssemblyError
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from ..runtime.layout import Layout

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import SUNK, UNHURRIED
 from ..errors import EvaluationError, calls_within
-from ..numeric.scales import Array
 from .events import is_told_by_the_caller
 
 if TYPE_CHECKING:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.contacts import ITERATIONS, SOLVED
 from ..base.limits.runs import SAME
 from ..base.texts import shown
+from ..base.value_rules import as_count
 from ..errors import (
     EvaluationError,
     SimulationError,
@@ -23,8 +25,6 @@ from ..errors import (
     off_range,
     untrue,
 )
-from ..numeric.counts import as_count
-from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.room import read_number, require_room, require_steps

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from ..runtime.columns import Columns, describe, project, units_of_layout
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory

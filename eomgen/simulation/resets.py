@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.runs import AHEAD, CROWDED, TOUCHING
 from ..errors import ZenoError
-from ..numeric.scales import Array
 from .events import GO_ON, RESET, WAIT, Events, RunEvent, crowd_of
 
 

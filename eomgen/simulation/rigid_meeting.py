@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.contacts import LINKED
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .rigid_rows import RigidRows
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import SimulationError, cannot, off_range
 from ..numeric.pair_sums import RECORD
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

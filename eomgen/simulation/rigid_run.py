@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 from ..runtime.columns import Columns
 from ..runtime.trajectory import Trajectory
 from .contact_forces import ContactForces

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.algebra import Array
 from ..base.limits.contacts import (
     APART,
     CLOSINGS,
@@ -49,7 +50,6 @@ from ..base.limits.contacts import (
 from ..errors import SimulationError
 from ..numeric.contact_impulses import ContactImpulses, solve_contacts
 from ..numeric.contact_problem import ContactProblem
-from ..numeric.scales import Array
 from ..runtime.late import eager
 from .rigid_in_c import DONE, TOO_LONG, rigid_stepper
 from .rigid_meeting import HeldInertia, Meeting, Spot

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.runs import ATOL, RTOL
 from ..base.texts import shown
 from ..errors import ill_shaped, ill_typed, incomplete, no_choice, off_range
-from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.impacts import ASIDE, CONTRADICTS, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..errors import NoDerivativeError, cannot
-from ..numeric.scales import Array
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
 from .impact_slopes import after_impact, after_reset
 from .sensitivity_result import EventSlopes

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array, Indices
 from ..base.limits.analyses import SINGULAR
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..errors import NoDerivativeError, SimulationError
-from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.given_start import Span, Start

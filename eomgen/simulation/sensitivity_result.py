@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import whole_file
 from ..errors import ill_typed
-from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.run_parts import Named
 from ..runtime.storage import table_path

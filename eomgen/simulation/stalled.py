@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 
 class Crawling(Exception):

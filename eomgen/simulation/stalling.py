@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, MOST_STEPS, NOTICED, SHORT, STEEP, STILL
 from ..errors import SimulationError
-from ..numeric.scales import Array
 from ..runtime.failure import place
 from .stalled import Crawling
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..errors import UnavailableError, UsageError, cannot
-from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..analysis.linear import output_derivatives
+from ..base.algebra import Array
 from ..errors import cannot
-from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .input_slopes import InputSlopes
 from .sensitivity_start import Differentiated

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED
 from ..base.limits.analyses import NUDGE
 from ..base.limits.constraints import EXACT
 from ..base.limits.numbers import TINY
 from ..graph.core import Expr
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from .cases import Case
 from .rounding_sizes import FOLDED, UNIT, bounded

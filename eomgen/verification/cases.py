@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import CLOSED, REGULAR
 from ..errors import EomgenError
-from ..numeric import algebra
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

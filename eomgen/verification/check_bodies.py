@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.numbers import EPS, TINY
-from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of

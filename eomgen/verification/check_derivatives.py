@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import OFF_CONSTRAINTS
 from ..base.limits.numbers import EPS, TINY
 from ..errors import EomgenError
-from ..numeric import algebra
-from ..numeric.scales import Array
 from .bench import Bench, numbers
 from .cases import Case
 from .comparison import Comparison, pairs, size_of

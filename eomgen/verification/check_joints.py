@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
+from ..base import algebra
 from ..describe.mechanism import JointSpec
 from ..frames import GROUND, Marker
 from ..joints import Prismatic, Revolute
-from ..numeric import algebra
 from . import bodies
 from .bench import Bench
 from .comparison import Comparison

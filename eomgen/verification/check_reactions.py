@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..analysis.reactions import reactions
+from ..base.algebra import Array
 from ..frames import GROUND
 from ..joints import Continuous, Prismatic, Revolute
-from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
 from .check_joints import placed

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.analyses import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 from ..base.limits.constraints import ACCEPTED
 from ..base.operations import operations_with
 from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
-from ..numeric import algebra
-from ..numeric.scales import Array
 from ..runtime.near_names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.algebra import Array
 from ..base.limits.analyses import ROUNDED
-from ..numeric.scales import Array
 from .finding import Finding
 
 UNDERFLOW = float(np.finfo(float).tiny)  #: below it roundings are not relative (Higham 2002, sec. 2.2)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..base.algebra import Array
 
 HALVINGS = 5
 FIRST_STEP = 2e-2  #: relative to the size of the variable

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import algebra
+from ..base.algebra import Array, correlated
 from ..base.limits.analyses import CLOSED
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
-from ..numeric import algebra
-from ..numeric.definite import correlated
-from ..numeric.scales import Array
 from ..runtime.minimal import Minimal
 from ..runtime.signal_rates import moving_inputs
 from .cases import Case

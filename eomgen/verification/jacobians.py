@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..errors import EomgenError
-from ..numeric.scales import Array
 from .cases import Case
 from .comparison import Comparison, failed, pairs, size_of
 from .differences import FIRST_STEP, SHORTER, extrapolate

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import BUILDS, SPREAD_OF_ROUNDING, ZERO
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
-from ..numeric.scales import Array
 from .cases import Case, random_cases
 
 if TYPE_CHECKING:

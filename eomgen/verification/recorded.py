@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.kernel_table import NAMED
 from ..errors import EomgenError
-from ..numeric.scales import Array
 from .comparison import FAILED, Comparison, size_of
 from .finding import Finding
 

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.analyses import NUDGE, PAIR_ROUNDING
 from ..base.limits.numbers import EPS
 from ..base.operations import OPERATIONS, Operation
 from ..graph.core import Expr
 from ..graph.pair_calls import PairCall
 from ..graph.traverse import common_graph, reachable
-from ..numeric.scales import Array
 
 #: Relative rounding of one node: at most three roundings to nearest (a reciprocal, a product, a sum), and one unit in
 #: the last place, 2 roundings, of a function; 4 half units each way.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import pipeline
+from ..base.algebra import from_quaternion
 from ..derivation import Derivation
 from ..describe.mechanism import Body, Mechanism
 from ..equations import METHODS
@@ -24,14 +25,13 @@ from ..graph import vectors as vec
 from ..graph.copies import copied
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics.topology import Topology, find_topology
-from ..numeric.rotation_matrices import from_quaternion
 from ..runtime.bound_model import BoundModel
 from .check_bodies import true_accelerations
 from .comparison import Comparison, failed
 from .finding import NOT_REACHED, Finding
 
 if TYPE_CHECKING:
-    from ..numeric.scales import Array
+    from ..base.algebra import Array
     from .bench import Bench
     from .cases import Case
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..base.limits.numbers import EPS
 from ..base.limits.runs import MOST_STATES
 from ..base.texts import shown
+from ..base.value_rules import read_count
 from ..errors import EomgenError, off_range
-from ..numeric.counts import read_count
 from ..simulation.events import told_by_the_caller
 from .cases import random_cases
 from .comparison import failed

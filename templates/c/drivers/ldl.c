@@ -21,7 +21,7 @@ static double embedded_sizes(const double *restrict B, const double *restrict ma
 }
 
 /* Whether a pivot is lost in the rounding of its own entry, or is what rounding leaves of a zero; of an indefinite matrix
-   (numeric/definite.py, FAINT) it must keep half of its digits. NaN shows in the result. */
+   (base/algebra.py, FAINT) it must keep half of its digits. NaN shows in the result. */
 static int pivot_lost(double d, double size, double largest)
 {
     return INDEFINITE ? fabs(d) <= INERTIA_FAINT * size : d <= INERTIA_SINGULAR * size || d <= INERTIA_NOTHING * largest;
