@@ -7,11 +7,12 @@ import json
 import os
 import sys
 from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
-from eomgen.cli import main
+(SCRIPT,) = entry_points(group="console_scripts", name="eomgen")
 
 
 class Result(NamedTuple):
@@ -39,7 +40,7 @@ def run(*words: object, cwd: Path | str | None = None, stdin: str | bytes | None
         stack.enter_context(redirect_stdout(out))
         stack.enter_context(redirect_stderr(err))
         try:
-            main([str(word) for word in words])
+            SCRIPT.load()([str(word) for word in words])
         except SystemExit as left:
             code = int(left.code or 0)
         else:

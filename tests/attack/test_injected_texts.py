@@ -280,20 +280,19 @@ def test_a_model_file_that_is_written_reads_back_the_texts(tmp_path: Path) -> No
     (tmp_path / "again.yaml").write_text(written)
     again = eg.load(tmp_path / "again.yaml")
     assert again.to_yaml() == written
-    assert again.mechanism().doc == data["doc"]
 
 
 def test_a_pair_of_surrogates_is_a_character_and_half_of_one_is_refused(tmp_path: Path) -> None:
     for text in LONE.values():
         with pytest.raises(eg.ModelError, match=r"contains U\+D[0-9A-F]{3}, which is half of a") as caught:
-            load(described([text]), tmp_path).mechanism()
+            load(described([text]), tmp_path).check()
         places = {"doc", "parameters.p0.doc", "inputs.u0.doc", "outputs.y0.doc", "states.z0.doc", "events.e0.doc"}
         assert places | {"bodies.rod.display[0].file"} == {problem.path for problem in caught.value.problems}
         model = eg.Model("held", doc=text)  # in Python as in a file
         model.parameter("l", 1.0, unit=text, doc=text)
         model.revolute("A", model.ground, model.body("rod", mass=1.0, inertia={"zz": 1.0}))
         with pytest.raises(eg.ModelError) as caught:
-            model.mechanism()
+            model.check()
         assert {problem.path for problem in caught.value.problems} == {"doc", "parameters.l.unit", "parameters.l.doc"}
     module = load(described([PAIR]), tmp_path).compile(target="numpy", kernels=["rhs"])
     assert_held(module.metadata, ["\N{GRINNING FACE}"])

@@ -21,7 +21,7 @@ from sweeps import part_of
 
 import eomgen as eg
 
-ABUSE = Path(__file__).parent / "fmu_abuse"
+ABUSE = Path(__file__).with_name("fmu_abuse.c")
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
 POINTS = 21
 #: Which run always: a loop in both versions, a rolling disc, a loop in space with a redundant description.
@@ -224,16 +224,10 @@ def test_random_calls_neither_crash_nor_leak(model: Any, version: str, tmp_path:
         archive.extractall(tmp_path)
     sources = tmp_path / "sources"
     files = [str(file) for file in sorted(sources.glob("*.c")) if file.name != f"fmi{version}.c"]
-    flags = [
-        "-std=c99",
-        "-O1",
-        "-fsanitize=address,undefined",
-        "-fno-sanitize-recover=all",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-    ]
-    command = ["gcc", *flags, f"-I{sources}", str(ABUSE / f"abuse{version}.c"), *files, "-o", "abuse", "-lm"]
+    flags = (
+        f"-std=c99 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror -DVERSION={version}"
+    )
+    command = ["gcc", *flags.split(), f"-I{sources}", str(ABUSE), *files, "-o", "abuse", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run(["./abuse", "150"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")

@@ -267,4 +267,4 @@ simulation: {end: 2}
     m.weld("W", m.ground, m.body("c", mass=1))
     m.lock("brake", "W", closes="1 - t")
     with pytest.raises(eg.ModelError, match=r"constraints.brake.joint: 'W' has no coordinates to lock"):
-        m.mechanism()
+        m.check()

@@ -226,7 +226,7 @@ def once_welded() -> eg.Model:
 @pytest.mark.parametrize("target", TARGETS)
 def test_it_moves_as_with_one_weld(target: str) -> None:
     one, two = once_welded().compile(target=target), twice_welded().compile(target=target)
-    assert two.layout.n_dof == 1
+    assert two.n_dof == 1
     start = {"theta": 0.3}
     a, b = one.simulate(1.0, initial=start), two.simulate(1.0, initial=start)
     np.testing.assert_allclose(b["theta"][-1], a["theta"][-1], rtol=1e-9)

@@ -144,7 +144,8 @@ def test_an_exported_package_stands_alone(target: str, tmp_path: Path) -> None:
 def test_independent_ones_as_linearize_takes_them(names: tuple[str, ...]) -> None:
     """Coordinates and velocities are chosen apart, and completed."""
     module = tied().compile(target="numpy", independent=names)
-    assert {name for name in names if name in module.v_names} <= {module.v_names[k] for k in module.layout.independent}
+    chosen = {module.v_names[k] for k in module.metadata["independent"]}
+    assert {name for name in names if name in module.v_names} <= chosen
     x = module.x0(a=0.3, c=0.2, r=0.5)
     near = module.linearize(x)
     assert set(names) <= set(near.states)

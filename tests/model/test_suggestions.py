@@ -72,7 +72,7 @@ def test_words_of_other_programs_in_python(held: dict[str, Any], kind: str, word
 def test_words_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
     (tmp_path / "model.yaml").write_text(f"name: m\n{text}\n")
     with pytest.raises(eg.ModelError, match=f"did you mean '?{meant}'?\\?"):
-        eg.load(tmp_path / "model.yaml").mechanism()
+        eg.load(tmp_path / "model.yaml").check()
 
 
 @pytest.mark.parametrize(

@@ -105,4 +105,4 @@ def pendulum(text: str, mass: object = 1, body: str = "bob") -> eg.Model:
 @pytest.mark.parametrize("text", ["x(com)", "total_mass"])
 def test_a_mechanism_without_mass_has_no_sums(text: str) -> None:
     with pytest.raises(eg.ModelError, match="no body has a mass"):
-        pendulum(text, mass=0).mechanism()
+        pendulum(text, mass=0).check()

@@ -16,7 +16,7 @@ import nbformat
 import numpy as np
 import pytest
 from browser import Browser
-from kernels import executed
+from children import executed
 from PIL import Image
 
 import eomgen as eg

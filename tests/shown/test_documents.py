@@ -23,7 +23,7 @@ import nbformat
 import numpy as np
 import pytest
 from browser import Browser
-from kernels import executed
+from children import executed
 from models import EXAMPLES
 from PIL import Image
 from sweeps import part_of

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+from collections.abc import Iterator
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -14,10 +15,10 @@ import numpy as np
 import pytest
 import sympy as sp
 from browser import Browser
+from matplotlib.mathtext import MathTextParser
 from models import EXAMPLES, TESTS
 from shown_numbers import METHODS, evaluate, random_state, state_values
 from sweeps import part_of
-from tex_formulas import require_tex
 
 import eomgen as eg
 
@@ -82,6 +83,35 @@ class Page(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         self.text.append(data)
+
+
+#: A matrix or cases with none in it, which Matplotlib does not know, and what ends a cell or a line.
+INNERMOST = re.compile(r"\\begin\{([a-z]+)\}((?:(?!\\begin\{|\\end\{).)*)\\end\{\1\}", re.S)
+ENDS = re.compile(r"&|\\\\")
+
+
+def require_tex(markdown: str) -> None:
+    """Every formula between dollars is one that a TeX reader takes."""
+    displays = re.findall(r"\$\$(.+?)\$\$", markdown, re.S)
+    inline = re.findall(r"(?<![\\$])\$(?!\$)(.+?)(?<!\\)\$", re.sub(r"\$\$.+?\$\$", "", markdown, flags=re.S), re.S)
+    for formula in (*displays, *inline):
+        assert not re.search(r"\\text\{[^}]*(?<!\\)[_^&%#]", formula), formula
+        for cell in _cells(formula):
+            _require(re.sub(r"\\(left|right|displaystyle)\b", "", cell).replace(r"\text{", r"\mathrm{").strip())
+
+
+def _cells(formula: str) -> Iterator[str]:
+    """The cells of all matrices and cases, and the formula with a letter in their places."""
+    while found := INNERMOST.search(formula):
+        yield from ENDS.split(found[2])
+        formula = f"{formula[: found.start()]} x {formula[found.end() :]}"
+    yield from ENDS.split(formula)
+
+
+@cache
+def _require(cell: str) -> None:
+    read: Any = MathTextParser("path").parse
+    read(f"${cell}$") if cell else None
 
 
 def check(document: Any) -> None:
