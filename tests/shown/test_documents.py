@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import base64
+import inspect
 import io
 import re
 import resource
@@ -124,6 +125,34 @@ def test_links_lead_somewhere_and_the_readme_shows_what_ships() -> None:
     (shown,) = blocks(ROOT / "README.md", "yaml")
     shipped = re.sub(r"^doc:.*\n", "", (EXAMPLES / "slider_crank.yaml").read_text("utf-8"), flags=re.MULTILINE)
     assert re.sub(r" *#.*", "", shown) == shipped
+
+
+def properties(schema: Any) -> set[str]:
+    """The keys that a JSON Schema knows, at every depth."""
+    parts = schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    here = schema.get("properties") if isinstance(schema, dict) else None
+    return set(here if isinstance(here, dict) else ()).union(*map(properties, parts))
+
+
+def test_pages_know_every_key_and_public_name_and_the_glossary_every_term() -> None:
+    text = "\n".join(path.read_text(encoding="utf-8") for path in DOCUMENTS)
+    code = set(re.findall(r"\w+", " ".join(re.findall(r"`[^`]+`|```.*?```", text, re.DOTALL))))
+    assert properties(command.run("check", "--schema").json) - code == set()
+    names = {name: getattr(eg, name) for name in eg.__all__ if name != "__version__"}
+    for kind in (eg.Model, eg.Module, eg.Equations, eg.Trajectory):
+        members = {name: getattr(kind, name) for name in dir(kind) if not name.startswith("_")}
+        members = {name: member for name, member in members.items() if callable(member) or isinstance(member, property)}
+        assert [name for name, member in members.items() if not inspect.getdoc(member)] == []
+        if not re.search(rf"autoclass:: eomgen\.[\w.]+\.{kind.__name__}\n   :members:\n   :inherited-members:", text):
+            names |= members  # each has to stand on a page
+    assert [name for name, member in names.items() if not inspect.getdoc(member)] == []
+    assert set(names) - code == {"from_description"}
+    glossary = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    targets = [re.sub(r"\s+", " ", term) for term in re.findall(r"\{term\}`([^`]+)`", text)]
+    terms = set(re.findall(r"^(\S.*)\n: ", glossary, re.MULTILINE))
+    assert {term.rpartition("<")[2].rstrip(">") for term in targets} <= terms
+    module = eg.load_example("pendulum").compile(target="numpy")
+    assert all(hasattr(module, name) for name in re.findall(r"`mod\.(\w+)", glossary))
 
 
 # -- gallery and pictures ---------------------------------------------------------------------------------------------
