@@ -13,9 +13,9 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.api.module import Module
 from eomgen.compilation import Options, compile_sources, load_core
 from eomgen.emit import emit_c
+from eomgen.module import Module
 from eomgen.program import Limits
 
 from .large_loops import closed_chain, timed

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .api.equations import Equations as Equations
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
-    from .api.module import Module as Module
     from .errors import AssemblyError as AssemblyError
     from .errors import EomgenError as EomgenError
     from .errors import EquilibriumError as EquilibriumError
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from .errors import ZenoError as ZenoError
     from .loading import load as load
     from .loading import load_example as load_example
+    from .module import Module as Module
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
     from .runtime.trajectory import Trajectory as Trajectory
@@ -49,7 +49,7 @@ _STARTED = time()  #: files of eomgen that are newer than this are not the code 
 
 _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
 #: For annotations: what calls return, so no name that a misspelt one stands for.
-_TYPES = {"Equations": "api.equations", "Module": "api.module", "Trajectory": "runtime.trajectory"}
+_TYPES = {"Equations": "api.equations", "Module": "module", "Trajectory": "runtime.trajectory"}
 _HOMES |= _TYPES
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (

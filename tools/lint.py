@@ -97,8 +97,8 @@ def imports_of(name: str) -> set[str]:
 def directions() -> Iterator[str]:
     """Imports in a circle, or against the rows of ARCHITECTURE.md."""
     graph = {name: imports_of(name) for name in FILES}
-    calls = import_module("eomgen.api.module").CALLS  # named as text
-    graph["eomgen.api.module"] |= {f"eomgen.{home}" for home in calls.values()}
+    calls = import_module("eomgen.module").CALLS  # named as text
+    graph["eomgen.module"] |= {f"eomgen.{home}" for home in calls.values()}
     groups = import_module("eomgen.verification.verify").GROUPS
     graph["eomgen.verification.verify"] |= {f"eomgen.verification.check_{group}" for group in groups}
     try:

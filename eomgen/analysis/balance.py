@@ -18,6 +18,7 @@ from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
+from ..runtime.derivative_calls import assembly_jacobian
 from .tangent import find_tangent
 
 if TYPE_CHECKING:
@@ -163,11 +164,6 @@ def slopes(
     rates = np.array(along[n_q:])
     rates[layout.n_v - len(layout.states) :] = 0.0
     return BalanceSlopes(tangent.Z, (J @ along)[n_q:], rates, by_unknown, motion)
-
-
-def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
-    """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
-    return module.kernels.state("assembly_jacobian")(x, t=t)
 
 
 def force_slopes(

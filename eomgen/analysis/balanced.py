@@ -10,6 +10,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import DIFFERENCES
 from ..base.limits.constraints import STATE
+from ..base.texts import as_html, as_text, number, without_noise
 from ..runtime.constraint_kernels import constraint_system
 from ..runtime.near_names import unknown
 from .balance import Balance, balance_forces, force_slopes
@@ -17,7 +18,6 @@ from .eigenvalue_rounding import stability_of_matrix
 from .linear import linearize
 from .linearization import Linearization
 from .stability import SecondOrder, stiffness_errors, verdict
-from .tables import as_html, as_text, number, without_noise
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -12,11 +12,8 @@ from ..runtime.given_start import Start
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_number, read_numbers
-from .driven_coordinates import DrivenCoordinates, DrivenPath
-from .followed_path import FollowedPath
-from .kinematic import complete, start_from
-from .open_joint import describe_gap
-from .singular import Singular
+from ..simulation.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
+from ..simulation.kinematic import complete, describe_gap, start_from
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -21,14 +21,14 @@ from ..base.limits.analyses import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
+from ..base.texts import as_text
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
 from ..numeric.partitions import partition
+from ..runtime.constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.refusals import refuse_reaction_laws, refuse_states
 from ..runtime.room import read_numbers
-from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
-from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

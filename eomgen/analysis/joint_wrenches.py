@@ -10,7 +10,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import UNMOVED
 from ..errors import cannot
-from .constrained import ProjectedStates
+from ..runtime.constrained import ProjectedStates
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import cannot, ill_shaped, no_choice
+from ..runtime.derivative_calls import output_derivatives
 from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
 from ..runtime.room import read_number, read_numbers
 from .eigenvalue_rounding import own_accelerations
@@ -147,9 +148,3 @@ def _outputs(
     Y = output_derivatives(module, t, x, rates[n_q:])
     by_a = Y[:, n_x : n_x + n_v]
     return Y[:, :n_x] @ directions + by_a @ moved[n_q:], Y[:, n_x + n_v : n_x + n_v + layout.n_u] + by_a @ U[n_q:]
-
-
-def output_derivatives(module: BoundModel, t: float, x: Array, a: Array) -> Array:
-    """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
-    n_q = module.n_q
-    return module.kernels.motion("output_derivatives")(x[:n_q], x[n_q:], a, t=t)

@@ -17,8 +17,8 @@ from ..errors import cannot, ill_chosen
 from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
+from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.near_names import read_names, unknown
-from .balance import assembly_jacobian
 from .tangent import TangentSpace
 
 if TYPE_CHECKING:

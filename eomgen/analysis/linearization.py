@@ -10,11 +10,11 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import COUPLED, STILL
+from ..base.texts import as_html, as_text, number
 from ..errors import cannot
 from ..runtime.near_names import require, unknown
 from .eigenvalue_rounding import BALANCED
 from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
-from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.layout import Layout

@@ -20,7 +20,7 @@ from ..base.inline_pictures import image_html
 from ..base.limits.analyses import SYMMETRIC
 from ..base.limits.numbers import SHOWN_COMPLEX
 from ..base.notation import Notation
-from ..base.texts import html_text
+from ..base.texts import as_html, as_text, html_text, number
 from ..errors import EomgenError, cannot, off_range
 from ..runtime.assembled import initial_of
 from ..runtime.room import read_numbers
@@ -29,7 +29,6 @@ from .equilibrium import equilibrium
 from .linear import linearize
 from .linearization import Linearization
 from .stability import symmetric_modes, uncertainty
-from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

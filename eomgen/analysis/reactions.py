@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from .constrained import ProjectedStates, evaluate, prepare, solve_multipliers
+from ..runtime.constrained import ProjectedStates, evaluate, prepare, solve_multipliers
 from .joint_wrenches import GROUND, along_free, free_of, joint_table, on_successor, place, shift, transmitted
 from .self_stress import remove_self_stress
 

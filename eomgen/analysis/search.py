@@ -12,9 +12,10 @@ from ..base.algebra import Array, Indices
 from ..base.limits.analyses import DIFFERENCES, LEAST_UNKNOWN
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
 from ..numeric.projection import largest
+from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
-from .balance import Balance, assembly_jacobian, balance_forces, force_slopes, slopes
+from .balance import Balance, balance_forces, force_slopes, slopes
 from .eigenvalue_rounding import own_accelerations
 from .linear_step import RANK, LinearizedResidual, Solver
 from .tangent import displacement_names

@@ -18,7 +18,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import SEEN
 from ..base.limits.constraints import BALANCE as RANK
-from .constrained import ProjectedStates
+from ..runtime.constrained import ProjectedStates
 from .joint_wrenches import GROUND, Geometry, along_free, free_of, shift, transmitted
 
 

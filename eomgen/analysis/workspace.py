@@ -13,6 +13,7 @@ from ..base.algebra import Array
 from ..base.files import whole_file
 from ..base.inline_pictures import picture_html
 from ..base.notation import Notation
+from ..base.texts import as_html, as_text, number
 from ..base.value_rules import read_count
 from ..errors import ill_shaped
 from ..runtime.given_start import Start
@@ -20,7 +21,6 @@ from ..runtime.near_names import require, unknown
 from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_number
 from ..runtime.storage import table_path
-from .tables import as_html, as_text, number
 from .workspace_conditions import ConditionReader, Conditions, WorkspaceSingular, find_conditions
 from .workspace_flood import OUT, REACHED, Flood, Stage, flood
 from .workspace_grid import Grid, read_grid

@@ -2,7 +2,7 @@
 
 J = dy/dx of the chosen outputs y by the led coordinates x, along the constraints (C. Gosselin and J. Angeles,
 Singularity analysis of closed-loop kinematic chains, 1990): J loses rank where the outputs cannot move in some
-direction, and does not exist where the constraint Jacobian with the led rows does (:mod:`.singular`).
+direction, and does not exist where the constraint Jacobian with the led rows does (:mod:`~..simulation.followed_path`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..base.algebra import Array
 from ..base.limits.analyses import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..errors import cannot
 from ..numeric.roots import find_root
-from .singular import SHARE, Singular
+from ..simulation.followed_path import SHARE, Singular
 from .workspace_flood import OUT, Flood, Stage
 from .workspace_grid import Index
 

@@ -19,10 +19,8 @@ from ..errors import AssemblyError, PartitionError
 from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
 from ..runtime.given_start import Start
-from .driven_coordinates import DrivenCoordinates, DrivenPath
-from .followed_path import FollowedPath
-from .kinematic import complete, start_from
-from .singular import LOW, Singular
+from ..simulation.followed_path import LOW, DrivenCoordinates, DrivenPath, FollowedPath, Singular
+from ..simulation.kinematic import complete, start_from
 from .workspace_grid import Grid, Index
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.texts import shown
-from ..base.value_rules import as_count, read_count
+from ..base.value_rules import read_count
 from ..errors import ill_chosen, ill_placed, ill_typed, incomplete, no_choice, off_range, too_large
 from ..runtime.near_names import read_names, unknown
-from ..runtime.room import as_real, read_number, read_numbers
+from ..runtime.room import read_axis, read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -101,21 +101,6 @@ def read_grid(
 def _kind(layout: Layout, name: str) -> str:
     kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))
     return kinds.get(name, "time")
-
-
-def read_axis(label: str, given: Any) -> Array:
-    """Values of one axis from (low, high, count) or from the values themselves."""
-    what = f"{label}: give (low, high, count) or two or more rising or falling values"
-    if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
-        count = read_count(f"{label}: the third of (low, high, count)", given[2], 2, 10_000_000)
-        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
-    values = as_real(given)
-    if values is None:
-        raise ill_typed(f"{what}, not {shown(given)}")
-    steps = np.diff(values) if values.ndim == 1 else np.empty(0)
-    if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise ill_typed(f"{what}, not {shown(given)}")
-    return values
 
 
 def _bound(name: str, given: Any) -> float:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Unpack
 from .. import pipeline
 from ..base.inline_pictures import picture_html, side_by_side
 from ..derivation import Derivation
+from ..module import Module
 from ..runtime.near_names import find_lacking
-from .module import Module
 
 if TYPE_CHECKING:
     from ..describe.builder import Builder

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..kinematics.report import MechanismReport
+    from ..module import Module
     from ..runtime.option_types import BuildOptions
-    from .module import Module
 
 
 SMALL = 30  #: bodies of a model that is drawn whenever a notebook shows it
@@ -75,7 +75,7 @@ class Model(Builder):
         axes: bool = False,
         **named: float | str,
     ) -> Axes:
-        """Draw the mechanism at a configuration, without a compiler; arguments as for :meth:`.module.Module.draw`.
+        """Draw the mechanism at a configuration, without a compiler; arguments as for :meth:`~..module.Module.draw`.
 
         Examples
         --------

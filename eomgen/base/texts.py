@@ -12,9 +12,11 @@ import re
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
-from math import tau
+from math import isfinite, tau
 from textwrap import wrap
 from typing import Any
+
+from .limits.numbers import SHOWN, SHOWN_COMPLEX
 
 #: Characters of the generated lines that hold a comment or a literal.
 WIDTH = 114
@@ -193,3 +195,46 @@ def aligned_rows(rows: Sequence[tuple[str, str]]) -> list[str]:
         folded = fold(value, max(width, label_width + 20), first, " " * label_width) if width else []
         lines += folded or [first + value]
     return lines
+
+
+# -- labels and values of a result as text, and as HTML for notebooks --------------------------------------------------
+
+
+def number(value: complex, digits: int = 6) -> str:
+    """A real or complex number as people read it."""
+    value = complex(value)
+    if abs(value.real) <= SHOWN_COMPLEX * abs(value.imag):  # rounding
+        value = complex(0.0, value.imag)
+    if abs(value.imag) <= SHOWN_COMPLEX * max(1.0, abs(value)):
+        return f"{value.real:.{digits}g}"
+    return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"
+
+
+def without_noise(
+    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
+) -> list[float]:
+    """Values for a table, 0 where one is nothing beside the largest of its unit.
+
+    Parameters
+    ----------
+    values : sequence of float
+    units : sequence of str, optional
+        Of each; one for all by default.
+    sizes : sequence of float, optional
+        What each value is like elsewhere, over a run for instance; by default the values themselves.
+    """
+    units = units or [""] * len(values)
+    largest = dict.fromkeys(units, 0.0)
+    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
+        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
+    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+
+
+def as_text(title: str, facts: Sequence[tuple[str, str]]) -> str:
+    """Several aligned lines."""
+    return "\n".join([title, *aligned_rows(facts)])
+
+
+def as_html(title: str, facts: Sequence[tuple[str, str]]) -> str:
+    """A small table."""
+    return html_table(title, facts)

@@ -29,7 +29,7 @@ from .verb_run import complete_parameters, sort_settings
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
-    from ..api.module import Module
+    from ..module import Module
 
 
 class Prepared(NamedTuple):

@@ -16,8 +16,8 @@ from ..errors import MissingDependencyError, bad_file, incomplete
 from .shared_options import split_names
 
 if TYPE_CHECKING:
-    from ..api.module import Module
     from ..describe.mechanism import Mechanism
+    from ..module import Module
     from ..runtime import Trajectory
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ..analysis.tables import without_noise
+from ..base.texts import without_noise
 from ..errors import at_odds, no_such
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_heading, print_json, print_table

@@ -23,8 +23,8 @@ from .shared_options import parse_number, require_folder
 from .workspace_request import read_axes
 
 if TYPE_CHECKING:
-    from ..api.module import Module
     from ..ensembles.ensemble import Ensemble
+    from ..module import Module
 
 SHOWN = 10  #: failures listed
 MOST_WORKERS = 4096  #: processes of a local cluster

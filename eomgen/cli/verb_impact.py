@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..analysis.tables import without_noise
+from ..base.texts import without_noise
 from ..errors import at_odds, ill_typed, incomplete
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_heading, print_json, print_rows, say
@@ -36,8 +36,7 @@ def impact(
     as_json: bool,
 ) -> None:
     """Find the state after an impact at the initial state, without friction unless it is given."""
-    from ..analysis.impact_gaps import check_gaps
-    from ..analysis.impact_sliding import check_friction
+    from ..simulation.impact import check_friction, check_gaps
 
     if not gap and not stop:
         raise incomplete("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")

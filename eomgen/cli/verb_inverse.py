@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from ..analysis.tables import without_noise
+from ..base.texts import without_noise
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_heading, print_json, print_rows
 from .sections import verb_command

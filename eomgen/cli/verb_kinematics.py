@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..analysis.tables import without_noise
+from ..base.texts import without_noise
 from ..errors import at_odds, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
 from ..runtime.storage import RUNS
 from .failures import reports_failures
@@ -33,8 +33,8 @@ from .verb_run import complete_parameters, final_names, sort_settings
 from .workspace_request import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
-    from ..analysis.kinematic_motion import KinematicAnalysis
-    from ..api.module import Module
+    from ..module import Module
+    from ..simulation.kinematic import KinematicAnalysis
 
 COUNT = 201  #: points of a range unless it says
 SHOWN = 9  #: of them on the screen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..analysis.tables import without_noise
+from ..base.texts import without_noise
 from .analysis import Prepared, analysis_options, pairs, time_option
 from .screen import print_heading, print_json, print_table, say
 from .sections import verb_command

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..analysis.tables import without_noise
 from ..base.limits.numbers import RESTING
 from ..base.names import place_of_marker
+from ..base.texts import without_noise
 from ..errors import bad_file, incomplete
 from ..runtime.near_names import unknown
 from ..runtime.storage import RUNS
@@ -40,7 +40,7 @@ from .verb_derive import print_operations, summary
 if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..api.model import Model
-    from ..api.module import Module
+    from ..module import Module
     from ..runtime import Trajectory
     from .energy import EnergyBalance
 

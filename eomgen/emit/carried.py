@@ -13,7 +13,7 @@ from importlib.resources import files
 
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
-ALONE = ("errors", "targets", "analysis", "api", "base", "base/limits", "device", "ensembles", "identification",
+ALONE = ("errors", "module", "targets", "analysis", "base", "base/limits", "device", "ensembles", "identification",
          "numeric", "runtime", "show", "simulation", "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)

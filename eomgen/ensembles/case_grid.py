@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.workspace_grid import read_axis
 from ..base.algebra import Array
 from ..errors import at_odds, incomplete
 from ..runtime.near_names import check_names, require_mapping, without_dots
-from ..runtime.room import require_room
+from ..runtime.room import read_axis, require_room
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -38,7 +38,7 @@ class Failure(NamedTuple):
 
 
 class Ensemble:
-    """The results of many runs, from :meth:`~..api.module.Module.simulate_many`.
+    """The results of many runs, from :meth:`~..module.Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
     velocities and outputs.  Runs that failed hold NaN; ``reached`` has the states they came to.

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
-from ..analysis.constrained import multipliers
 from ..base import algebra
 from ..base.limits.numbers import EPS
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
 from ..graph.substitute import symbols_of
+from ..runtime.constrained import multipliers
 from .author import Author
 from .shown_values import evaluate, random_state, state_values
 

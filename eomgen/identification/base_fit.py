@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.tables import as_html, as_text
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import IDENTIFIED, LINEAR, MEASURED, ROUNDS
+from ..base.texts import as_html, as_text
 from ..errors import cannot, ill_shaped, off_range
 from ..runtime.near_names import read_names, unknown
 from ..runtime.room import read_numbers

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.tables import as_html, as_text
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import EFFECT, ROUNDED_COEFFICIENT
+from ..base.texts import as_html, as_text
 from ..errors import ProjectionError, off_range
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.tables import as_html
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import IDENTIFIED
-from ..base.texts import aligned_rows
+from ..base.texts import aligned_rows, as_html
 from ..runtime.near_names import require
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.linear import output_derivatives
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import QUADRATURE
+from ..runtime.derivative_calls import output_derivatives
 from ..runtime.input_kinds import Expressed, Tabulated
 from ..runtime.late_start import start_slopes
 from ..runtime.signals import Forcing

@@ -1,6 +1,6 @@
 """Stage runtime: a core (compiled extension or NumPy) with parameters and inputs bound -> BoundModel, its own calls.
 
-What every analysis and every run takes.  :class:`~..api.module.Module` is the same with the calls that load those.
+What every analysis and every run takes.  :class:`~..module.Module` is the same with the calls that load those.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class BoundModel(Assembled, Momenta):
     """A model with parameters and inputs bound, and the calls that need no analysis and no run.
 
-    What its attributes and calls are, :class:`~..api.module.Module` says, whose parameters it has too.
+    What its attributes and calls are, :class:`~..module.Module` says, whose parameters it has too.
     """
 
     #: what it was made from; None for a module of an exported package, or from a pickle

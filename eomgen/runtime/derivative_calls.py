@@ -63,3 +63,14 @@ def inverse_dynamics_derivatives(
         kept["inverse_dynamics_derivatives"] = module.kernels.motion("inverse_dynamics_derivatives")
     every = kept["inverse_dynamics_derivatives"](q, v, a, p, u, out, t)
     return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
+
+
+def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
+    """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
+    return module.kernels.state("assembly_jacobian")(x, t=t)
+
+
+def output_derivatives(module: BoundModel, t: float, x: Array, a: Array) -> Array:
+    """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
+    n_q = module.n_q
+    return module.kernels.motion("output_derivatives")(x[:n_q], x[n_q:], a, t=t)

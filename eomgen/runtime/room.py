@@ -12,6 +12,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..base.texts import shown
+from ..base.value_rules import as_count, read_count
 from ..errors import UsageError, ill_shaped, ill_typed, no_number, too_large
 
 #: What Python or NumPy would make a float of, or NaN, though it is no real number.
@@ -221,3 +222,18 @@ def _floats(what: str, given: Any, wanted: str) -> Array:
     if found is None:
         raise ill_typed(f"{wanted}, not {shown(given)}")
     return found
+
+
+def read_axis(label: str, given: Any) -> Array:
+    """Values of one axis from (low, high, count) or from the values themselves."""
+    what = f"{label}: give (low, high, count) or two or more rising or falling values"
+    if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
+        count = read_count(f"{label}: the third of (low, high, count)", given[2], 2, 10_000_000)
+        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
+    values = as_real(given)
+    if values is None:
+        raise ill_typed(f"{what}, not {shown(given)}")
+    steps = np.diff(values) if values.ndim == 1 else np.empty(0)
+    if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise ill_typed(f"{what}, not {shown(given)}")
+    return values

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.driven_coordinates import DrivenCoordinates, DrivenPath
-from ..analysis.followed_path import FollowedPath
-from ..analysis.kinematic import complete, follow_to_start, start_from
-from ..analysis.kinematic_motion import KinematicAnalysis, keep
-from ..analysis.open_joint import describe_gap
 from ..base.algebra import Array
 from ..errors import SimulationError, cannot, no_such
 from ..numeric.roots import find_root
 from ..runtime.given_start import Span, Start
 from ..runtime.signals import Forcing
 from .events import UNWATCHED, Events, RunEvent
+from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath
+from .kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
 from .run_arguments import find_span, ordered_times
 
 if TYPE_CHECKING:

@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.impact import Impact, strike_run
-from ..analysis.impact_gaps import Gaps, allowance, check_gaps
-from ..analysis.impact_sliding import Rough, check_friction
 from ..base.algebra import Array
 from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..base.limits.runs import INSTANT
@@ -22,6 +19,7 @@ from ..runtime.refusals import refuse_rigid
 from ..runtime.run_parts import Residuals
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
+from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
 from .impact_trajectory import ImpactRun
 from .impact_watch import Watch, first_missed
 from .run_arguments import find_span, find_state

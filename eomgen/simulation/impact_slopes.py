@@ -1,6 +1,6 @@
 """Simulation: a state at an event and its changes -> how the state right after a reset or an impact changes.
 
-An impact of one gap with normal n (see :mod:`..analysis.impact`) solves
+An impact of one gap with normal n (see :mod:`.impact`) solves
 
     M (v+ - v-) + C_q^T l = n^T g        C_q v+ + C_t = 0        r+ + e r- = 0,  r = n v + gap_t
 
@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.closed_rows import closed_rows, with_closed_rows
-from ..analysis.constrained import free_motions, solve_multipliers
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.impacts import OFF
 from ..errors import NoDerivativeError
 from ..numeric.projection import minimum_norm
+from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
 from .sensitivity_start import assembly_rows
 from .variational import Move, Variational
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from ..analysis.impact import Impact
 from ..base.algebra import Array
 from ..runtime.trajectory import Trajectory
+from .impact import Impact
 
 if TYPE_CHECKING:
     from ..runtime.protocols import Source

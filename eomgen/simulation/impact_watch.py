@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.impact_gaps import Gaps
 from ..base.algebra import Array
 from ..base.limits.impacts import FOUND, STARTED
 from ..base.limits.runs import INSTANT
 from ..numeric.roots import carry_out, find_root, search_least
+from .impact import Gaps
 
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory

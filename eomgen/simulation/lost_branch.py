@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.balance import assembly_jacobian
 from ..base import algebra
 from ..base.limits.constraints import PASSED
 from ..base.limits.impacts import OPENS
 from ..errors import NoDerivativeError
 from ..runtime.change_points import scaled_jacobians
+from ..runtime.derivative_calls import assembly_jacobian
 from .sensitivity_start import Differentiated
 
 if TYPE_CHECKING:

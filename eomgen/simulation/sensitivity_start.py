@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..analysis.balance import assembly_jacobian
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import CONTRADICTION, STATE
 from ..base.names import place_of_marker
 from ..errors import at_odds, ill_placed, incomplete, untrue
 from ..numeric.projection import minimum_norm
+from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
 
 if TYPE_CHECKING:

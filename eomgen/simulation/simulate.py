@@ -228,7 +228,7 @@ def simulate(
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
     if any(event.action == WAIT for event in watched.model):
-        from ..analysis.impact import describe_negative_gaps
+        from .impact import describe_negative_gaps
 
         words = describe_negative_gaps(bound, start, x0, watched.declared, forcing)
         if words and not is_told_by_the_caller():

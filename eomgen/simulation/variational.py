@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..analysis.linear import output_derivatives
 from ..base.algebra import Array
 from ..errors import cannot
+from ..runtime.derivative_calls import output_derivatives
 from ..runtime.signals import Forcing
 from .input_slopes import InputSlopes
 from .sensitivity_start import Differentiated

@@ -1,4 +1,4 @@
-"""Analysis: a Module, times and led coordinates -> positions, velocities and accelerations over the range.
+"""A Module, times and prescribed coordinates -> positions, velocities and accelerations over the range, without forces.
 
 Masses and forces play no part.  The range is followed from the initial position, so that the mechanism stays on its
 branch; positions between the points of the continuation are then solved from cubic guesses.
@@ -7,18 +7,21 @@ branch; positions between the points of the continuation are then solved from cu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.analyses import ALIGNED, SINGULAR
-from ..base.limits.constraints import EXACT, UNMOVED
+from ..base.limits.analyses import ALIGNED, SINGULAR, SLACK
+from ..base.limits.constraints import CONTRADICTION, EXACT, UNMOVED
 from ..base.texts import shown
 from ..errors import (
+    TO_BE_FINITE,
     AssemblyError,
     PartitionError,
+    cannot,
     ill_chosen,
     ill_placed,
     ill_shaped,
@@ -26,21 +29,272 @@ from ..errors import (
     no_number,
     too_large,
 )
+from ..numeric.closure import close
 from ..numeric.projection import largest
+from ..runtime.columns import Columns, describe, units_of
 from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_flag, read_number, read_numbers, require_room
-from .driven_coordinates import DrivenCoordinates, DrivenPath
-from .followed_path import FollowedPath
-from .kinematic_motion import KinematicAnalysis, keep
-from .known_range import KnownRange
-from .open_joint import describe_gap
-from .singular import Singular
+from ..runtime.run_parts import Residuals
+from ..runtime.trajectory import Trajectory
+from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.initial import Initial
+
+
+# -- the result --------------------------------------------------------------------------------------------------------
+
+
+METHOD = "kinematic"
+
+
+class MotionColumns(Columns):
+    """Columns of a motion whose accelerations are known, and come from no force.  NaN where it is not defined."""
+
+    def __init__(self, module: BoundModel, t: Array, x: Array, u: Array, a: Array) -> None:
+        super().__init__(module, t, x, u)
+        self.a = a
+
+    @cached_property
+    def slopes(self) -> Array:
+        """x' (n_x, n_t)."""
+        n_q = self.module.n_q
+        q, v = self.x[:n_q], self.x[n_q:]
+        space = self.module.layout.space
+        return np.concatenate([v if space is None else space.rates(q, v), self.a])
+
+    def _outputs(self) -> Array:
+        module, n_q = self.module, self.module.n_q
+        if not module.metadata.get("output_accelerations", True):
+            kernel = module.kernels.timed("outputs", nan=True)
+            return kernel(self.t, self.x, u=self._varying())
+        motion = module.kernels.motion("motion_outputs")
+        return motion(self.x[:n_q], self.x[n_q:], self.a, u=self._varying(), t=self.t)
+
+    @cached_property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (3, n_t)."""
+        T, V = self.module.kernels.state("energy", nan=True)(self.x, u=self._varying(), t=self.t)
+        return np.array([T, V, T + V])
+
+
+class KinematicAnalysis(Trajectory):
+    """The motion over a range of time or of prescribed coordinates, as a :class:`~..runtime.trajectory.Trajectory`.
+
+    Attributes
+    ----------
+    q, v, a : (n_q, n_t), (n_v, n_t), (n_v, n_t) arrays
+        Velocities and accelerations are NaN where the prescribed coordinates do not determine them.
+    led : tuple of str
+        The prescribed coordinates; none if drivers alone move the mechanism.
+    singular : list of Singular
+        Singular positions met, in order.
+    stop : Singular or None
+        Where the range ended early.
+    complete : bool
+        Whether the whole range was reached.
+    """
+
+    def __init__(
+        self,
+        module: BoundModel,
+        motion: tuple[Array, Array, Array, Array],
+        columns: MotionColumns,
+        header: dict[str, Any],
+        found: Sequence[Singular],
+        stop: Singular | None,
+        led: tuple[str, ...],
+        **rest: Any,
+    ) -> None:
+        t, _, _, self.a = motion
+        super().__init__(t, columns.x, columns, header, **rest)
+        self._module = module
+        self.singular, self.stop, self.led = list(found), stop, led
+
+    @property
+    def complete(self) -> bool:
+        """Whether the whole range was reached."""
+        return self.stop is None
+
+    def turning_points(self, name: str) -> list[tuple[float, float]]:
+        """Dead centres of a coordinate: (time, value) where its rate changes sign.
+
+        Between two points of the range the coordinate is taken as the cubic through its values and rates there.
+
+        Parameters
+        ----------
+        name : str
+            A column that has a rate, ``name_dot``.
+
+        Raises
+        ------
+        UsageError
+            The time is constant in the range, or the column has no rate.
+        """
+        if name + "_dot" not in self.names:
+            raise cannot(f"{name!r} has no rate among the columns")
+        if len(self.t) < 2 or not np.diff(self.t).any():
+            raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
+        y, rate = self[name], self[name + "_dot"]
+        found = []
+        for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):
+            h = self.t[k + 1] - self.t[k]
+            d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
+            cubic = np.array([d0 + d1 - 2 * dy, 3 * dy - 2 * d0 - d1, d0, y[k]])
+            roots = np.roots(np.polyder(cubic)) if cubic[:3].any() else np.zeros(1)
+            inside = [
+                float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < SLACK and -SLACK <= r.real <= 1 + SLACK
+            ]
+            if inside:
+                x = min(inside, key=lambda r: abs(r - d0 / (d0 - d1)) if d0 != d1 else r)
+                found.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))
+        return found
+
+    def __repr__(self) -> str:
+        over = (
+            f"of {', '.join(self.led)}"
+            if self.led
+            else f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s"
+            if self.t.size
+            else ""
+        )
+        end = "" if self.stop is None else f", ends early: {self.stop}"
+        return f"<KinematicAnalysis of {self.name}: {len(self)} points {over}{end}>"
+
+
+def keep(
+    driven: DrivenCoordinates,
+    t: Array,
+    parts: Sequence[tuple[Array, Array, Array]],
+    found: Sequence[Singular],
+    stop: Singular | None,
+    asked: int,
+    led: tuple[str, ...],
+    *,
+    u: Array | None = None,
+    header: Mapping[str, Any] | None = None,
+    **rest: Any,
+) -> KinematicAnalysis:
+    """Put an analysis together from its pieces; ``asked`` points were asked for.
+
+    ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``rest`` what a Trajectory takes.
+    """
+    module = driven.module
+    q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
+    x = np.concatenate([q, v])
+    if u is None:
+        u = np.repeat(module.u[:, None], len(t), axis=1)
+    columns = MotionColumns(module, t, x, u, a)
+    complete = describe(module) | {
+        "method": METHOD,
+        "rtol": None,
+        "atol": None,
+        "span": [float(t[0]), float(t[-1])] if t.size else [],
+        "led": list(led),
+        "singular": [str(s) for s in found],
+        "status": 0 if stop is None else -1,
+        "message": "the whole range" if stop is None else f"{len(t)} of {asked} points: {stop}",
+        "residuals": residuals(module, t, x)._asdict(),
+        "units": units_of(module, columns.names),
+        **(header or {}),
+    }
+    return KinematicAnalysis(module, (t, q, v, a), columns, complete, found, stop, led, **rest)
+
+
+def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
+    """How well the constraints are kept, all rows, where the motion is defined."""
+    n = module.n_q
+    if not module.n_rows or not t.size:
+        return Residuals()
+    position = largest(module.constraints.every(x[:n], t=t))
+    fine = np.isfinite(x).all(axis=0)
+    rate = module.kernels.state("velocity_constraints")(x[:, fine], t=t[fine]) if fine.any() else np.empty(0)
+    return Residuals(position, largest(rate), position, largest(rate))
+
+
+# -- what is known of the range ----------------------------------------------------------------------------------------
+
+
+class KnownRange:
+    """What of a range to and fro on one line was followed already.
+
+    Parameters
+    ----------
+    t : (n,) array
+    y : (k, n) array
+        Led values.
+    """
+
+    def __init__(self, t: Array, y: Array) -> None:
+        moving = [row for row in (t, *y) if np.ptp(row)]
+        #: values of the only coordinate that moves, or of the time, or None
+        self.values = moving[0] if len(moving) == 1 else None
+        self.low = self.high = 0.0 if self.values is None else float(self.values[0])
+
+    def known(self, first: int, last: int) -> float:
+        """The part of the way between two points, from the first on, that was followed and is smooth."""
+        if self.values is None or not self.low <= self.values[first] <= self.high:
+            return 0.0
+        start, end = float(self.values[first]), float(self.values[last])
+        inside = min(max(end, self.low), self.high) - start
+        return inside / (end - start) if end != start else 0.0
+
+    def note(self, first: int, last: int, smooth: bool) -> None:
+        """Take note of a way; after one that is not smooth nothing is known any more."""
+        if self.values is None:
+            return
+        ends = float(self.values[first]), float(self.values[last])
+        self.low, self.high = min(self.low, *ends), max(self.high, *ends)
+        if not smooth:
+            self.values = None
+
+
+# -- where the loops do not close --------------------------------------------------------------------------------------
+
+
+def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> str:
+    """The largest gap that is left when all equations are met as well as they can be.
+
+    Parameters
+    ----------
+    driven : DrivenCoordinates
+    t : float
+    y : (n_led,) array
+        Values of the led coordinates.
+    near : (n_q,) array
+        A closed position beside it.
+    """
+    layout, scales = driven.layout, driven.scales
+    system, led = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
+    with np.errstate(all="ignore"):  # coordinates of the tree are held exactly, so that the gap opens at a joint
+        q, _ = close(system.closure(led), system.with_values(near, led))
+    position = system.position
+    C = position(q)[0]
+    if not C.size:
+        return "beyond it, all joints close"
+    gaps = np.abs(scales.residual(C))
+    undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
+    if undefined.any():
+        owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
+        what = f"no finite value: {TO_BE_FINITE}"
+        return f"beyond it, at t = {t:.6g} s, {', '.join(owners)} has {what}"
+    place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
+    if not gaps.max() > CONTRADICTION:
+        return f"beyond it, at {place}, the loops close again: a driver's value jumps, or is out of reach in between"
+    joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
+    if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
+        worst = joints[int(np.argmax(gaps[joints]))]
+    else:
+        worst = int(np.argmax(gaps))
+    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    return f"beyond it, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
+
+
+# -- the analysis ------------------------------------------------------------------------------------------------------
+
 
 LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 turns
 

@@ -11,45 +11,46 @@ from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.argument_names import both_names, plain_names
-from ..runtime.bound_model import BoundModel
-from ..runtime.near_names import find_lacking
+from .runtime.argument_names import both_names, plain_names
+from .runtime.bound_model import BoundModel
+from .runtime.near_names import find_lacking
 
 if TYPE_CHECKING:
-    from ..analysis.consistent import consistent as _consistent
-    from ..analysis.constrained import multipliers as _multipliers
-    from ..analysis.coordinate_range import motion_range as _motion_range
-    from ..analysis.drive import actuator_forces as _actuator_forces
-    from ..analysis.equilibrium import equilibrium as _equilibrium
-    from ..analysis.impact import impact as _impact
-    from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
-    from ..analysis.linear import linearize as _linearize
-    from ..analysis.modes import modes as _modes
-    from ..analysis.reactions import driving_forces as _driving_forces
-    from ..analysis.reactions import reactions as _reactions
-    from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
-    from ..analysis.workspace import workspace as _workspace
-    from ..ensembles.simulate_many import simulate_many as _simulate_many
-    from ..identification.base_parameters import base_parameters as _base_parameters
-    from ..identification.fit import fit as _fit
-    from ..identification.regressor import inertial_remainder as _inertial_remainder
-    from ..identification.regressor import regressor as _regressor
-    from ..identification.regressor import standard_parameters as _standard_parameters
-    from ..runtime.canonical import Canonical
-    from ..runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
-    from ..runtime.drawing import draw as _draw
-    from ..runtime.drawing import draw_branches as _draw_branches
-    from ..runtime.drawing import explore as _explore
-    from ..runtime.minimal import Minimal
-    from ..runtime.protocols import JacobianCall
-    from ..runtime.summary import report as _report
-    from ..simulation.dae_solution import Dae
-    from ..simulation.impact_run import simulate_impacts as _simulate_impacts
-    from ..simulation.integrator import integrator as _integrator
-    from ..simulation.sensitivities import sensitivities as _sensitivities
-    from ..simulation.simulate import simulate as _simulate
-    from ..simulation.steppers import step as _step
-    from ..verification.verify import verify as _verify
+    from .analysis.consistent import consistent as _consistent
+    from .analysis.coordinate_range import motion_range as _motion_range
+    from .analysis.drive import actuator_forces as _actuator_forces
+    from .analysis.equilibrium import equilibrium as _equilibrium
+    from .analysis.linear import linearize as _linearize
+    from .analysis.modes import modes as _modes
+    from .analysis.reactions import driving_forces as _driving_forces
+    from .analysis.reactions import reactions as _reactions
+    from .analysis.reactions import undetermined_reactions as _undetermined_reactions
+    from .analysis.workspace import workspace as _workspace
+    from .ensembles.simulate_many import simulate_many as _simulate_many
+    from .identification.base_parameters import base_parameters as _base_parameters
+    from .identification.fit import fit as _fit
+    from .identification.regressor import inertial_remainder as _inertial_remainder
+    from .identification.regressor import regressor as _regressor
+    from .identification.regressor import standard_parameters as _standard_parameters
+    from .runtime.canonical import Canonical
+    from .runtime.constrained import multipliers as _multipliers
+    from .runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
+    from .runtime.drawing import draw as _draw
+    from .runtime.drawing import draw_branches as _draw_branches
+    from .runtime.drawing import explore as _explore
+    from .runtime.minimal import Minimal
+    from .runtime.protocols import JacobianCall
+    from .runtime.summary import report as _report
+    from .simulation.dae_solution import Dae
+    from .simulation.impact import impact as _impact
+    from .simulation.impact_run import simulate_impacts as _simulate_impacts
+    from .simulation.integrator import integrator as _integrator
+    from .simulation.kinematic import kinematic_analysis as _kinematic_analysis
+    from .simulation.sensitivities import sensitivities as _sensitivities
+    from .simulation.simulate import simulate as _simulate
+    from .simulation.steppers import step as _step
+    from .verification.verify import verify as _verify
+
 
 #: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
 CALLS: dict[str, str | Callable[..., Any]] = {
@@ -67,15 +68,15 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "regressor": "identification.regressor",
     "inertial_remainder": "identification.regressor",
     "base_parameters": "identification.base_parameters",
-    "multipliers": "analysis.constrained",
+    "multipliers": "runtime.constrained",
     "reactions": "analysis.reactions",
     "undetermined_reactions": "analysis.reactions",
     "driving_forces": "analysis.reactions",
     "actuator_forces": "analysis.drive",
-    "impact": "analysis.impact",
+    "impact": "simulation.impact",
     "simulate_impacts": "simulation.impact_run",
     "consistent": "analysis.consistent",
-    "kinematic_analysis": "analysis.kinematic",
+    "kinematic_analysis": "simulation.kinematic",
     "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
     "inverse_dynamics_derivatives": "runtime.derivative_calls",
@@ -96,7 +97,7 @@ FORMS = {
 
 def find_function(file: str, name: str) -> Any:
     """A function or class of another part of the package, which is loaded now."""
-    return getattr(import_module(f"..{file}", __package__), name)
+    return getattr(import_module(f".{file}", __package__), name)
 
 
 class LateMethod:
@@ -128,7 +129,7 @@ class Module(BoundModel):
     if it has any, in SI units and radians, in the order of ``x_names``; q' = v but for Euler parameters.  Every state
     may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last axis.  Every call takes
     ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None`` to write into; calls of
-    positions alone take ``t=0.0`` too.  A call that fails raises an :class:`~..errors.EvaluationError` with the time
+    positions alone take ``t=0.0`` too.  A call that fails raises an :class:`~.errors.EvaluationError` with the time
     and the state.
 
     Parameters
@@ -230,7 +231,7 @@ class Module(BoundModel):
 
         def __getattr__(self, name: str) -> Any:
             if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-                from ..simulation.steppers import find_solver
+                from .simulation.steppers import find_solver
 
                 return find_solver(self, name)
             if name in CALLS:  # an analysis of a user's own
@@ -244,12 +245,12 @@ class Module(BoundModel):
         return sorted({*super().__dir__(), *CALLS, *FORMS})
 
     def __repr__(self) -> str:
-        from ..runtime.summary import line
+        from .runtime.summary import line
 
         return line(self)
 
     def _repr_html_(self) -> str:
-        from ..runtime.notebook import module_html
+        from .runtime.notebook import module_html
 
         return module_html(self)
 
