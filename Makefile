@@ -21,6 +21,8 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+# Of tests too: pytest rewrites their files at each start otherwise, which takes as long as the quick ones.
+KEEP_BYTECODE := PYTHONDONTWRITEBYTECODE=
 
 .PHONY: demo quick test thorough bench notebooks lint docs pictures mutations fuzz clean
 .DELETE_ON_ERROR:
@@ -29,11 +31,11 @@ demo: $(VENV)/.installed-plot
 	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png --animate demo_output/slider_crank.gif
 
 test thorough: lint
-	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
+	@$(KEEP_BYTECODE) OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
 	  $(if $(filter thorough,$@),--thorough) $(if $(PROGRAMS),--programs)
 
 quick: $(VENV)/.installed-test
-	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --quick -q tests
+	@$(KEEP_BYTECODE) OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --quick -q tests
 
 lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .

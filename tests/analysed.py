@@ -91,7 +91,35 @@ def rssr() -> eg.Model:
     return m
 
 
+def oscillator() -> eg.Model:
+    """A mass on a line: m s'' = F - k s - c s' - a s^3, of which m = 1 kg alone is not zero."""
+    m = eg.Model("oscillator")
+    for name, value in {"m": 1.0, "k": 0.0, "c": 0.0, "a": 0.0}.items():
+        m.parameter(name, value)
+    m.prismatic("J", m.ground, m.body("mass", mass="m"), axis="x", coordinate="s")
+    force = m.input("F")
+    m.torque("law", "J", f"{force} - k*s - c*s_dot - a*s**3")
+    m.output("force", "F")
+    return m
+
+
+def hopper(apex: bool = False) -> eg.Model:
+    """A ball of 1 kg that falls from 1 m and bounces: h' becomes -e h' at the floor; it may be pushed."""
+    m = eg.Model("ball" if apex else "hopper", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81), m.parameter("e", 0.9)
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
+    m.torque("push", "J", m.input("u"))
+    m.initial(h=1.0)
+    m.event("floor", "h", direction=-1, reset={"h_dot": "-e*h_dot"})
+    if apex:
+        m.event("apex", "h_dot", direction=-1)
+    return m
+
+
 BUILT: dict[str, Callable[[], eg.Model]] = {
+    "oscillator": oscillator,
+    "hopper": hopper,
+    "hopper_with_apex": lambda: hopper(apex=True),
     "spring_four_bar": spring_four_bar,
     "quarter_car": quarter_car,
     "single_track": single_track,

@@ -17,6 +17,8 @@ from typing import Any
 import nbformat
 
 EXECUTE = Path(__file__).parents[1] / "notebooks" / "execute.py"
+#: Seconds after which a process that does not end hangs, however busy the machine is.
+HANGS = 600.0
 
 
 @contextmanager
@@ -30,11 +32,11 @@ def child(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[A
                 os.killpg(process.pid, signal.SIGKILL)  # what it started too
 
 
-def executed(path: Path, folder: Path, raw: bool = False, timeout: float = 400.0) -> Any:
+def executed(path: Path, folder: Path, raw: bool = False) -> Any:
     """The notebook with the outputs of a fresh kernel, as the project's own script stores it in a folder, or raw."""
     words = [sys.executable, str(EXECUTE), *(["--raw"] if raw else []), "--out", str(folder), str(path)]
     setting = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}  # of readline
     with child(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=setting) as process:
-        said = process.communicate(timeout=timeout)[0]
+        said = process.communicate(timeout=HANGS)[0]
     assert process.returncode == 0, said
     return nbformat.read(folder / path.name, as_version=4)

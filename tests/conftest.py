@@ -132,6 +132,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     if terminalreporter.config.getoption("--quick"):
+        chosen = [room for room in ROOMS if room in terminalreporter.config.stash.get(QUICK, ROOMS)]
+        terminalreporter.write_line(f"for what differs from the last commit: quick tests of {', '.join(chosen)}")
         return
     told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
     told |= {name: command for name, (_, command) in LIBRARIES.items()}

@@ -45,7 +45,7 @@ def floor_of(shape: tuple[tuple[str, Any], ...], target: str) -> Any:
     m.planar("j", m.ground, body)
     law = rigid(friction="friction", restitution="restitution")
     m.contacts("c", {**dict(shape), "on": body}, {"shape": "half_plane", "on": m.ground}, law)
-    return m.compile(target=target)
+    return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
 
 
 def pile(kinds: Sequence[str], gravity: float = G, walls: bool = True) -> eg.Model:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from attack.fuzz import KEPT, attack, case_of, files_of
 from attack.runner import MODULES, find
+from children import HANGS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -129,7 +130,7 @@ def test_the_guard_catches_what_no_case_may_do(tmp_path: Path) -> None:
     attempts = {what: text.format(folder=tmp_path) for what, text in CAUGHT.items()}
     attempts |= {"nothing": "", "warns": "import warnings; warnings.warn('x')", "fails": "{}[1]", "nothing again": ""}
     words = [sys.executable, "-c", PROGRAM, str(tmp_path), json.dumps(attempts)]
-    done = subprocess.run(words, cwd=KEPT.parents[1], capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(words, cwd=KEPT.parents[1], capture_output=True, text=True, timeout=HANGS, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     found = dict(line.split(": ") for line in done.stdout.splitlines())
     assert {what for what, kind in found.items() if kind == "escape"} == set(CAUGHT)

@@ -13,6 +13,7 @@ from pathlib import Path
 import command
 import numpy as np
 import pytest
+from children import HANGS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVER = Path(__file__).with_name("c_driver.c")
@@ -51,7 +52,7 @@ def exported(name: str, method: str, folder: Path) -> list[str]:
 
 
 def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words, cwd=cwd, capture_output=True, text=True, check=False, timeout=600)
+    return subprocess.run(words, cwd=cwd, capture_output=True, text=True, check=False, timeout=HANGS)
 
 
 @pytest.mark.parametrize(("name", "method"), EVERY)

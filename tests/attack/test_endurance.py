@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from analysed import compiled
 
 import eomgen as eg
 
@@ -30,7 +31,7 @@ def frequent_turns() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def crank(request: pytest.FixtureRequest) -> Any:
-    return eg.load_example("slider_crank").compile(target=request.param)
+    return compiled("slider_crank", request.param)
 
 
 def agree(task: Callable[[int], Any]) -> None:

@@ -269,7 +269,6 @@ def test_documents_and_tables_hold_no_character_that_does_not_print(tmp_path: Pa
     assert "<script>alert(1)</script>" in data["y0"].attrs["long_name"]
 
 
-@pytest.mark.quick
 def test_a_model_file_that_is_written_reads_back_the_texts(tmp_path: Path) -> None:
     texts = [text for text in NASTY.values() if text]
     written = load(described(texts), tmp_path).to_yaml()

@@ -14,12 +14,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from children import HANGS
 
 ROOT = Path(__file__).parents[2]
 MODEL = ROOT / "examples" / "pendulum.yaml"
@@ -59,7 +59,7 @@ def run(cache: Path | str, target: str, before: str = "", changes: Changes | Non
     ) as process, open(tell, "rb") as stream:  # fmt: skip
         os.close(told)
         try:
-            err = process.communicate(timeout=300.0)[1].decode("utf-8", "replace")
+            err = process.communicate(timeout=HANGS)[1].decode("utf-8", "replace")
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             return "hangs"
@@ -263,12 +263,12 @@ VERSION = '[ "$1" = --version ] && exec gcc --version'
 OUTPUT = 'out=; last=; for word; do [ "$last" = -o ] && out=$word; last=$word; done'
 LINKS = 'case " $* " in *" -c "*) exec gcc "$@";; esac'
 COMPILERS = {
-    "hangs behind a child": "sleep 600 & wait",
+    "hangs behind a child": "sleep 900 & wait",
     "prints without end": "exec yes",
     "hangs in compiling": f"{VERSION}\nsleep 600",
     "prints without end in compiling": f"{VERSION}\nexec yes nonsense",
     "dies in compiling": f"{VERSION}\nkill -SEGV $$",
-    "leaves a child that holds its output": 'sleep 600 &\nexec gcc "$@"',
+    "leaves a child that holds its output": 'sleep 900 &\nexec gcc "$@"',
     "makes nothing": f"{VERSION}\nexit 0",
     "makes empty files": f'{VERSION}\n{OUTPUT}\n: > "$out"',
     "makes garbage": f'{VERSION}\n{OUTPUT}\necho garbage > "$out"',
@@ -291,9 +291,7 @@ def test_compilers_that_are_broken_and_then_mended(name: str, tmp_path: Path) ->
     compiler.write_text(f"#!/bin/sh\n{COMPILERS[name]}\n".replace("OTHER", str(product)))
     compiler.chmod(0o755)
     changes: Changes = {"CC": str(compiler), "EOMGEN_COMPILER_SECONDS": "15"}
-    start = time.monotonic()
     outcome = run(cache, "cython", changes=changes)
-    assert time.monotonic() - start < 200
     compiler.write_text('#!/bin/sh\nexec gcc "$@"\n')
     survived(f"a compiler that {name}", outcome, after=run(cache, "cython", changes={"CC": str(compiler)}))
     assert outcome.startswith("named") or name.startswith("leaves a child"), outcome

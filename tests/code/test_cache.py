@@ -21,7 +21,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
-from children import child
+from children import HANGS, child
 from command import run
 
 import eomgen as eg
@@ -126,8 +126,7 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
         return m
 
     options: list[dict[str, Any]] = [
-        {}, {"optimize": 0}, {"optimize": 2}, {"native": True}, {"warnings": True}, {"extra": ["-DEXTRA"]},
-        {"extra": ["-mno-avx"]}, {"lanes": 0}, {"kernels": ["rhs"]},
+        {}, {"optimize": 0}, {"native": True}, {"extra": ["-DEXTRA"]}, {"lanes": 0}, {"kernels": ["rhs"]},
     ]  # fmt: skip
     modules = []
     for k, given in enumerate(options):
@@ -145,13 +144,12 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_damaged_entries_are_built_again(cache: Path, tmp_path: Path) -> None:
-    """A library cut short or gone, another source, half a manifest, an empty folder."""
+    """A library cut short, another source, half a manifest, an empty folder."""
     unit = write_unit(tmp_path)
     file = product()
     folder, content = file.parent, file.read_bytes()
     damages: list[Callable[[], Any]] = [
         lambda: file.write_bytes(content[: len(content) // 2]),
-        file.unlink,
         lambda: next((folder / "sources").glob("*.c")).write_text("something else"),
         lambda: (folder / "manifest.json").write_text('{"key": '),
         lambda: (shutil.rmtree(folder), folder.mkdir()),
@@ -258,8 +256,8 @@ def build(cc: Path, out: Path) -> AbstractContextManager[subprocess.Popen[str]]:
     return child(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 180.0) -> None:
-    deadline = time.monotonic() + seconds
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + HANGS
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.01)
@@ -273,7 +271,7 @@ def test_two_processes_build_the_same_at_once(cache: Path, tmp_path: Path) -> No
     cc, _ = compiler(tmp_path, lines)
     with build(cc, tmp_path / "one") as one, build(cc, tmp_path / "other") as other:
         for builder in (one, other):
-            builder.communicate(timeout=300)
+            builder.communicate(timeout=HANGS)
     assert [one.returncode, other.returncode] == [0, 0]
     assert len(list(met.iterdir())) == 2
     assert (tmp_path / "one" / "pendulum.fmu").read_bytes() == (tmp_path / "other" / "pendulum.fmu").read_bytes()
@@ -297,7 +295,7 @@ def test_a_build_that_is_killed_leaves_nothing_that_counts(cache: Path, tmp_path
     assert not (tmp_path / "out" / "pendulum.fmu").exists()
     compiler(tmp_path)  # the same command, which works now
     with build(cc, tmp_path / "out") as builder:
-        builder.communicate(timeout=300)
+        builder.communicate(timeout=HANGS)
     assert builder.returncode == 0
     assert len(entries()) == 1
     for folder in attempts(cache):
@@ -315,7 +313,7 @@ def test_a_build_that_is_ended_leaves_no_compiler_and_no_attempt(
     with build(cc, tmp_path / "out") as builder:
         wait_for(mark.exists)
         os.kill(builder.pid, by)
-        builder.communicate(timeout=180)
+        builder.communicate(timeout=HANGS)
     assert builder.returncode != 0
     wait_for(lambda: not Path("/proc", mark.read_text().strip()).exists())
     assert entries() == []

@@ -53,17 +53,16 @@ def alive(pid: int) -> bool:
 def test_a_compiler_that_hangs_is_killed_with_its_children(
     shell: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("CC", shell(VERSION + f"sleep 600 & echo $! > {tmp_path}/child; echo said; wait"))
+    monkeypatch.setenv(
+        "CC", shell(VERSION + f"(sleep 100; touch {tmp_path}/lived) & echo $! > {tmp_path}/child; echo said; wait")
+    )
     monkeypatch.setenv("EOMGEN_COMPILER_SECONDS", "2")
-    start = time.monotonic()
     with pytest.raises(eg.ToolchainError, match=r"did not finish.* 2\.?0? s \(EOMGEN_COMPILER_SECONDS sets"):
         write_unit(tmp_path)
-    assert time.monotonic() - start < 100
     children = (tmp_path / "child").read_text().split()
-    deadline = time.monotonic() + 20
-    while any(alive(int(pid)) for pid in children) and time.monotonic() < deadline:
+    while any(alive(int(pid)) for pid in children):
         time.sleep(0.01)
-    assert not any(alive(int(pid)) for pid in children)
+    assert not (tmp_path / "lived").exists()
     assert not (tmp_path / "pendulum.fmu").exists()
 
 

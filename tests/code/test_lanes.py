@@ -15,6 +15,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from children import HANGS
 from command import run
 
 import eomgen as eg
@@ -95,7 +96,7 @@ def test_an_ensemble_is_compiled_when_it_is_asked_for(named: Callable[..., eg.Mo
         thread.start()
     for thread in threads:
         thread.join()
-    assert [other.wait(timeout=300) for other in others] == [0, 0]
+    assert [other.wait(timeout=HANGS) for other in others] == [0, 0]
     for k in range(2):
         np.testing.assert_array_equal(np.load(tmp_path / f"{k}.npy"), found[0])
     assert len(found) == 3

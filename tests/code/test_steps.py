@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from analysed import compiled
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -55,14 +56,10 @@ def test_steps_are_those_of_scipy(method: str, copies: int) -> None:
 
 def test_an_implicit_method_halves_systems_of_second_order() -> None:
     """A stiff oscillator takes the steps of SciPy's Radau, and its Newton's method converges as fast."""
-    m = eg.Model("stiff")
-    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
-    m.torque("spring", "J", "-400*s - 0.3*s_dot")
-    m.initial(s=2.0)
-    mod = m.compile(optimize=0)
+    mod = compiled("oscillator", "cython").bind({"k": 400.0, "c": 0.3})
     options = {"rtol": 1e-9, "atol": 1e-11}
-    judge = solve_ivp(mod.rhs, (0.0, 2.0), mod.x0(), "Radau", jac=mod.jacobian, **options)
-    run = mod.simulate(2.0, method="Radau", **options)
+    judge = solve_ivp(mod.rhs, (0.0, 2.0), [2.0, 0.0], "Radau", jac=mod.jacobian, **options)
+    run = mod.simulate(2.0, [2.0, 0.0], method="Radau", **options)
     np.testing.assert_allclose(run.x[:, -1], judge.y[:, -1], atol=1e-7)
     assert len(run.t) == pytest.approx(len(judge.t), rel=0.02)
     assert run.nfev == pytest.approx(judge.nfev, rel=0.02)
@@ -87,16 +84,12 @@ def test_taylors_method_keeps_its_tolerance() -> None:
 
 def test_taylors_steps_are_judged_by_their_ends() -> None:
     """q'' = -q^3 from 0 at speed 1, where the first coefficients vanish; energy v^2/2 + q^4/4 stays."""
-    m = eg.Model("cube")
-    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="q")
-    m.torque("spring", "J", "-q**3")
-    m.initial(q_dot=1.0)
-    mod = m.compile(optimize=0)
+    mod = compiled("oscillator", "cython").bind({"a": 1.0})
     for rtol in (1e-6, 1e-9):
-        run = mod.simulate(20.0, method="Taylor", rtol=rtol, atol=rtol)
+        run = mod.simulate(20.0, [0.0, 1.0], method="Taylor", rtol=rtol, atol=rtol)
         judge = solve_ivp(lambda t, x: [x[1], -(x[0] ** 3)], (0.0, 20.0), [0.0, 1.0], "DOP853", rtol=1e-12, atol=1e-13)
         assert np.abs(run.x[:, -1] - judge.y[:, -1]).max() <= 30 * rtol
-        assert np.abs(run["q_dot"] ** 2 / 2 + run["q"] ** 4 / 4 - 0.5).max() <= 10 * rtol
+        assert np.abs(run["s_dot"] ** 2 / 2 + run["s"] ** 4 / 4 - 0.5).max() <= 10 * rtol
 
 
 def test_zeros_are_found_in_their_directions() -> None:
@@ -124,11 +117,7 @@ def test_zeros_are_found_in_their_directions() -> None:
 
 def test_after_a_reset_rates_are_those_of_the_new_state() -> None:
     """A ball with restitution 0.9 beside a state that follows its speed, for 4 s and until its bounces accumulate."""
-    m = eg.Model("ball", gravity=(0, -9.81, 0))
-    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
-    m.initial(h=1.0)
-    m.event("floor", "h", direction=-1, reset={"h_dot": "-0.9*h_dot"})
-    mod = m.compile(optimize=0)
+    mod = compiled("hopper", "cython")
     fall, speed = np.sqrt(2 / 9.81), np.sqrt(2 * 9.81)
     hits = fall + np.concatenate([[0.0], np.cumsum(2 * speed * 0.9 ** np.arange(1, 20) / 9.81)])
     k = int((hits < 4.0).sum())
@@ -146,11 +135,7 @@ def test_after_a_reset_rates_are_those_of_the_new_state() -> None:
 @pytest.mark.parametrize("kind", ["zero-order", "linear", "cubic"])
 def test_tables_are_read_as_scipy_reads_them(kind: str) -> None:
     """A unit mass is pushed by a table: its speed is the integral; the output reads the table itself."""
-    m = eg.Model("tabled")
-    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
-    m.torque("push", "J", m.input("F"))
-    m.output("force", "F")
-    run = m.compile(optimize=0).simulate(
+    run = compiled("oscillator", "cython").simulate(
         2.3, inputs={"F": eg.Signal(TIMES, VALUES, kind)}, t_eval=np.linspace(0.0, 2.3, 47), rtol=1e-11, atol=1e-12
     )
     t, spline = run.t, CubicSpline(TIMES, VALUES)
@@ -178,15 +163,6 @@ SAMPLES = np.linspace(0.0, 3.0, 13)
 LANES = {"DOP853": 1e-8, "RK45": 1e-8, "Taylor": 1e-10}
 
 
-@cache
-def oscillator() -> Any:
-    m = eg.Model("oscillator")
-    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="x")
-    m.torque("spring", "J", f"-k*x + {m.input('u')}")
-    m.parameter("k", 2.0)
-    return m.compile()
-
-
 def swings(k: int, forced: bool) -> np.ndarray:
     """x and x' at all times: about u / k, or pushed by a ramp from a time on."""
     stiffness, x, v = 2.0 + 5.0 * k, 1.0 - 0.2 * k, 0.5 * k
@@ -209,12 +185,12 @@ def test_every_run_of_an_ensemble_has_its_own_closed_form(method: str, forced: b
 
     The first step is too long and is tried again.
     """
-    mod, rtol = oscillator(), LANES[method]
+    mod, rtol = compiled("oscillator", "cython"), LANES[method]
     k = np.arange(COUNT)
-    ramp = {"u": eg.Signal([0.0, LATE, 10.0], [0.0, 0.0, SLOPE * (10.0 - LATE)], "linear")}
+    ramp = {"F": eg.Signal([0.0, LATE, 10.0], [0.0, 0.0, SLOPE * (10.0 - LATE)], "linear")}
     runs = mod.simulate_many(
-        3.0, {"x": 1.0 - 0.2 * k, "x_dot": 0.5 * k}, parameters={"k": 2.0 + 5.0 * k},
-        inputs=ramp if forced else {"u": 0.3 * k}, method=method, t_eval=SAMPLES, rtol=rtol, atol=1e-9,
+        3.0, {"s": 1.0 - 0.2 * k, "s_dot": 0.5 * k}, parameters={"k": 2.0 + 5.0 * k},
+        inputs=ramp if forced else {"F": 0.3 * k}, method=method, t_eval=SAMPLES, rtol=rtol, atol=1e-9,
         first_step=1.5,
     )  # fmt: skip
     assert runs.ok.all()

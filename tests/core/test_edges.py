@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
@@ -47,12 +44,11 @@ def test_fewer_speeds_than_coordinates() -> None:
         forcing=["m*a*w**2", "-m*a*v*w"],
         parameters={"m": 2.0, "J": 0.425, "a": 0.25},
     )
-    for target in ("numpy", "cython"):
-        mod = m.compile(target=target)
-        x = mod.x0(x=0.1, y=0.2, h=0.4, v=0.9, w=-0.8)
-        truth = {"x": 0.9 * np.cos(0.4), "y": 0.9 * np.sin(0.4), "h": -0.8, "v": 0.16, "w": 0.36 / 0.425}
-        got = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=False))
-        assert all(abs(got[k] - v) < 1e-12 for k, v in truth.items()), got
+    mod = m.compile(target="numpy")
+    x = mod.x0(x=0.1, y=0.2, h=0.4, v=0.9, w=-0.8)
+    truth = {"x": 0.9 * np.cos(0.4), "y": 0.9 * np.sin(0.4), "h": -0.8, "v": 0.16, "w": 0.36 / 0.425}
+    got = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=False))
+    assert all(abs(got[k] - v) < 1e-12 for k, v in truth.items()), got
     for n, k in ((4, 3), (7, 6), (1, 2), (2, 3)):
         q, v = [f"q{i}" for i in range(n)], [f"s{i}" for i in range(k)]
         m = eg.Model.from_equations(
@@ -86,24 +82,6 @@ initial: {e0: 1, wx: 0.01, wy: 2, wz: 0.01}
     mod.rhs(0.0, x)
     steps = len(mod.simulate(0.05).t)
     assert steps < 60, f"{steps} steps for 0.05 s"
-
-
-def test_drag_at_rest() -> None:
-    """-v |v| has the derivative 0 at rest."""
-    m = eg.Model("drag", gravity=(0, 0, -9.81))
-    b = m.body("b", mass=1)
-    m.translational("t", m.ground, b)
-    speed = "sqrt(vx(b)**2 + vy(b)**2 + vz(b)**2)"
-    m.force("d", b, [f"-v{c}(b)*{speed}" for c in "xyz"])
-    mod = m.compile()
-    J = mod.jacobian(0, np.zeros(6))
-    assert np.isfinite(J).all()
-    assert abs(J[3:, 3:]).max() == 0.0
-    mod.linearize(np.zeros(6))
-    truth = -np.sqrt(9.81) * np.tanh(5 * np.sqrt(9.81))
-    for method in ("Radau", "Taylor"):
-        end = mod.simulate(5.0, method=method)["t_z_dot"][-1]
-        assert abs(end - truth) < 1e-5, (method, end)
 
 
 LOOP = """<robot name="four_bar"><link name="base"/>
@@ -204,7 +182,7 @@ def test_casadi_without_holonomic_rows() -> None:
     m.planar("J", m.ground, b)
     m.knife_edge("k", b)
     e = m.derive()
-    mod = e.compile()
+    mod = e.compile(target="numpy")
     x = mod.x0(J_3=0.4, J_3_dot=-0.8)
     c = e.to_casadi()
     got = np.array(c.rhs(0, x, c.u_values, c.p_values)).ravel()
@@ -217,40 +195,6 @@ def test_rates_as_a_list() -> None:
         eg.Model.from_equations("m", ["q"], velocities=["v"], rates=["v"], mass_matrix=[["1"]], forcing=["0"]).check()
 
 
-def test_callbacks_cannot_change_the_run() -> None:
-    """An input or event function that changes the state it is given changes nothing, or is an error."""
-    bad = []
-    for target in ("cython", "numpy"):
-        mod = model(SPRING).compile(target=target)
-        truth = mod.simulate((0, 1)).x[:, -1]
-
-        def scaled(t, x):
-            x *= 0.999
-            return 0.0
-
-        def moved(t, x):
-            x[0] = 5.0
-            return 1.0
-
-        for method in ("DOP853", "RK45", "Radau", "BDF", "LSODA"):
-            for more in ({"inputs": {"u": scaled}}, {"events": [moved]}):
-                try:
-                    end = mod.simulate((0, 1), method=method, **more).x[:, -1]
-                except (eg.EomgenError, ValueError):
-                    continue
-                if not np.allclose(end, truth, atol=1e-5):
-                    bad.append((target, method, *more))
-    assert not bad, bad
-
-
-def test_event_that_is_nan() -> None:
-    """An event function that returns NaN is an error that names it, as for an input."""
-    for target in ("cython", "numpy"):
-        mod = model(SPRING).compile(target=target)
-        with pytest.raises(eg.UsageError, match="event .* is nan at t = "):
-            mod.simulate((0, 1), events=[lambda t, x: np.nan if x[0] < 0.5 else x[0] - 0.4])
-
-
 def test_driven_mechanism_with_an_event() -> None:
     """A mechanism that drivers move wholly, with an event that never happens."""
     for end in ("", ", terminal: true"):
@@ -259,19 +203,17 @@ def test_driven_mechanism_with_an_event() -> None:
             "constraints: {c: {type: driver, coordinate: q, value: t}}\n"
             f"events: {{e: {{expression: q + 1{end}}}}}\n"
         )
-        for target in ("numpy", "cython"):
-            assert abs(m.compile(target=target).simulate((0, 1))["q"][-1] - 1.0) < 1e-12
+        assert abs(m.compile(target="numpy").simulate((0, 1))["q"][-1] - 1.0) < 1e-12
 
 
 def test_states_without_freedoms() -> None:
     """First-order and sampled states beside bodies that cannot move: s' = -s from 2; s -> s/2 + 1 every 0.1 s."""
-    head = "name: w\nbodies: {b: {mass: 1}}\njoints: {j: {type: weld, between: [ground, b]}}\nstates: "
+    text = "name: w\nbodies: {b: {mass: 1}}\njoints: {j: {type: weld, between: [ground, b]}}\n"
+    text += 'states: {s: {rate: "-s", initial: 2}, z: {sampled: "0.5*z+1", period: 0.1, initial: 4}}\n'
     for target in ("numpy", "cython"):
-        end = model(head + '{s: {rate: "-s", initial: 2}}\n').compile(target=target).simulate((0, 1))["s"][-1]
-        assert abs(end - 2 * np.exp(-1)) < 1e-7, end
-        text = head + '{s: {sampled: "0.5*s+1", period: 0.1, initial: 4}}\n'
-        end = model(text).compile(target=target).simulate((0, 0.25))["s"][-1]
-        assert end == 2 + 2 / 2**3  # samples at 0, 0.1 and 0.2 s
+        run = model(text).compile(target=target).simulate((0, 0.25))
+        assert run["s"][-1] == pytest.approx(2 * np.exp(-0.25), abs=1e-7)
+        assert run["z"][-1] == 2 + 2 / 2**3  # samples at 0, 0.1 and 0.2 s
 
 
 def test_limits_of_urdf_at_infinity() -> None:
@@ -287,39 +229,20 @@ def test_limits_of_urdf_at_infinity() -> None:
 
 def test_documents_are_well_formed() -> None:
     """Control characters in doc: modelDescription.xml stays XML."""
-    bad = []
-    for char in ("\x07", "\x1b", "\uffff", "\u202e", "\u2066", "\u200b", "\ufeff"):
-        text = json.dumps(f"a{char}b")
-        m = model(
-            f"name: fz\ndoc: {text}\nbodies: {{b: {{mass: 1}}}}\n"
-            "joints: {j: {type: prismatic, between: [ground, b], coordinate: q}}\n"
-            f"inputs: {{u: {{value: 0, doc: {text}}}}}\n"
-        )
-        with tempfile.TemporaryDirectory() as d:
-            m.save(f"{d}/fz.yaml")
-            subprocess.run(
-                [sys.executable, "-m", "eomgen", "generate", f"{d}/fz.yaml", "--target", "fmu", "--out", f"{d}/o"],
-                check=True,
-                capture_output=True,
-            )
-            found = [os.path.join(r, f) for r, _, fs in os.walk(f"{d}/o") for f in fs if f.endswith(".fmu")]
-            try:
-                ET.fromstring(zipfile.ZipFile(found[0]).read("modelDescription.xml"))
-            except ET.ParseError:
-                bad.append(("fmu", ascii(char)))
-            for form in ("md", "tex"):
-                m.derive().explain().save(f"{d}/x.{form}")
-                if f"a{char}b" in Path(f"{d}/x.{form}").read_bytes().decode():
-                    bad.append((form, ascii(char)))
-    assert not bad, bad
-
-
-def test_sliding_is_seen() -> None:
-    """A force that changes sign with the velocity holds the state where it jumps: refused, over a short span too."""
-    mod = model(SPRING.replace("u - c*q_dot - k*q", '"where(q_dot > 0, -4, 4)"')).compile()
-    for more in ({}, {"t_eval": [0, 0.05]}):
-        with pytest.raises(eg.SimulationError):
-            mod.simulate((0, 0.05), **more)
+    characters = ("\x07", "\x1b", "\uffff", "\u202e", "\u2066", "\u200b", "\ufeff")
+    doc = json.dumps("a" + "a".join(f"{char}b" for char in characters))
+    m = model(
+        f"name: fz\ndoc: {doc}\nbodies: {{b: {{mass: 1}}}}\n"
+        "joints: {j: {type: prismatic, between: [ground, b], coordinate: q}}\n"
+        f"inputs: {{u: {{value: 0, doc: {doc}}}}}\n"
+    )
+    with tempfile.TemporaryDirectory() as d:
+        with zipfile.ZipFile(m.derive().write_fmu(f"{d}/fz.fmu")) as unit:
+            ET.fromstring(unit.read("modelDescription.xml"))
+        for form in ("md", "tex"):
+            m.derive().explain().save(f"{d}/x.{form}")
+            text = Path(f"{d}/x.{form}").read_text(encoding="utf-8")
+            assert [char for char in characters if f"a{char}b" in text] == []
 
 
 def test_latex_of_loops() -> None:

@@ -13,6 +13,7 @@ import pytest
 import sympy
 from force_judges import TREE_METHODS, P, Q, Seen, Wrench, problems, read_back
 from scipy.spatial.transform import Rotation
+from sweeps import TARGETS
 from sympy.physics import biomechanics
 
 import eomgen as eg
@@ -383,7 +384,7 @@ def slider() -> tuple[eg.Model, Any]:
     return m, b
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_a_force_that_is_undefined_is_named(target: str) -> None:
     m, b = slider()
     m.damper("oil", m.ground, b, damping=1)

@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 from force_judges import differences, read_back
 from scipy.spatial.transform import Rotation
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -93,7 +94,7 @@ def engine(text: bool) -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_loop_with_friction_as_texts(target: str) -> None:
     """The same as the element, which is held against free bodies elsewhere; multipliers are those of the module."""
     m = with_all_reactions(engine(text=True), "ABCS")

@@ -148,7 +148,7 @@ def test_a_driver_out_of_reach_is_told() -> None:
 LINES = models.reference("linkages_straight_line")
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
 def test_car_axis(method: str) -> None:
     """Rheonomic and stiff; published to 21 digits, which the INDEX rates as good to 2e-13 and 5e-12."""
     given = models.reference("caraxis")

@@ -10,6 +10,7 @@ import pytest
 import rotations
 from models import reference
 from scipy.spatial.transform import Rotation
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -120,7 +121,7 @@ def stone(rotation: str = "euler_parameters", **keys: Any) -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_no_rotation_and_no_number_are_named(target: str) -> None:
     module = stone().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
     start = module.x0(f_wx=1.0)

@@ -140,7 +140,7 @@ CASES: dict[str, Callable[[], eg.Model]] = {
 }
 
 
-ALWAYS_IN_C = {"spatial chain", "tethered", "rods held twice"}
+ALWAYS_IN_C = {"spatial chain", "rods held twice"}
 
 
 def on_constraints(module: Any, seed: int, t: float) -> np.ndarray:

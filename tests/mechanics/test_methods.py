@@ -261,7 +261,7 @@ def test_forms_agree(name: str) -> None:
 # -- Energy ------------------------------------------------------------------------------------------------------------
 BOTH = ["embedding", "lagrange"]
 #: Which are compiled for a run of ten seconds always, the rest by ``make thorough``.
-RUNS = [(name, "embedding") for name in ("slider_crank", "rolling_disc", "spatial_loop", "chain")]
+RUNS = [(name, "embedding") for name in ("slider_crank", "rolling_disc", "spatial_loop")]
 CONSERVATIVE = {
     "pendulum": {},
     "double_pendulum": {},

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import models
 import numpy as np
 import pytest
 import sympy as sp
+from analysed import compiled
 from sweeps import METHODS
 
 import eomgen as eg
@@ -159,7 +159,7 @@ def calls(mod: Any, x: np.ndarray) -> Iterator[tuple[str, Callable[[], Any]]]:
 @pytest.fixture(scope="module")
 def cranks() -> dict[str, Any]:
     """The slider-crank for both targets."""
-    return {target: models.build("slider_crank").compile(target=target) for target in ("numpy", "cython")}
+    return {target: compiled("slider_crank", target) for target in ("numpy", "cython")}
 
 
 @pytest.mark.parametrize("value", ENDS)

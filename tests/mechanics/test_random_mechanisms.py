@@ -12,6 +12,7 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
+from golden import IN_C
 from hypothesis import Phase, given, reject, seed, settings
 from hypothesis import strategies as st
 from random_models import (
@@ -287,7 +288,9 @@ def test_methods_agree(batch: int) -> None:
 
 
 def test_targets_agree() -> None:
-    for_each(1, lambda recipe: judge_alike(recipe, Made(recipe).compile(target="cython", optimize=0)), count=5)
+    for_each(
+        1, lambda recipe: judge_alike(recipe, Made(recipe).compile(target="cython", optimize=0, kernels=IN_C)), count=5
+    )
 
 
 # -- the same physics, described otherwise -----------------------------------------------------------------------------

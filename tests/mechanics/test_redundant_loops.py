@@ -30,7 +30,7 @@ def test_redundant_rows_are_reported_by_name(equations: Callable[..., Any], modu
     assert np.linalg.matrix_rank(mod.constraint_jacobian(q, rows="all"), tol=1e-9) == 3
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", TILTED)
 def test_a_tilted_linkage_moves_as_the_planar_one(module: Callable[..., Any], name: str, method: str) -> None:
     times = np.linspace(0, 5, 51)
@@ -49,7 +49,7 @@ def test_a_tilted_linkage_moves_as_the_planar_one(module: Callable[..., Any], na
     assert tilted.residuals.position < 1e-11
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
 def test_a_third_crank_of_a_parallelogram_changes_nothing(
     equations: Callable[..., Any], module: Callable[..., Any], method: str
 ) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import os
 import struct
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -321,10 +320,8 @@ def test_a_model_that_never_compiles_is_given_up(model: Any) -> None:
         '<compiler><lengthrange mode="all" inttotal="1e9" interval="1e8" timestep="1e-6"/></compiler>'
         f'{BALL}<actuator><muscle joint="j"/></actuator>'
     )
-    start = time.monotonic()
     with pytest.raises(eg.ModelError, match=r"model.xml:1: mujoco: MuJoCo needs more time for it than the .* s"):
         eg.load(model(text))
-    assert time.monotonic() - start < 300
 
 
 @pytest.mark.parametrize(

@@ -6,22 +6,17 @@ import time
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import models
 import numpy as np
 import pytest
 import sympy
+from analysed import compiled
 
 import eomgen as eg
 
 TARGETS = ("cython", "numpy")
-
-
-@cache
-def compiled(name: str, target: str) -> eg.Module:
-    return models.build(name).compile(target=target)
 
 
 WIDE = np.broadcast_to(0.5, 10**9)
@@ -124,7 +119,7 @@ POSITIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
 def test_positions_of_a_loop(case: str) -> None:
     call, words = POSITIONS[case]
     with pytest.raises(eg.EomgenError, match=words):
-        call(compiled("four_bar", "numpy"))
+        call(compiled("slider_crank", "numpy"))
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -236,7 +231,7 @@ WRITTEN = ("named", "named parameter", "initial", "end", "guess", "tolerance", "
 LISTED = ("late kernel", "bound", "independent", "minimal", "times kept", "table", "runs", "range")
 TEXTS = {"text", "text as an object"}
 LOOPS = ("state", "constraints", "independent", "minimal", "reactions", "late kernel")
-PLACES = [("pendulum", door) for door in DOORS] + [("four_bar", door) for door in LOOPS]
+PLACES = [("pendulum", door) for door in DOORS] + [("slider_crank", door) for door in LOOPS]
 
 
 @pytest.mark.parametrize(("name", "door"), PLACES)
@@ -282,7 +277,7 @@ def test_an_interrupt_within_a_conversion_is_one(target: str, method: str) -> No
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_refused_state_says_its_name_and_shape(target: str) -> None:
-    mod = compiled("four_bar", target)
+    mod = compiled("slider_crank", target)
     n = mod.n_x
     with pytest.raises(eg.UsageError, match=rf"^x of rhs must hold real numbers, \({n},\) or \({n}, k\), not 'ab'$"):
         mod.rhs(0.0, "ab")

@@ -7,8 +7,9 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from analysed import compiled
 from scipy.integrate import solve_ivp
-from sweeps import part_of
+from sweeps import TARGETS, part_of
 
 import eomgen as eg
 
@@ -233,7 +234,7 @@ def test_branches_hold_what_determines_a_position(initial: dict[str, float], giv
     assert all({"a": a, "e": e}[name] == pytest.approx(value) for name, value in given.items())
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_the_second_argument_is_the_time(target: str) -> None:
     """A slider-crank led at 3 rad/s from 0.2: at t its angles are known in closed form."""
     m = eg.Model("led")
@@ -277,7 +278,7 @@ def test_the_second_argument_is_the_time(target: str) -> None:
 )
 def test_far_states_come_to_the_same_place(name: str) -> None:
     model = models.build(name)
-    module, dense = model.compile(), model.compile(target="numpy")
+    module, dense = compiled(name, "cython"), model.compile(target="numpy")
     x, random = module.x0(), np.random.default_rng(1)
     for size in (0.01, 0.1, 0.2):
         far = np.tile(x[:, None], 5)

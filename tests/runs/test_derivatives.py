@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from analysed import compiled
+from sweeps import TARGETS
 
 import eomgen as eg
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-
-
-TARGETS = ["numpy", "cython"]
 
 
 def arm(turned: float = 0.0) -> eg.Model:
@@ -69,7 +68,7 @@ def test_derivatives_are_slopes_of_the_calls(target: str) -> None:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_jacobian_differentiates_by_what_is_named(target: str) -> None:
-    module = eg.load(EXAMPLES / "slider_crank.yaml").compile(target=target)
+    module = compiled("slider_crank", target)
     x = module.x0()
     np.testing.assert_array_equal(module.jacobian(0.0, x, wrt="x"), module.jacobian(0.0, x))
     np.testing.assert_array_equal(module.jacobian(0.0, x, wrt="u"), module.input_jacobian(0.0, x))
@@ -85,7 +84,7 @@ def test_jacobian_differentiates_by_what_is_named(target: str) -> None:
 @pytest.mark.parametrize("name", [pytest.param("puma560", marks=pytest.mark.thorough), "slider_crank"])
 def test_states_side_by_side_have_the_bits_of_one_alone(name: str) -> None:
     """Eleven columns: lanes of the processor, and a rest that does not fill them."""
-    module = eg.load(EXAMPLES / f"{name}.yaml").compile()
+    module = compiled(name, "cython")
     random = np.random.default_rng(5)
     x = module.project(module.x0()[:, None] + 0.1 * random.uniform(-1, 1, (module.n_x, 11)))
     q, v, a = x[: module.n_q], x[module.n_q :], random.uniform(-1, 1, (module.n_v, 11))

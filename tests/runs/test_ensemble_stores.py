@@ -1,11 +1,7 @@
-"""Ensembles kept in folders go on where they were, run on workers of dask.distributed, and can be interrupted."""
+"""Ensembles kept in folders go on where they were, and run on workers of dask.distributed."""
 
 from __future__ import annotations
 
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +10,6 @@ import distributed
 import numpy as np
 import pytest
 from analysed import compiled
-from children import child
 
 import eomgen as eg
 
@@ -143,22 +138,3 @@ def test_a_block_whose_task_fails_is_marked_and_the_others_are_kept(pendulum: An
     assert failure.run == 2
     assert "ArithmeticError: too high" in failure.message
     assert len(list((tmp_path / "runs").glob("block_*.npz"))) == 3  # what failed is run again next time
-
-
-def test_an_interrupt_is_honoured_soon() -> None:
-    code = (
-        "import signal; import numpy as np; import eomgen as eg\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it\n"
-        "mod = eg.load_example('double_pendulum').compile(optimize=0); print('ready', flush=True)\n"
-        "mod.simulate_many(1e4, {'theta1': np.linspace(-1, 1, 4000)}, rtol=1e-10, atol=1e-12)"
-    )
-    command = [sys.executable, "-c", code]
-    with child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdout.readline() == b"ready\n"
-        time.sleep(1.0)
-        start = time.perf_counter()
-        process.send_signal(signal.SIGINT)
-        errors = process.communicate(timeout=30)[1]
-    assert time.perf_counter() - start < 5.0  # the machine may be busy
-    assert process.returncode != 0
-    assert b"KeyboardInterrupt" in errors

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import analysed
 import models
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
 @cache
 def compiled(name: str, target: str = "cython", lanes: int | None = None) -> Any:
-    options: dict[str, Any] = {"optimize": 0} if target == "cython" else {}
-    return models.build(name).compile(target=target, **options, **({} if lanes is None else {"lanes": lanes}))
+    if lanes is None:
+        return analysed.compiled(name, target)
+    return models.build(name).compile(target=target, optimize=0, lanes=lanes)
 
 
 @pytest.fixture
@@ -104,21 +106,16 @@ def test_a_loop_is_kept_closed_and_a_run_that_cannot_begin_holds_up_none(lanes: 
 
 
 def test_runs_that_fail_are_marked_and_say_why() -> None:
-    q = eg.Model("runaway")
-    q.parameter("k", 1.0)
-    body = q.body("a", mass=1.0)
-    q.prismatic("s", q.ground, body, axis="x")
-    q.torque("pull", "s", "k*s**3")
-    module = q.compile(optimize=0)
-    # v' = k s^3 reaches infinity in finite time for k > 0 and swings for k < 0
-    ensemble = module.simulate_many(20, {"s": 1.0}, {"k": np.array([-1.0, 1.0, -2.0, 3.0])}, max_steps=5000)
+    module = compiled("oscillator")
+    # v' = -a s^3 reaches infinity in finite time for a < 0 and swings for a > 0
+    ensemble = module.simulate_many(20, {"s": 1.0}, {"a": np.array([1.0, -1.0, 2.0, -3.0])}, max_steps=5000)
     assert ensemble.status.tolist()[0] == ensemble.status.tolist()[2] == 0
     assert [f.run for f in ensemble.failures()] == [1, 3]
     assert all("step size" in f.message for f in ensemble.failures())
     # the time of escape of s' = s^2 / sqrt(2) from rest at s = 1: integral of ds / sqrt((s^4 - 1) / 2)
     assert ensemble.t_end[1] == pytest.approx(1.8540746773013719, abs=1e-6)
     assert ensemble.t_end[3] == pytest.approx(1.8540746773013719 / np.sqrt(3), abs=1e-6)
-    short = module.simulate_many(20, {"s": 1.0}, {"k": np.array([-1.0, -2.0])}, max_steps=3)
+    short = module.simulate_many(20, {"s": 1.0}, {"a": np.array([1.0, 2.0])}, max_steps=3)
     assert [f.message for f in short.failures()] == ["more than max_steps steps"] * 2
     assert (short.steps == 3).all()
 
@@ -150,19 +147,14 @@ def test_events_of_every_run(lanes: int | None) -> None:
 
 
 def test_resets_of_the_model() -> None:
-    m = eg.Model("bouncing", gravity=(0, -10.0, 0))
-    m.parameter("e", 0.5)
-    m.prismatic("y", m.ground, m.body("ball", mass=1.0), axis="y")
-    m.event("floor", "y", direction=-1, reset={"y_dot": "-e*y_dot"})
-    module = m.compile(optimize=0)
     e = np.array([0.3, 0.5, 0.9])
-    ensemble = module.simulate_many(1.2, {"y": 5.0 / 4.0}, {"e": e}, **TIGHT)
+    ensemble = compiled("hopper").simulate_many(1.2, {"h": 5.0 / 4.0}, {"e": e, "g": 10.0}, **TIGHT)
     first = 0.5  # sqrt(2 h / g), with speed 5 m/s
     second = first + 2 * e * 5.0 / 10.0
     t, _ = ensemble.events("floor")
     np.testing.assert_allclose(t[0], first, rtol=1e-9)
     np.testing.assert_allclose(t[1, :2], second[:2], rtol=1e-9)
-    np.testing.assert_allclose(ensemble["y_dot"][2], 0.9 * 5.0 - 10.0 * 0.7, rtol=1e-8)
+    np.testing.assert_allclose(ensemble["h_dot"][2], 0.9 * 5.0 - 10.0 * 0.7, rtol=1e-8)
 
 
 def test_without_compiled_code(pendulum: Any) -> None:
@@ -349,14 +341,9 @@ def test_the_bits_of_a_loop(crank: Any) -> None:
 
 def test_a_run_that_fails_holds_up_no_other() -> None:
     """s'' = 2 s^3 from s = s' = 1 ends at t = 1; from 0.5 at t = 2 (s = 1/(2 - t))."""
-    m = eg.Model("bursts")
-    body = m.body("mass", mass=1.0)
-    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
-    m.torque("push", "J", "2*s**3")
     s = np.array([0.5, 1.0, 0.5, 0.25, 1.0, 0.5, 0.25, 0.5, 0.5])
-    many = m.compile(optimize=0).simulate_many(
-        1.5, {"s": s, "s_dot": s**2}, first_step=1e-3, method="Taylor", rtol=1e-11, atol=1e-13
-    )
+    tight = {"first_step": 1e-3, "method": "Taylor", "rtol": 1e-11, "atol": 1e-13}
+    many = compiled("oscillator").simulate_many(1.5, {"s": s, "s_dot": s**2}, {"a": -2.0}, **tight)
     np.testing.assert_array_equal(many.ok, s < 1)
     np.testing.assert_allclose(many.x[0, s < 1], 1 / (1 / s[s < 1] - 1.5), rtol=1e-9)
     np.testing.assert_allclose(many.t_end[s == 1], 1.0, atol=1e-6)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from analysed import compiled
 from scipy.integrate import DOP853
-from sweeps import part_of
+from sweeps import TARGETS, part_of
 
 import eomgen as eg
 
@@ -33,7 +34,7 @@ def ball(name: str = "ball", **floor: Any) -> eg.Model:
 
 @pytest.fixture(scope="module")
 def modules() -> dict[str, Any]:
-    return {target: ball().compile(target=target) for target in ("cython", "numpy")}
+    return {target: compiled("hopper", target) for target in ("cython", "numpy")}
 
 
 def levels(n: int) -> dict[str, Any]:
@@ -210,36 +211,29 @@ FLAT = ("(t - {a!r})**4", "(t - {a!r})**6", "abs(t - {a!r})**3", "sin(t - {a!r})
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_flat_touches_are_found_wherever_they_are(target: str) -> None:
     """In steps at one of whose ends the value is above 1e-10 of its size, as the docs say; corners are not found."""
-    m = eg.Model("swings")
-    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
-    m.torque("f", "s", "-2*s")
-    m.initial(s=0.1)
-    module = m.compile(target=target)
+    module = compiled("oscillator", target).bind({"k": 2.0})
     places = np.random.default_rng(4).uniform(0.05, 1.95, 12).tolist()
     for method in ("DOP853", "RK45"):
         for text in FLAT:
-            run = module.simulate(2.0, events=[text.format(a=a) for a in places], method=method, **COARSE)
+            run = module.simulate(2.0, [0.1, 0.0], events=[text.format(a=a) for a in places], method=method, **COARSE)
             assert len(run.t) < 20  # steps of 0.1 and more: (t - a)**6 is 1e-10 of its size 0.02 from its touch
             for a, found in zip(places, run.t_events, strict=True):
                 np.testing.assert_allclose(found, [a], atol=1e-6, err_msg=f"{text} {a} {method}")
     corners = [text.format(a=a) for a in places for text in ("abs(t - {a!r})", "sqrt(abs(t - {a!r}))")]
-    assert [len(found) for found in module.simulate(2.0, events=corners).t_events] == [0] * len(corners)
+    assert [len(found) for found in module.simulate(2.0, [0.1, 0.0], events=corners).t_events] == [0] * len(corners)
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-9, 1e-7, -1e-6, 1e-5])
 def test_a_touch_beside_the_end_of_a_step_is_found_once(offset: float) -> None:
-    m = eg.Model("slides")
-    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
-    m.torque("f", "s", m.input("u"))
-    table = {"u": ([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])}  # a corner at 1, where a step ends
+    table = {"F": ([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])}  # a corner at 1, where a step ends
     for target, methods in {"cython": ["RK45", "Radau"], "numpy": ["RK45", "LSODA"]}.items():
-        mod = m.compile(target=target)
+        mod = compiled("oscillator", target)
         for method in methods:
             run = mod.simulate(2.0, inputs=table, events={"touch": f"(t - 1 - {offset})**2"}, method=method)
             np.testing.assert_allclose(run.t_events["touch"], [1.0 + offset], atol=1e-6)
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_a_reset_where_a_value_touches_zero_happens_once(target: str) -> None:
     m = eg.Model("kicked")
     m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")

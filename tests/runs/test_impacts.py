@@ -12,6 +12,7 @@ import judges
 import numpy as np
 import pytest
 from analysed import compiled
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -185,7 +186,7 @@ def box(gravity: float = 0.0, target: str = "numpy") -> Any:
     return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_to_and_fro_between_walls(target: str) -> None:
     """The mirror images of the walls: y is a triangle wave of y0 + v t."""
     mod, rng = box(target=target), np.random.default_rng(1)
@@ -327,7 +328,7 @@ def ball_on_input(target: str, bounces: bool = True) -> Any:
     return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
 
 
-@pytest.fixture(scope="module", params=["cython", "numpy"])
+@pytest.fixture(scope="module", params=TARGETS)
 def racket(request: Any) -> Any:
     return ball_on_input(request.param)
 

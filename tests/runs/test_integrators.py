@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import command
-import models
 import numpy as np
 import pytest
+from analysed import compiled
 
 import eomgen as eg
 
@@ -35,13 +35,13 @@ def cart(request: pytest.FixtureRequest) -> Any:
 
 
 @pytest.fixture(scope="module")
-def compiled() -> Any:
+def in_c() -> Any:
     return spring()
 
 
 @pytest.fixture(scope="module")
 def four_bar() -> Any:
-    return models.build("four_bar").compile()
+    return compiled("four_bar", "cython")
 
 
 def closed_form(x: Any, h: float, k: float = 9.0, force: float = 0.0) -> np.ndarray:
@@ -70,26 +70,26 @@ def test_parameters_and_inputs_of_a_call(cart: Any) -> None:
 
 
 @pytest.mark.parametrize("method", ["DOP853", "RK45", "Taylor", "Radau"])
-def test_calls_have_the_bits_of_whole_runs_and_forget_each_other(compiled: Any, method: str) -> None:
-    go, x = compiled.integrator(method=method, **TIGHT), compiled.x0()
+def test_calls_have_the_bits_of_whole_runs_and_forget_each_other(in_c: Any, method: str) -> None:
+    go, x = in_c.integrator(method=method, **TIGHT), in_c.x0()
     first = go(0.0, x, 2.0)
-    run = compiled.simulate((0.0, 2.0), x, t_eval=[2.0], method=method, **TIGHT)
+    run = in_c.simulate((0.0, 2.0), x, t_eval=[2.0], method=method, **TIGHT)
     np.testing.assert_array_equal(first, run.x[:, -1])
     assert go.evaluations == run.nfev
     go(1.0, first, -30.0)
     np.testing.assert_array_equal(go(0.0, x, 2.0), first)
 
 
-def test_steps_of_one_size(compiled: Any) -> None:
-    go, x = compiled.integrator(method="RK4", step=0.01), compiled.x0()
+def test_steps_of_one_size(in_c: Any) -> None:
+    go, x = in_c.integrator(method="RK4", step=0.01), in_c.x0()
     by_hand = x
     for k in range(10):
-        by_hand = compiled.step(k * 0.01, by_hand, 0.01)
+        by_hand = in_c.step(k * 0.01, by_hand, 0.01)
     np.testing.assert_allclose(go(0.0, x, 0.1), by_hand, rtol=1e-14)
-    short = compiled.simulate((0.0, 1e-3), x, method="RK4", step=0.01)  # a run shorter than a step
+    short = in_c.simulate((0.0, 1e-3), x, method="RK4", step=0.01)  # a run shorter than a step
     np.testing.assert_array_equal(short.x[:, -1], go(0.0, x, 1e-3))
     pushed = {"parameters": {"k": 0.0}, "inputs": {"F": "t**3"}}
-    run = compiled.simulate(1.0, [0.0, 0.0], **pushed, method="RK4", step=0.25)
+    run = in_c.simulate(1.0, [0.0, 0.0], **pushed, method="RK4", step=0.25)
     assert run["x_dot"][-1] == pytest.approx(1 / 8, rel=1e-14)  # Simpson's rule, exact for cubics
     with pytest.raises(eg.UsageError, match="would not end"):
         go(0.0, x, 1e12)
@@ -164,25 +164,25 @@ def test_what_stops_a_call_is_named(method: str) -> None:
     np.testing.assert_allclose(go(1.0, mod.x0(), 0.1), mod.simulate((1.0, 1.1), method=method).x[:, -1], rtol=1e-6)
 
 
-def test_an_interrupt_stops_a_long_call(compiled: Any) -> None:
+def test_an_interrupt_stops_a_long_call(in_c: Any) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        go = compiled.integrator(**TIGHT)
+        go = in_c.integrator(**TIGHT)
         with pytest.raises(KeyboardInterrupt):
             threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-            go(0.0, compiled.x0(), 1e9)
+            go(0.0, in_c.x0(), 1e9)
     finally:
         signal.signal(signal.SIGINT, before)
     np.testing.assert_allclose(go(0.0, [0.3, 0.0], 1.0), closed_form([0.3, 0.0], 1.0), atol=1e-8)
 
 
-def test_one_thread_at_a_time(compiled: Any) -> None:
-    go, refused = compiled.integrator(**TIGHT), []
+def test_one_thread_at_a_time(in_c: Any) -> None:
+    go, refused = in_c.integrator(**TIGHT), []
 
     def disturb() -> None:
         while not refused:  # not at work yet
             try:
-                go(0.0, compiled.x0(), 1e-3)
+                go(0.0, in_c.x0(), 1e-3)
             except eg.UsageError as error:
                 refused.append(str(error))
         os.kill(os.getpid(), signal.SIGINT)
@@ -193,7 +193,7 @@ def test_one_thread_at_a_time(compiled: Any) -> None:
             threading.Timer(0.1, disturb).start()
             while True:  # unless the other was at work for a moment
                 with suppress(eg.UsageError):
-                    go(0.0, compiled.x0(), 1e9)
+                    go(0.0, in_c.x0(), 1e9)
     finally:
         signal.signal(signal.SIGINT, before)
     assert refused == [
@@ -252,7 +252,7 @@ def test_the_command_line_takes_them(path: Path) -> None:
 
 def test_steps_are_of_order_four() -> None:
     """Order 4, whole steps, and the same steps one by one."""
-    mod = models.build("double_pendulum").compile()
+    mod = compiled("double_pendulum", "cython")
     x0 = mod.x0()
     exact = mod.simulate((0, 1), x0, rtol=1e-13, atol=1e-14).x[:, -1]
     errors = []

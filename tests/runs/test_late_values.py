@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import TARGETS
 
 import eomgen as eg
-
-TARGETS = ("cython", "numpy")
 
 
 def thrown(h: float = 2.0, w: float = 0.5) -> eg.Model:

@@ -20,7 +20,6 @@ def numbers(pairs: Any) -> np.ndarray:
     return np.sort_complex(np.array([float(re) + 1j * float(im) for re, im in pairs]))
 
 
-@pytest.mark.quick
 def test_the_iftomm_four_bar() -> None:
     """Equilibrium, M, C, K and eigenvalues of the IFToMM linearization benchmark."""
     given = models.reference("iftomm_fourbar_diagonal_spring")["reference"]

@@ -13,11 +13,13 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from analysed import compiled
+from sweeps import TARGETS
 
 import eomgen as eg
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_shapes_of_every_call_for_one_state_and_a_batch(target: str) -> None:
     """Of a linkage with a redundant row; strided, lists and other real types mean the same."""
     m = models.build("three_cranks")
@@ -60,7 +62,7 @@ def test_shapes_of_every_call_for_one_state_and_a_batch(target: str) -> None:
 
 @pytest.fixture(scope="module")
 def arm() -> Any:
-    return models.build("two_link_manipulator").compile()
+    return compiled("two_link_manipulator", "cython")
 
 
 def test_every_way_to_name_the_arguments_gives_the_same(arm: Any) -> None:
@@ -172,7 +174,7 @@ CALLS = (*TIMED, *OF_STATE, *OF_POSITION, *OF_MOTION)
 
 @pytest.fixture(scope="module", params=["cython", "numpy"])
 def turning(request: pytest.FixtureRequest) -> eg.Module:
-    return models.build("slider_crank").compile(target=request.param)
+    return compiled("slider_crank", request.param)
 
 
 def arguments(turning: eg.Module, name: str, x: Any) -> tuple[Any, ...]:

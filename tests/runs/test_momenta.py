@@ -7,6 +7,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -51,7 +52,7 @@ def states(mod, count: int = 4) -> np.ndarray:
     return np.random.default_rng(5).uniform(-1, 1, (mod.n_x, count))
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_calls_and_outputs_equal_mujoco(target: str) -> None:
     mod = tree(target)
     world = mujoco.MjModel.from_xml_string(XML)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -61,7 +62,10 @@ def held_twice() -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize(("make", "target"), [(truss, "cython"), (truss, "numpy"), (held_twice, "numpy")])
+@pytest.mark.parametrize(
+    ("make", "target"),
+    [(truss, "numpy"), (held_twice, "numpy"), pytest.param(truss, "cython", marks=pytest.mark.thorough)],
+)
 def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> None:
     mod = make().compile(target=target)  # type: ignore[operator]
     x = mod.x0()
@@ -89,7 +93,7 @@ def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> 
     assert target == "cython" or mod.verify().ok
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_welds_that_late_values_part_are_named(target: str) -> None:
     mod = held_twice().compile(target=target)
     with pytest.raises(eg.AssemblyError, match=r"off by 0\.1\) can never hold: no coordinate changes it"):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rigid_scenes import SHAPES, G, on_floor, rigid
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -81,7 +82,7 @@ def test_inputs() -> None:
         {"shape": "half_plane", "on": m.ground},
         rigid(friction="mu"),
     )
-    run = m.compile().simulate(
+    run = m.compile(target="numpy").simulate(
         1.0, {"j_y": 0.1}, {"mu": 0.4}, inputs={"push": ([0.0, 1.0], [0.0, 8.0])}, method="moreau", step=1e-3
     )
     begins = 0.4 * G / 8.0
@@ -112,7 +113,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_what_has_no_impulses_says_so(target: str) -> None:
     floor = on_floor(SHAPES["circle"], {"friction": 0.3}, target=target)
     for entry, call in ENTRIES.items():

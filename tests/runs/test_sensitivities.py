@@ -5,6 +5,7 @@ Through events too: resets, impacts, ends; and what has no derivative is refused
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 import sympy
 from analysed import compiled
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -37,10 +39,12 @@ def slopes(f: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndar
 
 @pytest.mark.parametrize(
     ("name", "target"),
-    [
-        *((name, "numpy") for name in ("slider_crank", "three_cranks", "rolling_disc", "rssr", "double_pendulum")),
-        *((name, "cython") for name in ("slider_crank", "rolling_disc", "rssr", "double_pendulum")),
-    ],
+    part_of(
+        itertools.product(
+            ("slider_crank", "three_cranks", "rolling_disc", "rssr", "double_pendulum"), ("numpy", "cython")
+        ),
+        lambda case: case[1] == "numpy" or case[0] in ("slider_crank", "rssr"),
+    ),
 )
 def test_derivatives_of_the_right_hand_side(name: str, target: str) -> None:
     mod = compiled(name, target)
@@ -252,11 +256,9 @@ def bounces() -> tuple[list[sympy.Symbol], list[sympy.Expr], sympy.Expr, sympy.E
 IMPACT = {"direction": 0, "reset": None, "restitution": 0.8}
 
 
-@pytest.mark.parametrize(
-    ("floor", "target"), [({}, "numpy"), (IMPACT, "numpy"), (IMPACT, "cython")], ids=["reset", "impact", "impact in C"]
-)
-def test_a_bouncing_ball_in_closed_form(floor: dict[str, Any], target: str) -> None:
-    mod, end = ball(**floor).compile(target=target), 1.3
+@pytest.mark.parametrize("floor", [{}, IMPACT], ids=["reset", "impact"])
+def test_a_bouncing_ball_in_closed_form(floor: dict[str, Any]) -> None:
+    mod, end = ball(**floor).compile(target="numpy"), 1.3
     names = ["h", "h_dot", "g"] + (["e"] if not floor else [])
     s = mod.sensitivities(names, end, {"h": 1.0, "h_dot": 0.5})
     symbols, times, height, speed = bounces()

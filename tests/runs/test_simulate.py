@@ -9,7 +9,9 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from analysed import compiled
 from scipy.integrate import DOP853, RK45, solve_ivp
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -37,7 +39,7 @@ def swing() -> eg.Module:
 def test_the_published_motion(crank: eg.Module, target: str) -> None:
     """Reference: planar_slider_crank_dynamics.json (multiplier form in 30 digits against a closed form)."""
     data = models.reference("planar_slider_crank_dynamics")["reference"]
-    mod = crank if target == "numpy" else models.build("free_slider_crank").compile()
+    mod = crank if target == "numpy" else compiled("free_slider_crank", "cython")
     run = mod.simulate((0, 1), t_eval=[0.1, 0.5, 1.0], rtol=1e-10, atol=1e-12)
     for j, row in enumerate(data["omega10"]["values"].values()):
         for ours, theirs in {"theta": "theta", "beta": "beta", "x": "x", "x_dot": "xdot"}.items():
@@ -54,7 +56,7 @@ def test_the_published_motion(crank: eg.Module, target: str) -> None:
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_every_method_comes_to_the_same(crank: eg.Module, target: str) -> None:
-    mod = crank if target == "numpy" else models.build("free_slider_crank").compile()
+    mod = crank if target == "numpy" else compiled("free_slider_crank", "cython")
     exact = mod.simulate(0.3, rtol=1e-11, atol=1e-12).x[:, -1]
     for method in METHODS:
         rtol = 1e-4 if method == "RK23" else 1e-6
@@ -71,10 +73,10 @@ def test_plain_scipy_and_solver_classes(crank: eg.Module) -> None:
     run = crank.simulate((0, 0.2), method=DOP853)
     np.testing.assert_array_equal(run.t, sol.t)
     np.testing.assert_allclose(run.x, sol.y, atol=1e-8)
-    compiled = models.build("free_slider_crank").compile()
-    assert type(compiled.DOP853(compiled.rhs, 0.0, x0, 1.0)) is compiled.bind({"g": 9.0}).DOP853
+    fast = compiled("free_slider_crank", "cython")
+    assert type(fast.DOP853(fast.rhs, 0.0, x0, 1.0)) is fast.bind({"g": 9.0}).DOP853
     for method in ("DOP853", "RK45", "RK23", "Radau"):
-        ours = solve_ivp(compiled.rhs, (0.0, 0.5), x0, method=getattr(compiled, method), rtol=1e-6)
+        ours = solve_ivp(fast.rhs, (0.0, 0.5), x0, method=getattr(fast, method), rtol=1e-6)
         slope = {"jac": crank.jacobian} if method == "Radau" else {}
         theirs = solve_ivp(crank.rhs, (0.0, 0.5), x0, method=method, rtol=1e-6, **slope)
         np.testing.assert_allclose(ours.t, theirs.t, rtol=1e-4 if method == "Radau" else 1e-6, err_msg=method)
@@ -83,7 +85,7 @@ def test_plain_scipy_and_solver_classes(crank: eg.Module) -> None:
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_values_between_the_steps(crank: eg.Module, target: str) -> None:
-    mod = crank if target == "numpy" else models.build("free_slider_crank").compile()
+    mod = crank if target == "numpy" else compiled("free_slider_crank", "cython")
     run, times = mod.simulate(0.4, dense_output=True), np.linspace(0, 0.4, 33)
     exact, there = mod.simulate(0.4, t_eval=times, rtol=1e-12, atol=1e-13), run.at(times)
     np.testing.assert_allclose(there["theta"], exact["theta"], atol=1e-7)
@@ -169,7 +171,7 @@ def test_an_rtol_below_rounding_is_raised_without_a_warning(swing: eg.Module, me
     assert run.metadata["rtol"] == 100 * np.finfo(float).eps
 
 
-@pytest.fixture(scope="module", params=["numpy", "cython"])
+@pytest.fixture(scope="module", params=TARGETS)
 def rooted(request: pytest.FixtureRequest) -> eg.Module:
     """A force that is no number for x above 1 m."""
     m = eg.Model("rooted")
@@ -199,7 +201,7 @@ def test_a_failure_at_the_start_is_no_simulation_error(swing: eg.Module, rooted:
         rooted.simulate(1.0, {"x": 2.0})
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_unbounded_motion_is_named(target: str) -> None:
     m = eg.Model("burst")
     m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
@@ -236,7 +238,7 @@ def test_without_scipy_the_message_says_what_to_install() -> None:
 # -- runs do not share what they were given --------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def module() -> eg.Module:
-    return models.build("slider_crank").compile()
+    return compiled("slider_crank", "cython")
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "RK45"}, {"rtol": 1e-5}, {"atol": 1e-6, "method": "Radau"}])

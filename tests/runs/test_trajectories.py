@@ -13,6 +13,8 @@ from pathlib import Path
 import models
 import numpy as np
 import pytest
+from analysed import compiled
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -126,25 +128,10 @@ def test_outputs_called_like_energies_come_first_and_the_balance_stays_right(cra
     np.testing.assert_array_equal(again["T"], run["T"])
 
 
-@pytest.fixture
-def slider():
-    def make(target):
-        m = eg.Model("pushed")
-        m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
-        m.torque("push", "J", m.input("u"))
-        return m.compile(target=target)
-
-    return make
-
-
 @pytest.mark.parametrize(("method", "target"), [("DOP853", "cython"), ("Radau", "cython"), ("LSODA", "numpy")])
 def test_a_run_without_dense_output_is_evaluated_anywhere(method: str, target: str) -> None:
     """It is made again; with a reset, an input that jumps and arguments that the user has changed since."""
-    m = eg.Model("ball", gravity=(0, -9.81, 0))
-    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
-    m.torque("push", "J", m.input("u"))
-    m.event("floor", "h", direction=-1, reset={"h_dot": "-0.8*h_dot"})
-    module = m.compile(target=target)
+    module = compiled("hopper", target).bind({"e": 0.8})
     initial, values = {"h": 1.0}, [0.0, 3.0]
     plain = {"method": method, "inputs": {"u": ([0.0, 1.0], values)}}
     run = module.simulate(1.0, initial, t_eval=[0, 1], **plain)
@@ -170,25 +157,25 @@ class Remembering:
         return 1e-9 * self.calls
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
-def test_a_run_that_cannot_be_made_again_is_refused(slider, target):
-    module, push, runs = slider(target), {"gain": 1.0}, []
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_run_that_cannot_be_made_again_is_refused(target):
+    module, push, runs = compiled("oscillator", target), {"gain": 1.0}, []
     for k in (1.0, 2.0, 3.0):
-        runs.append(module.simulate(1.0, inputs={"u": lambda t, x: k}))  # noqa: B023
-    runs.append(module.simulate(1.0, inputs={"u": Remembering()}))
-    runs.append(module.simulate(1.0, inputs={"u": lambda t, x: push["gain"]}, t_eval=[0.5, 1.0]))
+        runs.append(module.simulate(1.0, inputs={"F": lambda t, x: k}))  # noqa: B023
+    runs.append(module.simulate(1.0, inputs={"F": Remembering()}))
+    runs.append(module.simulate(1.0, inputs={"F": lambda t, x: push["gain"]}, t_eval=[0.5, 1.0]))
     push["gain"] = 2.0
     for run in (runs[0], runs[1], *runs[3:]):
         for _ in range(2):  # nothing of the other run is kept
             with pytest.raises(eg.UsageError, match="give other values now"):
                 run.at(0.5)
-    assert runs[2].at(0.5)["h"] == pytest.approx(0.375, abs=1e-9)
+    assert runs[2].at(0.5)["s"] == pytest.approx(0.375, abs=1e-9)
 
 
 @pytest.mark.parametrize("where", ["events", "inputs"])
-def test_what_stops_a_run_made_again_comes_out(slider, where):
+def test_what_stops_a_run_made_again_comes_out(where):
     """Ctrl-C and a function that fails, in compiled code and out of it; nothing of the unfinished run is kept."""
-    module, stop = slider("cython"), [None]
+    module, stop = compiled("oscillator", "cython"), [None]
 
     def one(t, x):
         if stop[0] is not None and t > 0.2:
@@ -196,7 +183,7 @@ def test_what_stops_a_run_made_again_comes_out(slider, where):
         return 1.0
 
     run = module.simulate(
-        1.0, inputs={"u": one if where == "inputs" else 1.0}, events=one if where == "events" else None
+        1.0, inputs={"F": one if where == "inputs" else 1.0}, events=one if where == "events" else None
     )
     for raised, seen in ((KeyboardInterrupt(), eg.SimulationInterrupted), (ZeroDivisionError(), ZeroDivisionError)):
         stop[0] = raised
@@ -204,7 +191,7 @@ def test_what_stops_a_run_made_again_comes_out(slider, where):
             run.at(0.5)
     stop[0] = None
     assert not run.has_dense_output
-    assert run.at(0.9)["h"] == pytest.approx(0.405, abs=1e-6)
+    assert run.at(0.9)["s"] == pytest.approx(0.405, abs=1e-6)
     assert run.has_dense_output
 
 
@@ -220,7 +207,7 @@ print([value.hex() for value in module.rhs(0.5, module.x0(theta=0.4)).tolist()])
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_a_module_goes_to_another_process_with_its_values(tmp_path: Path, target: str) -> None:
-    module = models.build("slider_crank").compile(target=target).bind({"r": 0.12}, {"tau": 0.5})
+    module = compiled("slider_crank", target).bind({"r": 0.12}, {"tau": 0.5})
     file = tmp_path / "module.pickle"
     file.write_bytes(pickle.dumps(module))
     assert file.stat().st_size < 2000
@@ -235,7 +222,7 @@ def test_a_module_goes_to_another_process_with_its_values(tmp_path: Path, target
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_a_run_and_its_file_say_where_they_come_from(target: str, tmp_path: Path) -> None:
-    module = models.build("slider_crank").compile(target=target)
+    module = compiled("slider_crank", target)
     inputs = {"tau": ([0.0, 1.0], [0.0, 0.1])}
     run, again = (module.simulate(0.2, parameters={"r": 0.11}, inputs=inputs, rtol=1e-6) for _ in range(2))
     facts = eg.load_trajectory(run.save(tmp_path / "a.npz")).metadata

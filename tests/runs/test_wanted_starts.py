@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from numpy import cos, pi, sin
 from scipy.spatial.transform import Rotation
+from sweeps import TARGETS
 
 import eomgen as eg
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-@pytest.fixture(scope="module", params=["numpy", "cython"])
+@pytest.fixture(scope="module", params=TARGETS)
 def crank(request: pytest.FixtureRequest) -> Any:
     return eg.load(EXAMPLES / "slider_crank.yaml").compile(target=request.param)
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import command
 import pytest
-from children import child
+from children import HANGS, child
 from models import EXAMPLES
 from sweeps import COVERING, part_of
 
@@ -297,7 +297,7 @@ def test_the_doctor_tells_what_is_installed_and_cannot_be_imported(tmp_path: Pat
     with child(
         [sys.executable, "-m", "eomgen", "doctor", "--json"], env=environment, stdout=PIPE, text=True
     ) as process:
-        told = process.communicate(timeout=60)[0]
+        told = process.communicate(timeout=HANGS)[0]
     assert process.returncode == 3
     checks = {check["name"]: check for check in json.loads(told)["checks"]}
     for name in ("pint", "[mesh]"):
@@ -328,7 +328,7 @@ def test_a_signal_ends_a_command_without_a_traceback(number: signal.Signals, aft
         assert process.stdout.readline() == "begun\n"
         time.sleep(after + 0.05)
         process.send_signal(number)
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=HANGS)
     assert process.returncode == 128 + number, said
     assert said.replace("interrupted\n", "").strip() == ""
 
@@ -402,7 +402,7 @@ def test_every_line_fits_the_columns_that_are_set() -> None:
         setting = {**os.environ, "COLUMNS": columns}
         words = [sys.executable, "-m", "eomgen", "check", str(EXAMPLES / "double_wishbone.yaml")]
         with child(words, env=setting, stdout=PIPE, text=True) as process:
-            return max(map(len, process.communicate(timeout=100)[0].splitlines()))
+            return max(map(len, process.communicate(timeout=HANGS)[0].splitlines()))
 
     assert longest("60") <= 62 < longest("many")
     assert longest("1") > 20  # never narrower than can be read

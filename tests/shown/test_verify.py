@@ -13,6 +13,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from children import HANGS
 from command import run
 from sweeps import COVERING, METHODS, part_of
 
@@ -122,7 +123,6 @@ def test_odd_arguments_are_named(given: dict[str, Any]) -> None:
         models.build("pendulum").compile(target="numpy").verify(**given)
 
 
-@pytest.mark.quick
 def test_the_command(tmp_path: Path) -> None:
     words = ("verify", EXAMPLES / "pendulum.yaml", "--target", "numpy", "--states", 2, "--seconds", 0)
     written = run(*words)
@@ -150,7 +150,7 @@ def selftest(package: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-B", "-m", f"{package.name}.selftest", *words]
     env = {**os.environ, "PYTHONPATH": str(package.parent)}
     return subprocess.run(
-        command, cwd=package.parent, env=env, capture_output=True, text=True, check=False, timeout=100
+        command, cwd=package.parent, env=env, capture_output=True, text=True, check=False, timeout=HANGS
     )
 
 
