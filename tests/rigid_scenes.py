@@ -48,9 +48,9 @@ def floor_of(shape: tuple[tuple[str, Any], ...], target: str) -> Any:
     return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
 
 
-def pile(kinds: Sequence[str], gravity: float = G, walls: bool = True) -> eg.Model:
-    """Bodies of several shapes among themselves, between two walls on a floor or free."""
-    m = eg.Model("pile", gravity=(0, -gravity, 0))
+def pile(kinds: Sequence[str]) -> eg.Model:
+    """Bodies of several shapes among themselves, between two walls on a floor."""
+    m = eg.Model("pile", gravity=(0, -G, 0))
     m.parameter("mu", 0.3), m.parameter("e", 0.0)
     shapes = []
     for k, kind in enumerate(kinds):
@@ -58,13 +58,9 @@ def pile(kinds: Sequence[str], gravity: float = G, walls: bool = True) -> eg.Mod
         m.planar(f"j{k}", m.ground, body)
         shapes.append({**SHAPES[kind], "on": body})
     m.contacts("among", shapes, law=rigid(friction="mu", restitution="e"))
-    if walls:
-        sides = [
-            m.ground,
-            m.ground.at(-0.6, 0, 0, rpy=(0, 0, -np.pi / 2)),
-            m.ground.at(0.6, 0, 0, rpy=(0, 0, np.pi / 2)),
-        ]
-        m.contacts("walls", shapes, {"shape": "half_plane", "on": sides}, rigid(friction="mu", restitution="e"))
+    turned = [m.ground.at(x, 0, 0, rpy=(0, 0, x / abs(x) * np.pi / 2)) for x in (-0.6, 0.6)]
+    sides = {"shape": "half_plane", "on": [m.ground, *turned]}
+    m.contacts("walls", shapes, sides, rigid(friction="mu", restitution="e"))
     return m
 
 

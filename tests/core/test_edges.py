@@ -23,16 +23,6 @@ def model(text: str, suffix: str = ".yaml") -> eg.Model:
         return eg.load(path)
 
 
-SPRING = """name: spring
-parameters: {k: 3, c: 0.1}
-inputs: {u: 0}
-bodies: {bob: {mass: 2}}
-joints: {slide: {type: prismatic, between: [ground, bob], axis: x, coordinate: q}}
-forces: {d: {type: torque, joint: slide, value: u - c*q_dot - k*q}}
-initial: {q: 1}
-"""
-
-
 def test_fewer_speeds_than_coordinates() -> None:
     """x' = v cos h, y' = v sin h, h' = w, v' = a w^2, w' = -m a v w / J, without constraints."""
     m = eg.Model.from_equations(
@@ -82,36 +72,6 @@ initial: {e0: 1, wx: 0.01, wy: 2, wz: 0.01}
     mod.rhs(0.0, x)
     steps = len(mod.simulate(0.05).t)
     assert steps < 60, f"{steps} steps for 0.05 s"
-
-
-LOOP = """<robot name="four_bar"><link name="base"/>
-<link name="a"><inertial><mass value="1"/><origin xyz="0.1 0 0"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="b"><inertial><mass value="2"/><origin xyz="0.2 0 0"/>
-<inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="c"><inertial><mass value="1"/><origin xyz="0.15 0 0"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
-<joint name="j2" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0.2 0 0"/><axis xyz="0 0 1"/></joint>
-<joint name="j3" type="continuous"><parent link="base"/><child link="c"/><origin xyz="0.4 0 0"/>
-<axis xyz="0 0 1"/></joint>
-%s</robot>"""
-
-
-def test_loops_in_urdf() -> None:
-    """loop_joint (Drake) and loop_constraint close the loop: one degree of freedom."""
-    drake = (
-        '<loop_joint name="l" type="continuous"><axis xyz="0 0 1"/>'
-        '<link1 link="b" rpy="0 0 0" xyz="0.4 0 0"/><link2 link="c" rpy="0 0 0" xyz="0.3 0 0"/></loop_joint>'
-    )
-    other = (
-        '<loop_constraint name="l"><parent link="b"/><parent_origin xyz="0.4 0 0"/><child link="c"/>'
-        '<child_origin xyz="0.3 0 0"/></loop_constraint>'
-    )
-    for tag in (drake, other):
-        m = model(LOOP % tag, ".urdf")
-        m.guess(j1=1.0, j2=-0.7, j3=1.6)
-        assert m.check().degrees_of_freedom == 1
 
 
 def test_names_of_sympy() -> None:
@@ -175,20 +135,6 @@ def test_independent_kept() -> None:
     assert "q" in m.compile(target="numpy").minimal.x_names
 
 
-def test_casadi_without_holonomic_rows() -> None:
-    """rhs and project of the CasADi target where all constraints are nonholonomic."""
-    m = eg.Model("sleigh")
-    b = m.body("b", mass=2.0, com=(0.25, 0, 0), inertia={"zz": 0.3})
-    m.planar("J", m.ground, b)
-    m.knife_edge("k", b)
-    e = m.derive()
-    mod = e.compile(target="numpy")
-    x = mod.x0(J_3=0.4, J_3_dot=-0.8)
-    c = e.to_casadi()
-    got = np.array(c.rhs(0, x, c.u_values, c.p_values)).ravel()
-    assert np.allclose(got, mod.rhs(0.0, x), atol=1e-12), got
-
-
 def test_rates_as_a_list() -> None:
     """A list where a mapping is wanted is a named error."""
     with pytest.raises(eg.EomgenError, match="rates"):
@@ -216,17 +162,6 @@ def test_states_without_freedoms() -> None:
         assert run["z"][-1] == 2 + 2 / 2**3  # samples at 0, 0.1 and 0.2 s
 
 
-def test_limits_of_urdf_at_infinity() -> None:
-    """lower="-inf" is no limit on that side."""
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>'
-        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
-        '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-        '<limit lower="-inf" upper="-0.5" effort="1" velocity="1"/></joint></robot>'
-    )
-    model(text, ".urdf").check()
-
-
 def test_documents_are_well_formed() -> None:
     """Control characters in doc: modelDescription.xml stays XML."""
     characters = ("\x07", "\x1b", "\uffff", "\u202e", "\u2066", "\u200b", "\ufeff")
@@ -243,31 +178,6 @@ def test_documents_are_well_formed() -> None:
             m.derive().explain().save(f"{d}/x.{form}")
             text = Path(f"{d}/x.{form}").read_text(encoding="utf-8")
             assert [char for char in characters if f"a{char}b" in text] == []
-
-
-def test_latex_of_loops() -> None:
-    """No double superscript in LaTeX, whatever the joints are called (here B and P beside the projection)."""
-    m = model("""name: six
-bodies:
-  crank: {mass: 1, com: [0.03, 0, 0], inertia: {zz: 0.001}, markers: {a: [0.06, 0, 0]}}
-  coupler: {mass: 2, com: [0.1, 0.03, 0], inertia: {zz: 0.01}, markers: {b: [0.2, 0, 0], p: [0.1, 0.12, 0]}}
-  rocker: {mass: 1.5, com: [0.08, 0, 0], inertia: {zz: 0.005}, markers: {b: [0.16, 0, 0]}}
-  link: {mass: 1, com: [0.12, 0, 0], inertia: {zz: 0.006}, markers: {e: [0.24, 0, 0]}}
-  out: {mass: 3, com: [0.09, 0, 0], inertia: {zz: 0.02}, markers: {e: [0.18, 0, 0]}}
-joints:
-  O2: {type: revolute, between: [ground, crank], coordinate: theta}
-  A: {type: revolute, between: [crank.a, coupler]}
-  B: {type: revolute, between: [coupler.b, rocker.b]}
-  O4: {type: revolute, between: [{body: ground, at: [0.22, 0, 0]}, rocker], coordinate: psi}
-  P: {type: revolute, between: [coupler.p, link]}
-  E: {type: revolute, between: [link.e, out.e]}
-  O6: {type: revolute, between: [{body: ground, at: [0.3, 0.25, 0]}, out], coordinate: phi}
-independent: [theta]
-initial: {theta: 0.5}
-guess: {psi: 1.8, phi: 2.5}
-""")
-    text = m.derive()._repr_latex_()
-    assert "}^T M_t" not in text or "}^{\\ast}^T" not in text, "double superscript"
 
 
 def test_advice_keeps_the_mechanism() -> None:
@@ -291,19 +201,6 @@ def test_advice_keeps_the_mechanism() -> None:
     advice = re.search(r"leave ([\w, ]+?) out", notes)
     left_out = set(re.findall(r"g\d", advice.group(1))) if advice else set()
     assert epicyclic(whole - left_out).degrees_of_freedom == 1
-
-
-def test_damaged_results() -> None:
-    """A trajectory file with a renamed array or a damaged header is a UsageError."""
-    mod = model(SPRING).compile(target="numpy")
-    with tempfile.TemporaryDirectory() as d:
-        mod.simulate((0, 1), events=[lambda t, x: x[0] - 0.5]).save(f"{d}/r.npz")
-        arrays = dict(np.load(f"{d}/r.npz"))
-        for k in list(arrays):
-            changed = {("x" + a if a == k else a): v for a, v in arrays.items()}
-            np.savez(f"{d}/b.npz", **changed)
-            with pytest.raises(eg.UsageError):
-                eg.load_trajectory(f"{d}/b.npz")
 
 
 def test_auxiliary_forces_that_act() -> None:
@@ -392,56 +289,8 @@ def test_quaternion_rates_written_implicitly() -> None:
     np.testing.assert_allclose([got["w1"], got["w2"], got["w3"]], [-0.1, 0.15, -0.02], atol=1e-10)
 
 
-def test_parameters_without_a_value() -> None:
-    """A message about a parameter without a value does not offer what cannot be done."""
-    m = eg.Model("p", gravity=(0, "-g", 0))
-    for name in ("g", "l", "m"):
-        m.parameter(name)
-    m.revolute("J", m.ground, m.body("b", mass="m", com=(0, "-l", 0)), coordinate="q")
-    with pytest.raises(eg.ModelError) as told:
-        m.compile(target="numpy")
-    assert [problem.path for problem in told.value.problems] == ["parameters.g", "parameters.l", "parameters.m"]
-    assert "bind" not in str(told.value)
-
-
-def test_weld_of_mjcf_without_torque() -> None:
-    """weld with torquescale 0 holds no rotation (MuJoCo's rows vanish)."""
-    text = (
-        '<mujoco><worldbody><body name="wall"><geom type="box" size=".1 .1 .1" contype="0" conaffinity="0"/></body>'
-        '<body name="beam" pos="0 -1 0"><freejoint/>'
-        '<geom type="box" size=".1 1 .1" mass="2" contype="0" conaffinity="0"/></body></worldbody>'
-        '<equality><weld body1="wall" body2="beam" torquescale="0" anchor="0 1 0"/></equality></mujoco>'
-    )
-    m = model(text, ".xml")
-    n = m.check().degrees_of_freedom
-    assert n == 3 or any("torquescale" in str(t) for t in m.notes), n
-
-
-def test_centre_of_mass_by_a_hair() -> None:
-    """Free bodies whose centre of mass lies 1e-9 to 1e-7 m off the origin fall freely, by every method."""
-    for off in ("1.0e-9", "1.0e-8", "1.0e-7", "3.0e-7"):
-        for rotation in ("euler_parameters", "euler_angles"):
-            m = model(
-                f"name: b\ngravity: [0, 0, -9.81]\nbodies: {{b: {{mass: 4.0, com: [{off}, {off}, {off}], "
-                "inertia: {xx: 0.3, yy: 0.25, zz: 0.1}}}\n"
-                f"joints: {{f: {{type: free, between: [ground, b], rotation: {rotation}}}}}\n"
-            )
-            for method in ("embedding", "recursive", "lagrange", "augmented"):
-                mod = m.derive(method).compile(target="numpy")
-                got = dict(zip(mod.v_names, mod.rhs(0.0, mod.x0())[mod.n_q :], strict=False))
-                assert abs(got["f_z_dot"] + 9.81) < 1e-6, (off, rotation, method, got)
-
-
-def test_leftovers_in_robot_files() -> None:
-    """A leftover xacro element in an expanded URDF is noted."""
-    text = (
-        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="a"/><link name="b"><inertial>'
-        '<mass value="1"/>'
-        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-        '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
-        '<axis xyz="0 0 1"/></joint><xacro:imu_sensor name="x"/></robot>'
-    )
-    assert any("xacro" in note for note in model(text, ".urdf").notes)
+def test_a_weld_between_bodies_that_stand() -> None:
+    """Of MJCF: it holds nothing, and the model compiles."""
     text = (
         '<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body><body name="post">'
         '<geom size=".1" pos="2 0 0"/></body>'
@@ -449,23 +298,3 @@ def test_leftovers_in_robot_files() -> None:
         '<weld name="w" body1="post" body2="rail"/></equality></mujoco>'
     )
     model(text, ".xml").compile(target="numpy")
-
-
-def test_sensitivities_with_tables() -> None:
-    """y = k u, so dy/dk = u(t), for held, linear and cubic tables, whichever part of the table a time lies in."""
-    m = eg.Model("cart")
-    b = m.body("cart", mass=1.0)
-    m.prismatic("J", m.ground, b, axis="x", coordinate="s")
-    m.parameter("k", 2.0)
-    u = m.input("u")
-    m.torque("push", "J", u)
-    m.output("y", "k*u")
-    mod = m.compile(target="numpy")
-    times = np.array([0.1, 0.7, 1.2, 1.9])
-    bad = []
-    for kind in ("linear", "zero-order", "cubic"):
-        signal = eg.Signal([0, 0.5, 1.0, 1.5, 2.0], [1.0, -2.0, 3.0, 5.0, 7.0], kind)
-        got = np.asarray(mod.sensitivities(["k"], (0, 2), inputs={"u": signal}, t_eval=times)["y", "k"]).ravel()
-        if not np.allclose(got, signal(times), atol=1e-6):
-            bad.append((kind, got.round(3).tolist()))
-    assert not bad, bad
