@@ -126,7 +126,7 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
         return m
 
     options: list[dict[str, Any]] = [
-        {}, {"optimize": 0}, {"native": True}, {"extra": ["-DEXTRA"]}, {"lanes": 0}, {"kernels": ["rhs"]},
+        {}, {"optimize": 0}, {"extra": ["-DEXTRA"]}, {"lanes": 0}, {"kernels": ["rhs"]},
     ]  # fmt: skip
     modules = []
     for k, given in enumerate(options):

@@ -249,7 +249,7 @@ def test_sources_rebuild_elsewhere(version: str, tmp_path: Path) -> None:
 
 
 def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
-    one, other = (ball().derive().write_fmu(tmp_path / f"{k}.fmu", "3") for k in "ab")
+    one, other = (ball().derive().write_fmu(tmp_path / f"{k}.fmu", "2.0") for k in "ab")
     assert one.read_bytes() == other.read_bytes()
 
 

@@ -44,7 +44,9 @@ def test_bristles_take_nothing_from_the_energy_of_the_contact() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kinds", "target"), [(("box", "box"), "numpy"), (("segment", "polygon"), "cython")], ids=["boxes", "compiled"]
+    ("kinds", "target"),
+    [(("box", "box"), "numpy"), pytest.param(("segment", "polygon"), "cython", marks=pytest.mark.thorough)],
+    ids=["boxes", "compiled"],
 )
 def test_derivatives_by_states_and_of_their_rates(kinds: tuple[str, str], target: str) -> None:
     mod = pair(PLANAR[kinds[0]], PLANAR[kinds[1]]).compile(target=target)

@@ -145,7 +145,7 @@ def engine(name: str) -> Any:
     return eg.load(models.EXAMPLES / f"{name}.yaml").compile(optimize=0)
 
 
-@pytest.mark.parametrize("name", part_of(ENGINES, "v_engine".__eq__))
+@pytest.mark.parametrize("name", part_of(ENGINES, "engine".__eq__))
 def test_an_engine_runs_as_its_one_angle_does(name: str) -> None:
     mod = engine(name)
     traj = mod.simulate(0.1, rtol=1e-11, atol=1e-13)

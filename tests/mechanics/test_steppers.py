@@ -80,6 +80,7 @@ def test_van_der_pol() -> None:
     assert len(solve_ivp(mod.rhs, (0, 2), [2.0, 0.0], method=mod.Radau, rtol=1e-6, atol=1e-8).t) < 1_200
 
 
+@pytest.mark.thorough
 def test_robertson() -> None:
     """Test set for IVP solvers (Mazzia, Magherini), problem ROBER at t = 1e11; concentrations are velocities here."""
     names = [sm.symbols(f"q{i} q{i}_dot") for i in (1, 2, 3)]

@@ -87,7 +87,7 @@ def assert_as_good(found: Any, run: Any, exact: Any, lanes: int | None, near: fl
     assert errors[0] < 4.0 * errors[1] + 1e-9 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("lanes", [0, None])
+@pytest.mark.parametrize("lanes", [pytest.param(0, marks=pytest.mark.thorough), None])
 def test_a_loop_is_kept_closed_and_a_run_that_cannot_begin_holds_up_none(lanes: int | None) -> None:
     crank = compiled("slider_crank", "cython", lanes)
     lengths = np.array([0.1, 0.5, 0.2, 0.12])  # the second is longer than the rod

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -102,7 +103,7 @@ def test_every_operation_means_the_same_on_a_tape(cart: Any) -> None:
     np.testing.assert_allclose(np.diff(rates["s_dot"])[smooth], simpson[smooth], rtol=1e-3)
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_signals_that_the_model_declares(target: str, tmp_path: Path) -> None:
     m = eg.Model("cart")
     body = m.body("cart", mass=1.0)

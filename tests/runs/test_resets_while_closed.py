@@ -121,7 +121,7 @@ def test_slopes_by_what_a_closed_constraint_forbids_are_refused() -> None:
     assert both.dx[:2, 0, -1] == pytest.approx([1.0, 1.0], abs=1e-6)
 
 
-@pytest.mark.parametrize(("target", "rate"), [("numpy", 10), ("cython", 100)])
+@pytest.mark.parametrize(("target", "rate"), [("numpy", 10), pytest.param("cython", 100, marks=pytest.mark.thorough)])
 def test_what_is_closed_holds_between_steps(target: str, rate: float) -> None:
     """A clutch with one degree of freedom left, w' = -c (w - w1): long steps once let rounding grow within them."""
     m = eg.Model("clutch")

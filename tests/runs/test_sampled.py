@@ -164,7 +164,9 @@ def test_a_model_file_says_the_same(module: Any, tmp_path: Path) -> None:
     assert np.array_equal(again.simulate(1.05).x[:, -1], x)
 
 
-@pytest.mark.parametrize(("method", "target"), [("DOP853", "numpy"), ("many", "cython")])
+@pytest.mark.parametrize(
+    ("method", "target"), [("DOP853", "numpy"), pytest.param("many", "cython", marks=pytest.mark.thorough)]
+)
 def test_clocks_whose_times_differ_by_rounding_keep_their_order(method: str, target: str) -> None:
     """0.3 and 3 * 0.1 are neighbouring numbers: b, declared later, takes the new a at each of its times."""
     m = eg.Model("cascade")

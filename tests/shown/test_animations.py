@@ -16,7 +16,7 @@ import nbformat
 import numpy as np
 import pytest
 from browser import Browser
-from children import executed
+from children import HANGS, executed
 from PIL import Image
 
 import eomgen as eg
@@ -189,7 +189,7 @@ def test_a_page_fits_a_narrow_window_and_says_what_it_lacks(run: Any, tmp_path: 
     with Browser(tmp_path / "profile", size=(420, 760)) as browser:
         browser.open(file.as_uri())
         browser.wait_for("document.getElementById('words') && document.getElementById('words').textContent !== ''")
-        end = time.monotonic() + 30
+        end = time.monotonic() + HANGS
         while True:  # until the mechanism is drawn
             drawn = (browser.picture()[60:600] < 200).any(axis=(0, 2))
             if drawn.sum() > 50 and not drawn[:3].any() and not drawn[-3:].any():
