@@ -27,13 +27,17 @@ class Result(NamedTuple):
         return json.loads(self.out)
 
 
-def run(*words: object, cwd: Path | str | None = None, stdin: str | bytes | None = None) -> Result:
-    """Call the command with these words, in the folder cwd; stdin is what it can read."""
+def run(
+    *words: object, cwd: Path | str | None = None, stdin: str | bytes | None = None, columns: str | None = None
+) -> Result:
+    """Call the command with these words, in the folder cwd; stdin is what it can read, columns the terminal's width."""
     given = stdin.encode() if isinstance(stdin, str) else stdin or b""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     with ExitStack() as stack:
         stack.enter_context(patch.dict(os.environ))
         os.environ.pop("COLUMNS", None)  # readline, which pytest imports, sets it
+        if columns is not None:
+            os.environ["COLUMNS"] = columns
         if cwd is not None:
             stack.enter_context(chdir(cwd))
         stack.enter_context(patch.object(sys, "stdin", io.TextIOWrapper(io.BytesIO(given), encoding="utf-8")))

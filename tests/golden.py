@@ -52,12 +52,13 @@ FAULTS: dict[str, Any] = {
 }  # fmt: skip
 
 
-#: What recordings need, in one build.
+#: What recordings and runs of rigid contacts need, in one build.
 IN_C = (
     "rhs", "jacobian", "mass_matrix", "embedded_mass_matrix", "bias", "energy", "constraints", "constraint_jacobian",
     "coordinate_slopes", "velocity_constraints", "project", "poses", "outputs", "events", "resets", "held_errors",
     "kinematics", "loop_coordinates", "loop_coordinate_jacobian", "alignment", "finite_forces", "meeting_time",
     "scales", "centroidal", "needed_wrenches", "wrench_geometry", "inverse_dynamics",
+    "near_pairs", "bias_apart", "motion_axes",
 )  # fmt: skip
 
 

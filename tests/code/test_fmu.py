@@ -25,7 +25,7 @@ ABUSE = Path(__file__).with_name("fmu_abuse.c")
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
 POINTS = 21
 #: Which run always: a loop in both versions, a rolling disc, a loop in space with a redundant description.
-ALWAYS = {("slider_crank", "2.0"), ("slider_crank", "3.0"), ("rolling_disc", "3.0"), ("spatial_slider_crank", "2.0")}
+ALWAYS = {("slider_crank", "2.0"), ("slider_crank", "3.0"), ("rolling_disc", "3.0")}
 
 
 def ball() -> eg.Model:

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from golden import IN_C
 
 import eomgen as eg
 
@@ -71,7 +72,7 @@ def woodpecker() -> Any:
             {"normal_law": "rigid", "friction": MU, "restitution": E_BEAK if k == 0 else 0.0},
         )
     m.independent(*coordinates)
-    return m.compile()
+    return m.compile(optimize=0, kernels=IN_C)
 
 
 def by_hand(end: float, h: float) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from golden import IN_C
 from rigid_scenes import SHAPES, G, on_floor, rigid
 from sweeps import TARGETS
 
@@ -235,7 +236,7 @@ def heap() -> Any:
         )
     m.contacts("heap", shapes, law=rigid(friction=0.4, restitution=0.3))
     m.contacts("floor", shapes, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.6))
-    return m.compile(optimize=0)
+    return m.compile(optimize=0, kernels=IN_C)
 
 
 @pytest.mark.parametrize("h", [1e-3, 4e-3])

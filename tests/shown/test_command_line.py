@@ -399,10 +399,7 @@ def test_keys_of_json(call: Call, verb: str) -> None:
 
 def test_every_line_fits_the_columns_that_are_set() -> None:
     def longest(columns: str) -> int:
-        setting = {**os.environ, "COLUMNS": columns}
-        words = [sys.executable, "-m", "eomgen", "check", str(EXAMPLES / "double_wishbone.yaml")]
-        with child(words, env=setting, stdout=PIPE, text=True) as process:
-            return max(map(len, process.communicate(timeout=HANGS)[0].splitlines()))
+        return max(map(len, command.run("check", EXAMPLES / "double_wishbone.yaml", columns=columns).out.splitlines()))
 
     assert longest("60") <= 62 < longest("many")
     assert longest("1") > 20  # never narrower than can be read
