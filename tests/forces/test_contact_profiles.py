@@ -124,7 +124,8 @@ def test_a_smooth_profile_through_points_of_a_circle_is_the_circle(points: int) 
         )
 
 
-@pytest.mark.parametrize("rolls", part_of([False, True], (False,).__contains__))
+@pytest.mark.thorough
+@pytest.mark.parametrize("rolls", [False, True])
 def test_period_in_a_round_valley(rolls: bool) -> None:
     """A disc of radius r in a valley of R swings as a pendulum of length R - r, and of 3/2 (R - r) if it rolls."""
     R, r, mass = 0.5, 0.05, 1.0
@@ -362,7 +363,7 @@ def test_beyond_the_grid_the_slope_goes_on() -> None:
         assert depth_of(mod, state(mod, [at], [TURNED])) == pytest.approx(0.02, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", part_of(["sphere", "ellipsoid", "cuboid"], ("ellipsoid",).__contains__))
+@pytest.mark.parametrize("kind", part_of(["sphere", "ellipsoid", "cuboid"], lambda kind: False))
 def test_energy_over_waves(kind: str) -> None:
     """Without losses it stays; with friction and damping it never grows."""
     speeds = {"j0_x_dot": 1.0, "j0_wx": 3.0, "j0_wy": -2.0}

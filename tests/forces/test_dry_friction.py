@@ -313,7 +313,8 @@ GROUNDS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("ground", ["half_plane", pytest.param("profile", marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("ground", GROUNDS)
 def test_a_bounce_takes_friction_times_the_impulse_of_the_normal_force(ground: str) -> None:
     """A sliding body lands and lifts off; Coulomb's law, and N (s0 z + s1 z') (Canudas de Wit, Tsiotras), by hand."""
     m = eg.Model("bounce", gravity=(0, 0, 0))

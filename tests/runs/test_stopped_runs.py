@@ -103,7 +103,11 @@ def four_bar() -> eg.Model:
     return m
 
 
-@pytest.fixture(scope="module", params=[("auto", "numpy"), ("augmented", "cython")], ids=str)
+@pytest.fixture(
+    scope="module",
+    params=[("auto", "numpy"), pytest.param(("augmented", "cython"), marks=pytest.mark.thorough)],
+    ids=str,
+)
 def linkage(request: Any) -> Any:
     method, target = request.param
     return four_bar().compile(method=method, target=target)
