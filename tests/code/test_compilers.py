@@ -192,7 +192,7 @@ def test_wrong_options_are_named(options: dict[str, Any], words: str, monkeypatc
 
 
 @pytest.mark.quick
-def test_kernels_that_were_not_asked_for_are_named() -> None:
+def test_kernels_that_were_not_requested_are_named() -> None:
     module = models.build("slider_crank").compile(target="numpy", kernels=["rhs", "project"])
     x = np.array([0.3, -0.4, 0.4, 1.0, -1.2, 0.0])
     assert module.rhs(0.0, x).shape == (6,)

@@ -82,7 +82,7 @@ def test_every_column_has_the_bits_of_a_single_call(name: str, named: Callable[.
             module.rhs(t, x, u=u)
 
 
-def test_an_ensemble_is_compiled_when_it_is_asked_for(named: Callable[..., eg.Model], tmp_path: Path) -> None:
+def test_an_ensemble_is_compiled_when_it_is_requested(named: Callable[..., eg.Model], tmp_path: Path) -> None:
     """Processes and threads that need it at once wait for one build, and all have the same numbers."""
     model, x = named(), 0.3 * states(20)
     module = model.compile(optimize=0)

@@ -151,7 +151,7 @@ def test_forces_and_jacobians_in_both_targets(kind: str) -> None:
     assert met > 3
 
 
-def test_points_and_radius_that_come_late() -> None:
+def test_points_and_radius_that_are_rebound() -> None:
     """A corner that is an outer one at the declared values becomes an inner one; a circle gets larger than a seat."""
     points = np.random.default_rng(4).uniform(-0.3, 0.3, (200, 2))
     corners = [(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (0.0, 0.05), (-0.3, 0.2)]
@@ -249,7 +249,7 @@ def test_a_tooth_is_felt_on_one_side_where_it_is_narrowest() -> None:
     assert found[10000 - 10] == pytest.approx(0.5e4 * 0.045**2, rel=1e-2)
 
 
-def test_what_is_wrong_with_an_outline_is_told() -> None:
+def test_what_is_wrong_with_an_outline_is_reported() -> None:
     cases = [
         ({"shape": "outline", "points": [(0, 0), (1, 1), (1, 0), (0, 1)]}, "points", "cross each other"),
         ({"shape": "outline", "points": [(0, 0), (1, 0)]}, "points", "give 3 to 64 corners"),

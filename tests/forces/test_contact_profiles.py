@@ -205,7 +205,7 @@ def test_targets_parameters_and_derivatives(kind: str) -> None:
         ({"points": [(0, 0), (1, 2, 3)]}, "points[1]", "two numbers"),
     ],
 )
-def test_what_is_wrong_with_a_profile_is_told(given: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_with_a_profile_is_reported(given: dict[str, Any], place: str, told: str) -> None:
     m, (ball,) = scenes.planar("wrong", 1)
     profile = {"shape": "profile", "on": m.ground, **given}
     m.contacts("floor", on(PLANAR["circle"], ball), profile, LAW)
@@ -392,7 +392,7 @@ def test_energy_over_waves(kind: str) -> None:
         ({"x": [0, 1], "y": [0, 1], "z": [[0, 0]]}, "z: has 1 rows for 2 points x"),
     ],
 )
-def test_what_is_wrong_with_a_field_is_told(given: dict[str, Any], told: str) -> None:
+def test_what_is_wrong_with_a_field_is_reported(given: dict[str, Any], told: str) -> None:
     m, (body,) = flying(1)
     m.contacts("floor", {**SHAPES["sphere"], "on": body}, {"shape": "height_field", "on": m.ground, **given}, ELASTIC)
     with pytest.raises(eg.ModelError, match=told):

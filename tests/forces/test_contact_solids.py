@@ -169,7 +169,7 @@ def test_depth_on_a_half_space(kind: str) -> None:
         ({"shape": "cuboid", "size": (1, 0, 1)}, r"size\[1\]: is 0; must be greater than 0"),
     ],
 )
-def test_what_is_wrong_with_a_shape_is_told(given: dict[str, Any], told: str) -> None:
+def test_what_is_wrong_with_a_shape_is_reported(given: dict[str, Any], told: str) -> None:
     m, (body,) = flying(1)
     m.contacts("floor", {**given, "on": body}, {"shape": "half_space", "on": m.ground}, ELASTIC)
     with pytest.raises(eg.ModelError, match=told):

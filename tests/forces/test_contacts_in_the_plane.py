@@ -186,7 +186,7 @@ def test_segments_without_a_radius_are_refused_where_corners_would_pass() -> Non
         ({"shape": "polygon", "points": [("m", 0), (0, 0.1), (-0.1, 0)]}, r"points\[0\]\[0\]"),
     ],
 )
-def test_groups_that_cannot_be_are_told(first: Any, told: str) -> None:
+def test_groups_that_cannot_be_are_reported(first: Any, told: str) -> None:
     m, bodies = scenes.planar("wrong", 2)
     m.parameter("m", 0.1, unit="kg")
     given = [on(one, bodies[0]) for one in first] if isinstance(first, list) else first

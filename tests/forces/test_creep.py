@@ -199,7 +199,7 @@ def test_a_track_that_moves_takes_the_opposite() -> None:
         ({"longitudinal": -1.0}, "forces.rail.longitudinal: is -1; must be 0 or greater"),
     ],
 )
-def test_what_is_wrong_with_creep_is_told(keys: dict[str, object], told: str) -> None:
+def test_what_is_wrong_with_creep_is_reported(keys: dict[str, object], told: str) -> None:
     m = eg.Model("wheel")
     wheel = m.body("wheel", mass=1.0, inertia=(1.0, 1.0, 1.0))
     m.free("f", m.ground, wheel)
@@ -209,7 +209,7 @@ def test_what_is_wrong_with_creep_is_told(keys: dict[str, object], told: str) ->
 
 
 @pytest.mark.parametrize(("law", "told"), [("linear", "the loads of left and right are not"), ("polach", "; or its")])
-def test_rest_is_told_by_the_speed_of_rolling(law: str, told: str) -> None:
+def test_rest_is_detected_by_the_speed_of_rolling(law: str, told: str) -> None:
     """Creepages are divided by the speed of the axle along the track; the ends of a spring have no part in it."""
     mod = wheelset(law).compile(target="numpy").bind(p={"V": 0.0})
     with pytest.raises(eg.NonFiniteError, match=told) as error:

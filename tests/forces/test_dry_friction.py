@@ -233,7 +233,7 @@ def test_derivatives_of_laws() -> None:
         ({"friction_law": "lugre", "friction": 0.1}, "bristle_stiffness", "is missing"),
     ],
 )
-def test_what_is_wrong_with_a_law_of_friction_is_told(law: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_with_a_law_of_friction_is_reported(law: dict[str, Any], place: str, told: str) -> None:
     assert told in problems(block(law))[f"forces.touch.{place}"]
 
 

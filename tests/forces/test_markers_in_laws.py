@@ -302,7 +302,7 @@ def test_a_law_may_use_the_force_of_another_element() -> None:
         ("force(1 + k)", "force() takes the name of one force element"),
     ],
 )
-def test_what_cannot_be_asked(law: str, message: str) -> None:
+def test_what_cannot_be_requested(law: str, message: str) -> None:
     m, _ = machine()
     m.torque("extra", "A", law)
     with pytest.raises(eg.ModelError, match=re.escape(message)):

@@ -148,7 +148,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("law", "place", "told"), WRONG)
-def test_what_is_wrong_with_a_law_is_told(law: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_with_a_law_is_reported(law: dict[str, Any], place: str, told: str) -> None:
     for bulk in (False, True):
         assert told in problems(ball(law, bulk))[f"forces.touch.{place}"]
 

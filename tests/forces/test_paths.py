@@ -251,7 +251,7 @@ def test_a_muscle_over_a_joint_reproduces_the_published_arm() -> None:
         np.testing.assert_allclose(found, given["own"]["qdd0"], rtol=1e-7)
 
 
-def test_faults_of_paths_are_told_by_place() -> None:
+def test_faults_of_paths_are_reported_by_place() -> None:
     m = eg.Model("faults")
     b = m.body("b", mass=1)
     m.prismatic("s", m.ground, b)
@@ -375,6 +375,6 @@ def test_slopes_and_a_helix() -> None:
         ({"smoothing": None}, "give friction and smoothing together"),
     ],
 )
-def test_what_is_wrong_with_a_rubbing_cylinder_is_told(keys: dict[str, Any], told: str) -> None:
+def test_what_is_wrong_with_a_rubbing_cylinder_is_reported(keys: dict[str, Any], told: str) -> None:
     with pytest.raises(eg.ModelError, match=told):
         band(**keys)

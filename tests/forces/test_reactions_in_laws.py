@@ -190,7 +190,7 @@ def test_file_components_and_states(tmp_path: Path) -> None:
         ("multiplier(A)", "'A' has no equation.*joints have equations where they close a loop"),
     ],
 )
-def test_what_is_wrong_is_told(text: str, told: str) -> None:
+def test_what_is_wrong_is_reported(text: str, told: str) -> None:
     m = eg.Model("pin")
     rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
     m.revolute("A", m.ground, rod)

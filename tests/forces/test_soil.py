@@ -214,7 +214,7 @@ def test_a_lifted_plate_forgets() -> None:
         ({"stiffness": 1e4, "cohesion": 1e3}, "cohesion", "belongs to contacts that have soil"),
     ],
 )
-def test_what_is_wrong_with_a_soil_is_told(law: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_with_a_soil_is_reported(law: dict[str, Any], place: str, told: str) -> None:
     assert told in problems(plate(law))[f"forces.soil.{place}"]
 
 
@@ -383,7 +383,7 @@ def test_no_bounce_gains_energy(law: dict[str, Any]) -> None:
         ({**SOIL, "recovery": 0.1}, "recovery", "has no meaning for wheels"),
     ],
 )
-def test_what_is_wrong_with_a_wheel_is_told(law: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_with_a_wheel_is_reported(law: dict[str, Any], place: str, told: str) -> None:
     assert told in problems(wheel(law))[f"forces.soil.{place}"]
 
 

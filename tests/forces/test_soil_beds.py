@@ -300,7 +300,7 @@ def free_pair() -> eg.Model:
     return m
 
 
-def test_momentum_targets_jacobian_and_late_parameters() -> None:
+def test_momentum_targets_jacobian_and_rebound_parameters() -> None:
     numpy, cython = free_pair().compile(target="numpy"), free_pair().compile(optimize=0)
     x = np.random.default_rng(4).uniform(0, 4e-3, numpy.n_x)
     x[:12] = [-0.7, 0.05, 0.1, 0.05, 0.48, 0.4, 0.1, -0.2, 0.3, 0.5, -0.3, -2.0]

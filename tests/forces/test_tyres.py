@@ -235,7 +235,7 @@ def test_exact_derivatives(target: str, law: dict[str, Any]) -> None:
         ({"law": "magic_formula", "half_length": 0.1}, "half_length", "belongs to law: brush"),
     ],
 )
-def test_what_is_wrong_is_told(law: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_is_reported(law: dict[str, Any], place: str, told: str) -> None:
     assert told in problems(corner(law))[f"forces.tyre.{place}"]
 
 

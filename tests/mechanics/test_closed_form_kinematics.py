@@ -197,7 +197,7 @@ def freudenstein(theta: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_a_mechanism_without_mass_is_led(target: str) -> None:
+def test_a_mechanism_without_mass_is_driven(target: str) -> None:
     mod = light_four_bar(0).compile(target=target)
     motion = mod.kinematic_analysis(**LED)
     psi = freudenstein(LED["theta"])
@@ -221,7 +221,7 @@ def test_by_every_method(method: str) -> None:
     np.testing.assert_allclose(np.cos(motion["psi"]), np.cos(freudenstein(LED["theta"])), atol=1e-9)
 
 
-def test_a_forgotten_mass_is_still_told() -> None:
+def test_a_forgotten_mass_is_still_reported() -> None:
     """Where something else has mass, or a force acts, a motion without inertia is a slip of the pen."""
     m = light_four_bar(0)
     m.torque("motor", "A", 1.0)

@@ -125,7 +125,7 @@ def test_closing_by_ida() -> None:
         ({"closes": "x1", "stabilisation": "size - 2"}, "constraints.latch.stabilisation: is 0; must be greater"),
     ],
 )
-def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
+def test_what_is_wrong_is_reported(keys: dict[str, object], told: str) -> None:
     m = eg.Model("carts")
     m.parameter("size", 2.0)
     for name in ("x1", "x2"):
@@ -170,7 +170,7 @@ def test_a_clutch_keeps_angular_momentum(how: str, target: str) -> None:
     assert lost == pytest.approx(0.5 * J1 * J2 / (J1 + J2) * (W1 - W2) ** 2, rel=1e-12)
 
 
-def test_a_lock_carries_what_the_shaft_needs_and_lets_go_where_it_is_told() -> None:
+def test_a_lock_carries_what_the_shaft_needs_and_lets_go_where_it_is_commanded() -> None:
     """A motor drives both discs; the clutch carries J2 / (J1 + J2) of its torque 4 t, and lets go at 5 N m."""
     m = discs("of the joint", opens="5 - abs(carried)")
     m.torque("motor", "A", "4*t")

@@ -127,7 +127,7 @@ def slider_crank(value: str = "10*t", l: float = 0.3, r: float = 0.1, e: float =
         (("D", "0.3 + 0.1*t"), r"d2 is off by 0.1 m at t = 0 s"),
     ],
 )
-def test_contradictory_drivers_are_told_by_name_and_residual(second: tuple[str, str], said: str) -> None:
+def test_contradictory_drivers_are_reported_by_name_and_residual(second: tuple[str, str], said: str) -> None:
     m = slider_crank()
     m.driver("d2", *second)
     with pytest.raises(
@@ -137,7 +137,7 @@ def test_contradictory_drivers_are_told_by_name_and_residual(second: tuple[str, 
     assert "remove one of drive, d2" in str(e.value)
 
 
-def test_a_driver_out_of_reach_is_told() -> None:
+def test_a_driver_out_of_reach_is_reported() -> None:
     with pytest.raises(
         eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*off \(drive by .* rad\); give the drivers"
     ):
@@ -253,7 +253,7 @@ def driven(value: str) -> eg.Model:
     return m
 
 
-def test_a_motion_that_ends_is_told_as_such() -> None:
+def test_a_motion_that_ends_is_reported_as_such() -> None:
     mod = driven("sqrt(1 - t)").compile(target="numpy")
     with pytest.raises(
         eg.SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a division by zero, or a root"

@@ -237,7 +237,7 @@ def test_it_moves_as_with_one_weld(target: str) -> None:
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_late_values_that_open_it_are_refused(target: str) -> None:
+def test_rebound_values_that_open_it_are_refused(target: str) -> None:
     mod = twice_welded().compile(target=target)
     with pytest.raises(eg.AssemblyError, match=r"W1\.r_x \(off by 0\.1\) can never hold: no coordinate changes it"):
         mod.simulate(0.1, initial={"theta": 0.3}, parameters={"l3": 0.4})
@@ -288,7 +288,7 @@ def out_of_plane(offset: float) -> eg.Model:
 
 
 @pytest.mark.parametrize("offset", [1e-9, 1e-4, 5e-3])
-def test_a_gap_across_the_plane_is_told(offset: float) -> None:
+def test_a_gap_across_the_plane_is_reported(offset: float) -> None:
     with pytest.raises(eg.AssemblyError, match=r"C\.r_z"):
         out_of_plane(offset).derive()
 
@@ -303,7 +303,7 @@ def body_on(axis: str, inertia: dict[str, float], turned: list[str] | None = Non
 
 
 @pytest.mark.parametrize("axis", "xy")
-def test_it_is_told(axis: str) -> None:
+def test_it_is_reported(axis: str) -> None:
     (note,) = body_on(axis, {"zz": 1.0})
     assert note.startswith("b turns about axes without a given moment of inertia")
     assert body_on(axis, {"xx": 1.0, "yy": 1.0, "zz": 1.0}) == []

@@ -61,7 +61,7 @@ def test_accelerations_are_those_of_the_indefinite_matrix(method: str, target: s
     assert signs == {(-1.0, 1.0)}
 
 
-def test_it_must_be_asked_for() -> None:
+def test_it_must_be_requested() -> None:
     with pytest.raises(eg.ModelError, match="moment about the centre of mass is -0.2.*check_inertia"):
         double_pendulum(-0.2).check()
     assert double_pendulum(-0.2, check_inertia="note").check().notes[0].startswith("bodies.two.inertia: the moment")

@@ -273,7 +273,7 @@ def test_accelerations_of_kane_and_levinson(method: str) -> None:
         ({"shape": "convex", "support": "log(-1 - nx**2)"}, "support", "is not a number"),
     ],
 )
-def test_what_is_wrong_is_told(keys: dict[str, Any], place: str, told: str) -> None:
+def test_what_is_wrong_is_reported(keys: dict[str, Any], place: str, told: str) -> None:
     m = eg.Model("wrong")
     body = m.body("body", mass=1, inertia=INERTIA)
     m.free("fly", m.ground, body)

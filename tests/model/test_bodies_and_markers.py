@@ -101,7 +101,7 @@ def refused(**given: Any) -> dict[str, tuple[str, str]]:
     return {p.path: (p.message, p.remedy) for p in error.value.problems}
 
 
-def test_ways_that_exclude_each_other_are_told_at_once() -> None:
+def test_ways_that_exclude_each_other_are_reported_at_once() -> None:
     found = refused(mass=1, com=(0, 0, 0), first_moment=(0, 0, 0), inertia=(1, 1, 1), principal=(1, 1, 1))
     assert set(found) == {"bodies.b.first_moment", "bodies.b.principal"}
     found = refused(solids=[{"type": "sphere", "radius": 1, "mass": 1}], mass=1, com=(0, 0, 0), about="origin")
@@ -310,7 +310,7 @@ AXES: dict[Any, tuple[float, float, float]] = {
 }  # fmt: skip
 
 
-def test_words_and_numbers_for_axes() -> None:
+def test_names_and_numbers_for_axes() -> None:
     m = eg.Model("axes")
     for k, axis in enumerate(AXES):
         m.revolute(f"r{k}", m.ground, m.body(f"a{k}", mass=1, inertia=(1, 1, 1)), axis=axis)
@@ -357,7 +357,7 @@ def test_markers_may_be_given_with_the_body() -> None:
         ({"tip": {"att": (0, 0, 0)}}, r"bodies.arm.markers.tip.*did you mean .at."),
     ],
 )
-def test_markers_that_cannot_be_are_told_with_their_place(markers: object, place: str) -> None:
+def test_markers_that_cannot_be_are_reported_with_their_place(markers: object, place: str) -> None:
     m = eg.Model("arm")
     m.revolute("A", m.ground, m.body("arm", mass=1, inertia={"zz": 1}, markers=markers))
     with pytest.raises(eg.ModelError, match=place):

@@ -101,7 +101,7 @@ def test_each_fault(old: str, new: str, line: int, path: str, message: str, reme
     assert str(problem).startswith(f"{problem.file}:{line}: {path}: ")
 
 
-def test_one_fault_is_told_once(tmp_path: Path) -> None:
+def test_one_fault_is_reported_once(tmp_path: Path) -> None:
     """A misspelt type, name or value does not put everything at fault that refers to it."""
     for old, new in [
         ("type: prismatic", "type: prismatik"),
@@ -272,7 +272,7 @@ def disc(joint: str, **keys: str) -> eg.Model:
     return m
 
 
-def test_a_disc_that_lies_flat_at_the_start_is_told_with_the_remedy() -> None:
+def test_a_disc_that_lies_flat_at_the_start_is_reported_with_the_remedy() -> None:
     with pytest.raises(
         eg.AssemblyError, match=r"constraints\.r: .*not finite.*the disc lies flat.*tilt the disc in initial"
     ):

@@ -112,7 +112,7 @@ def test_it_is_written_again_and_verified(tmp_path: Path) -> None:
         ("force(turn, on=b).x", "the element 'turn' acts along the coordinate"),
     ],
 )
-def test_what_is_wrong_is_told(text: str, told: str) -> None:
+def test_what_is_wrong_is_reported(text: str, told: str) -> None:
     m = craft()
     hub = m.body("hub", mass=1, inertia=INERTIA)
     m.revolute("hinge", m.ground, hub)

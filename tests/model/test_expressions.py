@@ -310,7 +310,7 @@ SLIPS = {
 
 
 @pytest.mark.quick
-def test_a_slip_is_told_with_what_to_write() -> None:
+def test_a_slip_is_reported_with_what_to_write() -> None:
     for text, fault in zip(SLIPS, faults(list(SLIPS)), strict=True):
         message, place, remedy = SLIPS[text]
         assert message in fault.message, text
@@ -318,7 +318,7 @@ def test_a_slip_is_told_with_what_to_write() -> None:
         assert remedy in fault.remedy, text
 
 
-def test_constants_of_other_programs_are_told() -> None:
+def test_constants_of_other_programs_are_reported() -> None:
     found = dict(zip(("PI", "e", "inf"), faults(["PI", "e", "inf"]), strict=True))
     assert all(f"unknown name '{text}'" in fault.message for text, fault in found.items())
     for text, remedy in (("PI", "write pi"), ("e", "write exp(1)"), ("inf", "numbers are finite")):

@@ -97,7 +97,7 @@ class Odd(os.PathLike[str]):
 NO_PATHS = (b"a.yaml", "", None, 3, ["a.yaml"], "a\0.yaml", "\ud800.yaml", Odd())
 
 
-def test_what_is_no_path_is_refused_in_the_same_words(run: Any) -> None:
+def test_what_is_no_path_is_refused_with_the_same_message(run: Any) -> None:
     for door in (eg.load, eg.load_trajectory, eg.load(EXAMPLE).save, run.save):
         for given in NO_PATHS:
             with pytest.raises(

@@ -174,7 +174,7 @@ def test_names_without_latex_are_printed_as_in_a_textbook_and_kept_apart() -> No
         (("'\\mathcal{E}'", "'<script>'"), "outputs.E.latex: '<script>' has '<'"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(change: tuple[str, str], message: str, tmp_path: Path) -> None:
+def test_what_is_wrong_is_reported_with_its_place(change: tuple[str, str], message: str, tmp_path: Path) -> None:
     assert change[0] in TEXT
     with pytest.raises(eg.ModelError) as raised:
         load(tmp_path, TEXT.replace(*change)).check()

@@ -283,7 +283,7 @@ def test_springs_drives_tendons_and_joint_chains_equal_mujoco(rotation: str, tmp
     assert (bodies["arm_a_1"]["mass"], bodies["arm"]["mass"]) == (0.0, pytest.approx(1.0))
 
 
-def test_it_floats_by_its_own_word(tmp_path: Path) -> None:
+def test_it_floats_by_its_own_key(tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     path.write_text(EVERYTHING)
     with pytest.raises(eg.UsageError, match="itself defines which bodies float"):

@@ -104,7 +104,7 @@ def sympy_call(name: str, argument: Any, order: int) -> Any:
     return sympy.Function(name)(argument).diff(argument, order)
 
 
-def test_without_a_twin_only_compiled_code_runs(sources: Path) -> None:
+def test_without_a_python_function_only_compiled_code_runs(sources: Path) -> None:
     m = pendulum("-9.81*swing(q)", full(sources))
     assert m.check()
     assert m.derive().force[0].has(sympy_call("swing", m.coordinate("q"), 0).func)
@@ -205,14 +205,14 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("keys", "message"), WRONG)
-def test_what_does_not_fit_is_told(sources: Path, keys: dict[str, Any], message: str) -> None:
+def test_what_does_not_fit_is_reported(sources: Path, keys: dict[str, Any], message: str) -> None:
     with pytest.raises(eg.ModelError) as caught:
         pendulum("-swing(q)", full(sources, **keys)).check()
     assert message in str(caught.value)
     assert len(caught.value.problems) == 1
 
 
-def test_twin_files_that_do_not_fit_are_told(sources: Path) -> None:
+def test_python_files_that_do_not_fit_are_reported(sources: Path) -> None:
     (sources / "other.py").write_text("swung = 1\n")
     (sources / "broken.py").write_text("1/0\n")
     for file, message in (("other.py", "other.py has no function swing"), ("broken.py", "ZeroDivisionError")):

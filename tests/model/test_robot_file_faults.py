@@ -69,13 +69,13 @@ def arm(folder: Path, *changes: tuple[str, str], name: str = "arm.urdf") -> Path
 
 
 @pytest.mark.parametrize(("old", "new", "said"), BROKEN, ids=lambda text: text[:24])
-def test_a_fault_is_told_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:
+def test_a_fault_is_reported_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:
     path = arm(tmp_path, (old, new))
     with pytest.raises(eg.ModelError, match=said):
         eg.load(path).check()
 
 
-def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+def test_all_faults_are_reported_at_once(tmp_path: Path) -> None:
     shapes = '<visual><geometry><mesh filename="a.stl" scale="1 0 1"/></geometry></visual>'
     inertia = ('ixx="0.1" iyy="0.1" izz="0.01"', 'ixx="0.1" iyy="0.1" izz="0.9"')
     path = arm(tmp_path, ("prismatic", "sliding"), ('"0.5"/></inertial>', f'"-1"/></inertial>{shapes}'), inertia)
@@ -217,7 +217,7 @@ def test_no_spelling_of_a_path_leads_out_of_the_folder(text: str, model: Any, mo
 
 
 @pytest.mark.parametrize("name", ["pipe.stl", "none.stl", ".", "%2e%2e/out/x.stl", "~/x.stl", "A.STL", "a" * 2000])
-def test_what_is_no_file_of_the_folder_is_told(name: str, model: Any) -> None:
+def test_what_is_no_file_of_the_folder_is_reported(name: str, model: Any) -> None:
     with pytest.raises(eg.ModelError, match=r"model.xml:2: mesh.file: .*(no plain file|names no file|too long)"):
         eg.load(model(mesh(name)))
 

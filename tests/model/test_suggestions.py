@@ -49,7 +49,7 @@ def held() -> dict[str, Any]:
         ("Equations", "latex", "explain"), ("eomgen", "modle", "Model"), ("Equations", "simulate", "compile"),
     ],
 )  # fmt: skip
-def test_words_of_other_programs_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
+def test_names_of_other_programs_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
     with pytest.raises(AttributeError, match=rf"has no attribute '{word}'; did you mean '?{meant}\b"):
         getattr(held[kind], word)
 
@@ -69,7 +69,7 @@ def test_words_of_other_programs_in_python(held: dict[str, Any], kind: str, word
         ("simulation: {t_end: 3}", "end"), ("simulation: {tol: 3}", "rtol"),
     ],
 )  # fmt: skip
-def test_words_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
+def test_names_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
     (tmp_path / "model.yaml").write_text(f"name: m\n{text}\n")
     with pytest.raises(eg.ModelError, match=f"did you mean '?{meant}'?\\?"):
         eg.load(tmp_path / "model.yaml").check()
@@ -85,7 +85,7 @@ def test_words_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str
         (["run", "m.yaml", "--output", "a"], "--out"), (["run", "m.yaml", "--tolerance", "1"], "--rtol"),
     ],
 )  # fmt: skip
-def test_words_of_other_programs_on_the_command_line(words: list[str], meant: str) -> None:
+def test_names_of_other_programs_on_the_command_line(words: list[str], meant: str) -> None:
     done = command.run(*words)
     assert done.code == 2
     assert f"id you mean {meant}" in done.err.replace("'", "")

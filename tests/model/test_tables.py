@@ -307,7 +307,9 @@ BROKEN: list[tuple[str, str, str]] = [
 
 
 @pytest.mark.parametrize(("functions", "path", "message"), BROKEN)
-def test_broken_entries_are_told_once_with_their_line(tmp_path: Path, functions: str, path: str, message: str) -> None:
+def test_broken_entries_are_reported_once_with_their_line(
+    tmp_path: Path, functions: str, path: str, message: str
+) -> None:
     two = "z: [[" in functions
     usable = functions.strip().startswith("law:")
     law = ("law(s, s)" if two else "law(s)") if usable else "s"

@@ -122,7 +122,7 @@ def test_right_expressions_pass(field: str, expression: str) -> None:
 
 
 @pytest.mark.parametrize(("field", "expression", "message"), WRONG)
-def test_wrong_expressions_are_told_with_their_place(field: str, expression: str, message: str) -> None:
+def test_wrong_expressions_are_reported_with_their_place(field: str, expression: str, message: str) -> None:
     with pytest.raises(eg.ModelError) as caught:
         model(field, expression).check()
     (problem,) = caught.value.problems
@@ -131,7 +131,7 @@ def test_wrong_expressions_are_told_with_their_place(field: str, expression: str
     assert problem.path.split(".")[0] in ("bodies", "forces", "constraints", "outputs", "initial")
 
 
-def test_all_are_told_at_once_with_their_lines(tmp_path: Path) -> None:
+def test_all_are_reported_at_once_with_their_lines(tmp_path: Path) -> None:
     text = """name: two
 parameters:
   l: {value: 500, unit: mm}
@@ -334,7 +334,7 @@ def test_values_are_converted(given: str, name: str, value: float, tmp_path: Pat
 
 
 @pytest.mark.parametrize(("given", "place", "said"), GIVEN_WRONG)
-def test_what_is_wrong_is_told_at_its_place(given: str, place: str, said: str, tmp_path: Path) -> None:
+def test_what_is_wrong_is_reported_at_its_place(given: str, place: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(eg.ModelError) as told:
         loaded(tmp_path, given).check()
     assert f"add.a.{place}: " in str(told.value)

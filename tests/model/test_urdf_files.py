@@ -106,7 +106,7 @@ def test_python_and_model_files_know_the_data(tmp_path: Path) -> None:
         ("armature: -1", "joints.a.armature: is -1"),
     ],
 )
-def test_wrong_data_is_told(data: str, said: str, tmp_path: Path) -> None:
+def test_wrong_data_is_reported(data: str, said: str, tmp_path: Path) -> None:
     text = (
         f"name: m\nbodies: {{r: {{mass: 1, inertia: [1, 1, 1]}}}}\n"
         f"joints: {{a: {{type: revolute, between: [ground, r], {data}}}}}"
@@ -115,7 +115,7 @@ def test_wrong_data_is_told(data: str, said: str, tmp_path: Path) -> None:
         load(tmp_path, text).check()
 
 
-def test_dry_friction_acts_where_it_is_asked_for() -> None:
+def test_dry_friction_acts_where_it_is_requested() -> None:
     q, v = np.array([0.1, 0.2, -0.3, 0.01, 0.02]), np.array([1.0, -2.0, 0.015, 0.1, 0.0])
     modules = [
         eg.load(ARM, **friction).compile(target="numpy", kernels=["bias"])
@@ -176,7 +176,7 @@ def test_locks_of_all_tied_joints_leave_a_note(tmp_path: Path) -> None:
     assert urdf(tmp_path, MIMIC, lock={"b": 0.3}, limits="off").notes == ()
 
 
-def test_mimics_are_tied_unless_asked_otherwise(tmp_path: Path) -> None:
+def test_mimics_are_tied_unless_stated_otherwise(tmp_path: Path) -> None:
     module = urdf(tmp_path, MIMIC).compile(target="numpy")
     assert (module.n_dof, urdf(tmp_path, MIMIC, mimic="independent").check().degrees_of_freedom) == (2, 3)
     x = dict(zip(module.x_names, module.x0(a=0.1, a_dot=1.0), strict=True))
@@ -252,7 +252,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("loop", "said"), REFUSED)
-def test_faults_of_loops_are_told_with_their_line(loop: str, said: str, tmp_path: Path) -> None:
+def test_faults_of_loops_are_reported_with_their_line(loop: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(eg.ModelError, match=f"robot.urdf:7: .*{said}"):
         urdf(tmp_path, FOUR_BAR.format(loop))
 
@@ -417,7 +417,7 @@ def test_what_rounding_leaves_passes(given: dict[str, Any], tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("given", "said"), SLIPS, ids=str)
-def test_a_slip_of_the_pen_is_told(given: dict[str, Any], said: str, tmp_path: Path) -> None:
+def test_a_slip_of_the_pen_is_reported(given: dict[str, Any], said: str, tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(two_links(given))
     if said == "exceeds the sum":  # taken by default, as other loaders do, and told

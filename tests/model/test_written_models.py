@@ -274,12 +274,12 @@ def test_an_example_is_the_model_of_its_file(tmp_path: Path, monkeypatch: pytest
         ("../slider_crank", "no example"),
     ],
 )
-def test_what_is_no_example_is_told(name: str, words: str) -> None:
+def test_what_is_no_example_is_reported(name: str, words: str) -> None:
     with pytest.raises(eg.UsageError, match=words):
         eg.load_example(name)
 
 
-def test_the_name_of_an_example_given_as_a_file_is_told() -> None:
+def test_the_name_of_an_example_given_as_a_file_is_reported() -> None:
     with pytest.raises(eg.UsageError, match=r"the example is load_example\('four_bar'\)"):
         eg.load("four_bar")
 

@@ -184,7 +184,7 @@ def test_what_a_force_acts_on_and_its_value() -> None:
     assert (described(m)["forces"]["t1"]["body"], last(m)["joint"]) == ("a", "J")
 
 
-def test_ends_that_are_not_there_are_told_by_the_check() -> None:
+def test_ends_that_are_not_there_are_reported_by_the_check() -> None:
     m, a, b, J, _ = parts()
     m.spring("s", a, None, 5)
     m.revolute("K", a, None)
@@ -223,7 +223,7 @@ def test_calls_that_cannot_be() -> None:
             setattr(m, name, 1)
 
 
-def test_calls_of_a_module_with_the_wrong_shape_of_values_are_told() -> None:
+def test_calls_of_a_module_with_the_wrong_shape_of_values_are_reported() -> None:
     m = eg.Model("calls")
     length = m.parameter("l", 1.0)
     m.revolute("q", m.ground, m.body("a", mass=1, com=(0, "-l", 0)))

@@ -59,7 +59,7 @@ FAULTS = (
         "ROUNDED * size",
         "1e-2 * size",
         "a row that is a constant gap of 1 % counts as fulfilled",
-        "tests/mechanics/test_mobility.py::test_a_gap_across_the_plane_is_told[1e-09]",
+        "tests/mechanics/test_mobility.py::test_a_gap_across_the_plane_is_reported[1e-09]",
     ),
     Fault(
         "tikhonov", "TIKHONOV",

@@ -258,7 +258,7 @@ FAULTS = (
         "work.initial or None",
         "None",
         "the command inverse ignores --set of coordinates",
-        "tests/shown/test_command_results.py::test_inverse_begins_where_it_is_told",
+        "tests/shown/test_command_results.py::test_inverse_begins_at_the_state_requested",
     ),
     Fault(
         "cut-ball-sign", "Columns._loops",

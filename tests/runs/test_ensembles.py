@@ -181,7 +181,7 @@ def test_without_compiled_code(pendulum: Any) -> None:
         ({"t_eval": [3.0, 2.0]}, "t_eval must be times in order"),
     ],
 )
-def test_wrong_words(pendulum: Any, options: dict[str, Any], message: str) -> None:
+def test_wrong_names(pendulum: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(eg.UsageError, match=message):
         pendulum.simulate_many(1, **options)
 

@@ -157,7 +157,7 @@ def test_texts_functions_and_mappings(method: str, target: str) -> None:
 
 
 @pytest.mark.parametrize(("times", "count"), [(True, 1), (2, 2), (2.0, 2), (np.int64(3), 3), (False, 4), (None, 4)])
-def test_a_run_ends_at_the_times_asked_for(swing: Any, times: Any, count: int) -> None:
+def test_a_run_ends_at_the_times_requested(swing: Any, times: Any, count: int) -> None:
     """As often as that, in compiled code and with a function of Python."""
 
     def height(t: float, x: np.ndarray) -> float:
@@ -170,7 +170,7 @@ def test_a_run_ends_at_the_times_asked_for(swing: Any, times: Any, count: int) -
 
 
 @pytest.mark.parametrize("method", ["DOP853", "BDF"])
-def test_an_event_without_a_value_is_told_of(swing: Any, method: str) -> None:
+def test_an_event_without_a_value_is_reported(swing: Any, method: str) -> None:
     q = swing.q_names[0]
     with pytest.warns(UserWarning, match="event gap: the value was not a number") as told:
         run = swing.simulate((0, 1.5), {q: 0.5}, events={"gap": f"log(-1 - {q}**2)", "low": q}, method=method)

@@ -125,7 +125,7 @@ def test_states_off_the_constraints_are_brought_onto_them_first(four_bar: Any) -
         (((1e308, [1.0, 2.0], 1e308), {}), "finite"),
     ],
 )
-def test_wrong_calls_are_told(cart: Any, call: Any, words: str) -> None:
+def test_wrong_calls_are_reported(cart: Any, call: Any, words: str) -> None:
     positional, named = call
     with pytest.raises(eg.UsageError, match=words):
         cart.integrator()(*positional, **named)

@@ -214,7 +214,7 @@ def test_a_led_slider_stops_at_its_dead_centres(free_crank: eg.Module) -> None:
         ({"theta": [0, 1], "initial": [0, 1]}, r"initial must name values or have shape \(3,\)"),
     ],
 )
-def test_what_cannot_be_asked(free_crank: eg.Module, asked: dict[str, object], said: str) -> None:
+def test_what_cannot_be_requested(free_crank: eg.Module, asked: dict[str, object], said: str) -> None:
     with pytest.raises(eg.UsageError, match=said):
         free_crank.kinematic_analysis(**asked)
 

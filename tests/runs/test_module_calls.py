@@ -268,7 +268,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_a_wrong_name_is_told_with_the_nearest(held: dict[str, Any], kind: str) -> None:
+def test_a_wrong_name_is_reported_with_the_nearest(held: dict[str, Any], kind: str) -> None:
     for name, near in WRONG[kind].items():
         with pytest.raises(AttributeError, match=rf"^{kind} has no attribute '{name}'; did you mean .*\b{near}\b.*\?$"):
             getattr(held[kind], name)

@@ -94,7 +94,7 @@ def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> 
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_welds_that_late_values_part_are_named(target: str) -> None:
+def test_welds_that_rebound_values_part_are_named(target: str) -> None:
     mod = held_twice().compile(target=target)
     with pytest.raises(eg.AssemblyError, match=r"off by 0\.1\) can never hold: no coordinate changes it"):
         mod.simulate(1.0, parameters={"l3": 0.4})

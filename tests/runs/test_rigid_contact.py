@@ -264,7 +264,7 @@ def test_forces_change_momentum_as_the_run_does(heap: Any, h: float) -> None:
     np.testing.assert_allclose(total, 0.0, atol=1e-9)  # action and reaction
 
 
-def test_stored_copied_and_asked_for_wrongly(tmp_path: Path) -> None:
+def test_stored_copied_and_requested_wrongly(tmp_path: Path) -> None:
     ball = on_floor(SHAPES["circle"], {"friction": 0.3})
     options: dict[str, Any] = {"method": "moreau", "step": 1e-3}
     whole = ball.simulate(0.5, {"j_y": 0.4}, **options)

@@ -146,7 +146,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_wrong_options_are_told(swing: eg.Module) -> None:
+def test_wrong_options_are_reported(swing: eg.Module) -> None:
     for options, words in [
         *OPTIONS,
         *(({"method": m, **given}, words) for m in METHODS for given, words in TOLERANCES),
@@ -215,7 +215,7 @@ def test_an_initial_array_is_projected(crank: eg.Module) -> None:
     assert np.abs(crank.constraints(run.x[:3, 0])).max() < 1e-13
 
 
-def test_progress_goes_to_stderr_only_when_asked(swing: eg.Module, capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_goes_to_stderr_only_when_requested(swing: eg.Module, capsys: pytest.CaptureFixture[str]) -> None:
     swing.simulate(20.0, {"theta": 2.0}, rtol=1e-11, atol=1e-12, progress=True)
     shown = capsys.readouterr()
     assert (shown.out, bool(shown.err)) == ("", True)

@@ -121,7 +121,7 @@ FAULTS: dict[str, tuple[Callable[[eg.Model], object], str, str]] = {
 
 
 @pytest.mark.parametrize("case", FAULTS)
-def test_faults_are_told_by_their_place(case: str) -> None:
+def test_faults_are_reported_by_their_place(case: str) -> None:
     make, path, message = FAULTS[case]
     m = sledge()
     make(m)

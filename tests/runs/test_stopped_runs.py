@@ -69,7 +69,7 @@ def test_a_friction_that_jumps_is_named(method: str, target: str) -> None:
         lambda case: case in (("DOP853", "cython"), ("LSODA", "numpy"), ("integrator", "cython"), ("Radau", "cython")),
     ),
 )
-def test_a_sliding_mode_over_a_short_span_is_told_in_seconds(method: str, target: str) -> None:
+def test_a_sliding_mode_over_a_short_span_is_reported_in_seconds(method: str, target: str) -> None:
     """A spring that holds 1 N against 2 N of dry friction at rest: some 5e7 steps in 0.02 s."""
     module, start = sliding(target).bind({"friction": 2.0, "k": 3.0}), {"s": 1 / 3}
     asked: dict[str, Any] = {"t_eval": [0, 0.02]}

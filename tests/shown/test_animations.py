@@ -104,7 +104,7 @@ def test_films_need_ffmpeg(run: Any, tmp_path: Path) -> None:
         ("run.gif", {"model": eg.Model("m")}, r"model must be a module, as Model.compile\(\) returns"),
     ],
 )
-def test_slips_are_told_before_any_work(
+def test_slips_are_reported_before_any_work(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str | None, how: dict[str, Any], said: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

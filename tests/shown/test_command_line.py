@@ -187,7 +187,7 @@ def test_slips_as_json(call: Call, verb: str) -> None:
 
 
 @pytest.mark.quick
-def test_faults_of_a_model_are_told_all_at_once_with_their_lines(call: Call, tmp_path: Path) -> None:
+def test_faults_of_a_model_are_reported_all_at_once_with_their_lines(call: Call, tmp_path: Path) -> None:
     text = TEXT.replace("type: revolute", "type: revolut").replace("mass: m,", "mass: mm,")
     file = model_file(tmp_path, text)
     result = call("check", file)
@@ -240,7 +240,7 @@ def test_values_of_set_are_judged_as_declared_ones(call: Call, tmp_path: Path) -
     expect(found, 1, "forces.floor.friction: is -1 with mu = -1; must be 0 or greater")
 
 
-def test_files_that_cannot_be_written_are_told_before_the_work(call: Call, tmp_path: Path) -> None:
+def test_files_that_cannot_be_written_are_reported_before_the_work(call: Call, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.npz").mkdir()
     (tmp_path / "link.md").symlink_to(tmp_path / "other.md")

@@ -111,7 +111,7 @@ def test_the_work_of_an_input_that_changes_over_time_is_counted(call: Call, tmp_
     assert "kept to" not in out
 
 
-def test_the_loss_of_a_plastic_impact_is_told_and_left_out_of_the_balance(call: Call, tmp_path: Path) -> None:
+def test_the_loss_of_a_plastic_impact_is_reported_and_left_out_of_the_balance(call: Call, tmp_path: Path) -> None:
     """Two wheels that couple lose J_1 J_2 / (J_1 + J_2) / 2 of the square of the slip."""
     model = yaml(
         tmp_path,
@@ -126,7 +126,7 @@ def test_the_loss_of_a_plastic_impact_is_told_and_left_out_of_the_balance(call: 
     assert "-1.5 J at their instants" in call("run", model, *NUMPY).out
 
 
-def test_what_rests_is_told_as_resting(call: Call, tmp_path: Path) -> None:
+def test_what_rests_is_reported_as_resting(call: Call, tmp_path: Path) -> None:
     """A leg that falls freely keeps its angle; what the integrator leaves of its rate is not a result."""
     model = yaml(
         tmp_path,
@@ -143,7 +143,7 @@ def test_what_rests_is_told_as_resting(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("default")
-def test_a_warning_is_told_without_a_place_in_python(call: Call, tmp_path: Path) -> None:
+def test_a_warning_is_reported_without_a_place_in_python(call: Call, tmp_path: Path) -> None:
     model = yaml(
         tmp_path,
         "name: hinge\ngravity: [0, -9.81, 0]\nbodies: {rod: {mass: 1, com: [0.5, 0, 0], inertia: {zz: 0.1}}}\n"
@@ -223,7 +223,7 @@ def test_reactions_and_inverse(call: Call, tmp_path: Path) -> None:
     np.testing.assert_allclose(other["reactions"], forces["reactions"], atol=1e-9)
 
 
-def test_inverse_begins_where_it_is_told(call: Call, tmp_path: Path) -> None:
+def test_inverse_begins_at_the_state_requested(call: Call, tmp_path: Path) -> None:
     arm = yaml(
         tmp_path,
         "name: arm\ngravity: [0, -10, 0]\nbodies: {b: {mass: 2, com: [0, -0.5, 0]}}\n"

@@ -280,7 +280,7 @@ def test_accelerations_of_a_published_slider_crank() -> None:
     assert float(found[r"(\mathbf{a}_{\mathrm{slider}})_{1}"]) == pytest.approx(along, rel=1e-5)
 
 
-def test_a_model_at_rest_is_told_in_motion_and_rounding_as_zero() -> None:
+def test_a_model_at_rest_is_reported_in_motion_and_rounding_as_zero() -> None:
     """Two point masses at the ends of rods of 1 m, horizontal: the second moves at 1 + (1 + 1) m/s."""
     numbers = section(explained("double_pendulum"), "Numbers")
     found = lines(numbers)

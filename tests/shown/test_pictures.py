@@ -363,7 +363,7 @@ def test_a_ring_has_its_hole_and_a_fine_mesh_is_thinned_out(tmp_path: Path) -> N
         ("../part.stl", b"", "outside the folder of the model file"),
     ],
 )
-def test_what_cannot_be_drawn_is_told_and_left_out(name: str, data: bytes | None, why: str, tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_reported_and_left_out(name: str, data: bytes | None, why: str, tmp_path: Path) -> None:
     folder = tmp_path / "model"
     folder.mkdir()
     if data is not None:

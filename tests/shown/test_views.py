@@ -311,7 +311,7 @@ def test_a_solution_with_values_is_that_of_a_model_with_numbers(method: str) -> 
         two_arms().derive().with_parameters({"left.l": 0.5}).subs({"s": 0}).explain()
 
 
-def test_what_is_compiled_is_asked_of_the_equations() -> None:
+def test_what_is_compiled_is_computed_by_the_equations() -> None:
     view = two_arms().derive().with_parameters({"left.l": 0.5})
     for name in ("compile", "operations", "report"):
         with pytest.raises(AttributeError, match=r"view of equations has no .*"):

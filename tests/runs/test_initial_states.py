@@ -190,7 +190,7 @@ def test_a_parallelogram_stays_one_past_its_flat_positions(flat: eg.Module, angl
     np.testing.assert_allclose(q, expected, atol=1e-9)
 
 
-def test_leaving_the_branch_is_told() -> None:
+def test_leaving_the_branch_is_reported() -> None:
     """A rocker beyond its dead centre: there is a position on another branch, which x0 does not take silently."""
     mod = models.build("four_bar").compile(target="numpy")
     psi = float(mod.x0()[mod.q_names.index("psi")]) - 3.0

@@ -181,7 +181,7 @@ def test_only_what_is_differentiated_gets_rates() -> None:
     assert inputs_of(m) == ("u", "u_dot")
 
 
-def test_a_name_that_is_taken_is_told() -> None:
+def test_a_name_that_is_taken_is_reported() -> None:
     m = eg.Model("lift")
     b = m.body("b", mass=1)
     m.prismatic("s", m.ground, b, axis="y")
