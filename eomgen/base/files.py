@@ -111,6 +111,10 @@ KINDS = (
 )
 
 
+class MissingFileError(FileNotFoundError, UsageError, code="EG-FILE"):
+    """There is no such file; a FileNotFoundError too, as Python's own ``open`` raises."""
+
+
 def open_plain(path: str | os.PathLike[str], *, follow: bool = True) -> BinaryIO:
     """Open a plain file for reading, without waiting for anybody.
 
@@ -123,12 +127,15 @@ def open_plain(path: str | os.PathLike[str], *, follow: bool = True) -> BinaryIO
     Raises
     ------
     UsageError
-        It is not a plain file, or the path is none, such as one with NUL.
+        It is not a plain file, or the path is none, such as one with NUL; it is not there (a FileNotFoundError too).
     OSError
-        It is not there, or cannot be read.
+        It cannot be read.
     """
     name = as_name("path", path)
-    status = os.stat(name, follow_symlinks=follow)
+    try:
+        status = os.stat(name, follow_symlinks=follow)
+    except FileNotFoundError as error:
+        raise MissingFileError(error.errno, error.strerror, name) from None
     _require_plain(name, status)  # a socket cannot be opened, and some devices act when they are
     flags = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
     descriptor = os.open(name, flags if follow else flags | getattr(os, "O_NOFOLLOW", 0))

@@ -5,6 +5,7 @@ A generated package has no parser and is without this file.
 
 from __future__ import annotations
 
+from ..base.texts import shown
 from ..errors import ExpressionError, no_number
 from ..graph.core import Expr, Graph
 from .expressions import parse
@@ -17,14 +18,17 @@ def constant(text: str, what: str) -> float:
     ------
     UsageError
     """
+    allowed = "write numbers, pi and functions of them"
 
     def resolve(name: str) -> Expr:
-        raise ExpressionError(f"{name!r} is not a number", remedy="write numbers, pi and functions of them")
+        if name == text.strip():
+            raise no_number(f"{what} must be a number, not {shown(text)}; {allowed}")
+        raise ExpressionError(f"{name!r} is not a number", remedy=allowed)
 
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise no_number(f"{what} must be a number, not {text!r}: {error}") from None
+        raise no_number(f"{what} must be a number: {error}") from None
     if value is None:
         raise no_number(f"{what} must be a number, not {text!r}")
     return float(value)

@@ -15,7 +15,7 @@ def marker_reference(model: Described, value: Any) -> Any:
         _own(model, value)
         return value.reference
     if isinstance(value, JointHandle):
-        raise ill_placed(f"{value!r} is a joint; a body or a marker is expected")
+        raise ill_placed(f"{value.name} is a joint; a body or a marker is expected")
     return value
 
 
@@ -25,10 +25,14 @@ def joint_reference(model: Described, value: Any) -> Any:
         _own(model, value)
         return value.name
     if isinstance(value, MarkerHandle):
-        raise ill_placed(f"{value!r} is a body or marker; a joint or a coordinate is expected")
+        raise ill_placed(f"{value.label} is a body or marker; a joint or a coordinate is expected")
     return value
 
 
 def _own(model: Described, handle: MarkerHandle | JointHandle) -> None:
     if handle.model is not model:
-        raise ill_placed(f"{handle!r} belongs to the model {handle.model.name!r}, not to {model.name!r}")
+        name = handle.label if isinstance(handle, MarkerHandle) else handle.name
+        other = f"the model {handle.model.name!r}, not to {model.name!r}"
+        if handle.model.name == model.name:
+            other = f"another model that is called {model.name!r} too"
+        raise ill_placed(f"{name} belongs to {other}; use a handle of this model")

@@ -81,10 +81,11 @@ class Fail:
         """The exception, not raised."""
         what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
         names = self._names(name)
-        blame = ""
+        at, blame = place(names, x), ""
         if not np.isfinite(x).all() and names:
-            bad = [n for n, value in zip(names, x, strict=True) if not np.isfinite(value)]
-            blame = f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not"
+            bad = ~np.isfinite(x)
+            given = place([n for n, fault in zip(names, bad, strict=True) if fault], x[bad])
+            at, blame = "", f": {given[2:]} {'is' if bad.sum() == 1 else 'are'} given"
             remedy = "check the state given"
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
@@ -111,7 +112,7 @@ class Fail:
         if status == 1 and name == "jacobian" and not blame:
             remedy += ", or a root of 0, which has no derivative"
         error = STATUS.get(status, EvaluationError)
-        return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
+        return error(f"{name} at t = {t:.6g}{at}: {what}{blame}; {remedy}", t, x)
 
     def _names(self, kernel: str) -> Sequence[str]:
         known = {("q",): self.layout.q, ("q", "v"): self.layout.x, ("q", "v", "a"): self.layout.x + self.layout.a}

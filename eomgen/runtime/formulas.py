@@ -47,7 +47,7 @@ class Formula(Expressed):
 
         def resolve(name: str) -> Expr:
             if name not in known:
-                raise unknown(f"name in {what}", name, known)
+                raise unknown("name", name, known, what)
             return graph.symbol(name)
 
         try:

@@ -131,7 +131,10 @@ class Kernels:
         """Names what a failure at a state is due to, as far as it can be told."""
         from .culprit import find_culprit
 
-        return find_culprit(self, status, t, x, p, u)
+        try:
+            return find_culprit(self, status, t, x, p, u)
+        except UsageError:  # a kernel that would tell was not generated
+            return ""
 
 
 class Missing:

@@ -35,9 +35,9 @@ def plain_name(name: object, instances: Mapping[str, str]) -> Any:
     return undotted(name, instances) if isinstance(name, str) else name
 
 
-def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
+def unknown(what: str, name: object, allowed: Iterable[str], place: str = "") -> UnknownNameError:
     """The error for an unknown name, with near misses or, if there are none, what there is."""
-    return UnknownNameError(f"no {what} {name!r}; {_hint(name, allowed)}")
+    return UnknownNameError(f"{place}{': ' * bool(place)}no {what} {name!r}; {_hint(name, allowed)}")
 
 
 def find_lacking(one: object, kind: str, name: str) -> Any:

@@ -61,6 +61,13 @@ def swung() -> Any:
     return m.compile(target="numpy")
 
 
+def massless_rhs() -> None:
+    m = eg.Model("swing")
+    m.parameter("mass", 1.0)
+    m.revolute("A", m.ground, m.body("rod", mass="mass", com=(0.5, 0, 0)))
+    m.compile(target="numpy", method="newton_euler", kernels=["rhs"]).rhs(0.0, [0, 0], p={"mass": 0})
+
+
 def crank_with(section: str, *given: Any, **values: Any) -> None:
     m = models.build("slider_crank")
     getattr(m, section)(*given, **values)
@@ -141,6 +148,7 @@ CALLS: dict[str, Callable[[], Any]] = {
     "RK4 without step": lambda: crank().simulate(0.1, method="RK4"),
     "a tolerance": lambda: crank().simulate(0.1, rtol=-1.0),
     "a tolerance of words": lambda: crank().simulate(0.1, rtol="fine"),
+    "a tolerance by a formula": lambda: crank().simulate(0.1, rtol="2*fine"),
     "a first step": lambda: crank().simulate(0.1, first_step=2.0),
     "times not in order": lambda: crank().simulate(0.1, t_eval=[0.1, 0.0]),
     "an input unknown": lambda: crank().simulate(0.1, inputs={"taf": 1.0}),
@@ -167,7 +175,10 @@ CALLS: dict[str, Callable[[], Any]] = {
     "a workspace": lambda: crank().workspace(of=["s"], over=3),
     "a grid": lambda: crank().workspace(of=["s"], over={"theta": (0, 1, 10**9)}),
     "projection from afar": lambda: crank().project(np.full(crank().n_x, 1e9)),
-    "a dead centre": lambda: crank().rhs(0.0, np.full(crank().n_x, np.nan)),
+    "a state without numbers": lambda: crank().rhs(0.0, np.full(crank().n_x, np.nan)),
+    "a rate without number": lambda: crank().energy([0.3, 0, 0.4, np.inf, 0, 0]),
+    "a state of a large model": lambda: crank("bricard").energy(np.full(crank("bricard").n_x, np.nan)),
+    "no kernel to tell more": massless_rhs,
     "energies of nothing": lambda: crank().reactions(0.0, [0.0]),
     "a drive": lambda: crank().actuator_forces(0.0, crank().x0(), actuated=["no"]),
     "runs of unequal lengths": lambda: crank().simulate_many(
@@ -175,8 +186,10 @@ CALLS: dict[str, Callable[[], Any]] = {
     ),
     "a reduction": lambda: crank().simulate_many(0.1, initial={"theta": [0, 1]}, reduce="best"),
     "frames": lambda: crank().simulate(0.01).animate("a.xyz"),
+    "a file of a picture": lambda: crank().draw(file="a.png"),
     "a column": lambda: crank().simulate(0.01)["phi"],
     "a time outside": lambda: crank().simulate(0.01, dense_output=True).at(1.0),
+    "a file that is not there": lambda: eg.load("nowhere.yaml"),
     "a file of no kind": lambda: eg.load("robot.xacro"),
     "an example": lambda: eg.load_example("pendulem"),
     "a target": lambda: pendulum().compile(target="fortran"),
@@ -188,6 +201,7 @@ CALLS: dict[str, Callable[[], Any]] = {
     "a keyword": lambda: pendulum().revolute("B", "ground", "rod", axs="z"),
     "a marker": lambda: swing("revolute", "B", "ground", 3),
     "a foreign body": lambda: pendulum().revolute("B", pendulum().body("b"), pendulum().ground),
+    "a body of another model": lambda: pendulum().revolute("B", models.build("slider_crank").ground, pendulum().ground),
     "an attribute of Model": lambda: pendulum().revolut,
     "a body that hangs in the air": lambda: swing("body", "other", mass=1),
     "no inertia": lambda: swing("output", "o", "A", mass=0, inertia=0),
