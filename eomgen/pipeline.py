@@ -203,7 +203,7 @@ def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
         place = min(places, key=lambda place: names.index(place.partition(".")[2]), default=None)
         if place is None:
             raise
-        raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows) from None
+        raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows, error.code) from None
 
 
 @np.errstate(all="ignore")
@@ -255,7 +255,7 @@ def _assemble_start(equations: Derivation) -> list[str]:
         named = next((name for name in more if name in str(error)), more[0] if more else "")
         problem = mechanism.problem(f"initial.{named}" if named else "initial", str(error), code=error.code)
         if isinstance(error, AssemblyError):
-            raise AssemblyError(str(problem), error.rows) from None
+            raise AssemblyError(str(problem), error.rows, error.code) from None
         raise ModelError([problem]) from None
     return []
 

@@ -10,76 +10,77 @@ from pathlib import Path
 import numpy as np
 import pytest
 from model_files import EXAMPLES, SLIDER_CRANK, faults, load
+from refusals import refused
 
 import eomgen as eg
 
-# piece of the slider-crank, what it becomes, then line, path, message and remedy (parts of them)
+# piece of the slider-crank, what it becomes, then line, path, code and what the fault tells
 BROKEN = [
-    ("tip, slider]", "tip, slidr]", 18, "joints.C.between[1]", "no body 'slidr'", "'slider'"),
-    ("body: ground", "body: groun", 22, "forces.k1.between[0].body", "no body 'groun'", "'ground'"),
-    ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "no marker 'tap'", "'tip'"),
-    ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "'2r' is not an identifier", "start with a letter"),
-    ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "a reserved word of Python", "lambda_"),
-    ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "'t' is reserved for the time", "another name"),
-    ("  g: 9.81", "  g: 9.81\n  sqrt: 1", 10, "parameters.sqrt", "'sqrt' is a built-in function", "another name"),
-    ("9.81", "9.81\n  s: 1", 20, "joints.D.coordinate", "'s' is already used by the parameter", "one namespace"),
-    ("  g: 9.81", "  g: 9.81\n  theta_dot: 1", 17, "joints.A.coordinate", "'theta_dot' is already used", "rename one"),
-    ("{tau:", "{g:", 10, "inputs.g", "'g' is already used by the parameter at parameters.g", "rename one"),
-    ("speed: vx", "tau: vx", 23, "outputs.tau", "'tau' is already used by the input", "rename one"),
-    ("speed: vx", "theta: vx", 23, "outputs.theta", "'theta' is a coordinate", "must be theta itself"),
-    ("  D: {type", "  C: {type", 19, "joints.C", "given twice, first in line 18", "rename one"),
-    (" s}", " theta}", 19, "joints.D.coordinate", "'theta' is already used by the coordinate", "rename"),
-    ("value: tau}", "value: tua}", 21, "forces.motor.value", "unknown name 'tua'", "did you mean 'tau'?"),
-    ("com: [l/2, 0, 0]", "com: [ell/2, 0, 0]", 13, "bodies.rod.com[0]", "unknown name 'ell'", "declare a parameter"),
-    ("[l/2", "[theta", 13, "bodies.rod.com[0]", "the coordinate 'theta' cannot be used", "parameters"),
-    ("200", "1 + theta", 22, "forces.k1.stiffness", "the coordinate 'theta' cannot be used", "numbers"),
-    ("value: tau}", "value: ax(rod)}", 21, "forces.motor.value", "the acceleration of a marker 'ax(rod)' cannot", ""),
-    ("200", "x(rod)", 22, "forces.k1.stiffness", "x(...) of a marker cannot be used", "the laws of"),
-    ("axis: x", "axis: w", 19, "joints.D.axis", "'w' is not an axis", "x, y, z, -x, -y, -z or three numbers"),
-    ("axis: x", "axis: [0, 0, 0]", 19, "joints.D.axis", "no length", "three numbers"),
-    ("axis: x", "axs: x", 19, "joints.D.axs", "unknown key", "did you mean 'axis'?"),
-    ("type: prismatic", "type: prismatik", 19, "joints.D.type", "no joint of type 'prismatik'", "'prismatic'"),
-    ("{type: prismatic, ", "{", 19, "joints.D.type", "is missing", "revolute, continuous"),
-    ("between: [ground, slider], axis", "axis", 19, "joints.D.between", "is missing", "two markers"),
-    ("between: [ground, slider], axis", "between: [ground], axis", 19, "joints.D.between", "is not a list of two", ""),
-    ("ground, slider", "rod, rod.tip", 19, "joints.D.between", "same body", "two bodies"),
-    ("crank], c", "crank], sequence: xyz, c", 16, "joints.A.sequence", "has no", ""),
-    ("coordinate: s}", "coordinates: [s, u]}", 19, "joints.D.coordinates", "2 names for a joint of 1", "name all 1"),
-    ("mass: m_s", "mass: -0.5", 14, "bodies.slider.mass", "is -0.5", "0 or more"),
-    ("m_s: {value: 0.5", "m_s: {value: -0.5", 14, "bodies.slider.mass", "-0.5 at the declared values", "0 or more"),
-    ("mass: m_s", "com: [0, 0, 0]", 14, "bodies.slider.mass", "is missing", "a number or an expression"),
-    ("mass: m_s", "mass: heavy stuff", 14, "bodies.slider.mass", "not a valid expression", "allowed are"),
-    ("mass: m_s", "mass: true", 14, "bodies.slider.mass", "True is not a number", ""),
-    ("mass: m_s", "mass: .inf", 14, "bodies.slider.mass", "not a finite number", ""),
-    ("mass: m_s", "mass: m_s, colour: red", 14, "bodies.slider.colour", "unknown key", "allowed: mass, com"),
-    ("slider: {mass: m_s}", "slider: 0.5", 14, "bodies.slider", "is not a mapping", "{key: value"),
-    ("mass: m_s", "mass: 1, inertia: [1, 1, 5]", 14, "bodies.slider.inertia", "exceeds the sum", "centre of mass"),
-    (": m_s", ": 1, inertia: {xx: 1, yy: 1, zz: 1, xy: 3}", 14, "bodies.slider.inertia", "negative principal", "sign"),
-    (": m_s", ": 1, inertia: [[1, r, 0], [0, 1, 0], [0, 0, 1]]", 14, "bodies.slider.inertia", "symmetric", "[j][i]"),
-    ("mass: m_s", "mass: 1, inertia: {zx: 1}", 14, "bodies.slider.inertia.zx", "unknown key", "xz"),
-    ("mass: m_s}", "mass: m_s}\n  spare: {mass: 1}", 15, "bodies.spare", "no chain of joints", "type free"),
-    ("mass: m_s}", "mass: m_s}\n  my-body: {mass: 1}", 15, "bodies.my-body", "not an identifier", "letters"),
-    ("{tip: {at", "{t-p: [0, 0, 0], tip: {at", 13, "bodies.rod.markers.t-p", "not an identifier", "letters"),
-    ("{tip: {at: [l, 0, 0]", "{tip: {at: [l, 0]", 13, "bodies.rod.markers.tip.at", "is not three numbers", ""),
-    ("type: torque", "type: tork", 21, "forces.motor.type", "no force of type 'tork'", "did you mean 'torque'?"),
-    ("joint: A, value", "value", 21, "forces.motor", "joint or body is missing", "joint, body"),
-    ("joint: A, value", "joint: A, body: rod, value", 21, "forces.motor", "both joint and body are", "joint, body"),
-    ("joint: A, value", "joint: AA, value", 21, "forces.motor.joint", "no joint 'AA'", "did you mean 'A'?"),
-    ("stiffness: 200, ", "", 22, "forces.k1.stiffness", "is missing", "a number or an expression"),
-    ("stiffness: 200", "stiffnes: 200", 22, "forces.k1.stiffnes", "unknown key", "did you mean 'stiffness'?"),
-    ("independent: [theta]", "independent: [tetha]", 24, "independent[0]", "no coordinate 'tetha'", "'theta'"),
-    ("independent: [theta]", "independent: [theta, theta]", 24, "independent[1]", "named twice", "once"),
-    ("theta_dot: 10", "thetadot: 10", 25, "initial.thetadot", "no coordinate, velocity or output", "'theta_dot'"),
-    ("theta_dot: 10", "theta_dot: q", 25, "initial.theta_dot", "unknown name 'q'", ""),
-    ("end: 5", "end: -5", 26, "simulation.end", "-5 is not a number greater than 0", ""),
-    ("method: DOP853", "method: DOP85", 26, "simulation.method", "'DOP85' is not known", "did you mean 'DOP853'?"),
-    ("value: 0.1, unit", "value: m_c/2, unit", 4, "parameters.r.value", "'m_c' cannot be used here", "numbers and pi"),
-    ("unit: m, doc", "unit: 3, doc", 4, "parameters.r.unit", "3 is not a text", ""),
-    ("name: slider_crank", "name: slider-crank", 1, "name", "not an identifier", "letters"),
-    ("name: slider_crank", "doc: none", 1, "name", "is missing", "name"),
-    ("independent: [theta]", "independant: [theta]", 24, "independant", "unknown key", "did you mean 'independent'?"),
-    ("[0, -g, 0]", "[0, -g]", 2, "gravity", "is not three numbers", ""),
-    ("[0, -g, 0]", "[0, -g*t, 0]", 2, "gravity[1]", "the time 't' cannot be used here", "parameters"),
+    ("tip, slider]", "tip, slidr]", 18, "joints.C.between[1]", "EG-NAME-UNKNOWN slidr 'slider'?"),
+    ("body: ground", "body: groun", 22, "forces.k1.between[0].body", "EG-NAME-UNKNOWN groun 'ground'?"),
+    ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "EG-EXPRESSION tap 'tip'?"),
+    ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "EG-NAME-FORM '2r'"),
+    ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "EG-NAME-FORM lambda_"),
+    ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "EG-NAME-FORM 't' time"),
+    ("  g: 9.81", "  g: 9.81\n  sqrt: 1", 10, "parameters.sqrt", "EG-NAME-FORM sqrt_"),
+    ("9.81", "9.81\n  s: 1", 20, "joints.D.coordinate", "EG-NAME-TAKEN 's' parameters.s"),
+    ("  g: 9.81", "  g: 9.81\n  theta_dot: 1", 17, "joints.A.coordinate", "EG-NAME-TAKEN 'theta_dot' parameters.theta_dot"),
+    ("{tau:", "{g:", 10, "inputs.g", "EG-NAME-TAKEN 'g' parameters.g"),
+    ("speed: vx", "tau: vx", 23, "outputs.tau", "EG-NAME-TAKEN 'tau' inputs.tau"),
+    ("speed: vx", "theta: vx", 23, "outputs.theta", "EG-NAME-TAKEN 'theta' coordinate"),
+    ("  D: {type", "  C: {type", 19, "joints.C", "EG-FILE-DAMAGED 18"),
+    (" s}", " theta}", 19, "joints.D.coordinate", "EG-NAME-TAKEN theta"),
+    ("value: tau}", "value: tua}", 21, "forces.motor.value", "EG-NAME-UNKNOWN tua 'tau'?"),
+    ("com: [l/2, 0, 0]", "com: [ell/2, 0, 0]", 13, "bodies.rod.com[0]", "EG-NAME-UNKNOWN ell"),
+    ("[l/2", "[theta", 13, "bodies.rod.com[0]", "EG-REFERENCE theta"),
+    ("200", "1 + theta", 22, "forces.k1.stiffness", "EG-REFERENCE theta"),
+    ("value: tau}", "value: ax(rod)}", 21, "forces.motor.value", "EG-REFERENCE ax(rod)"),
+    ("200", "x(rod)", 22, "forces.k1.stiffness", "EG-EXPRESSION x(...)"),
+    ("axis: x", "axis: w", 19, "joints.D.axis", "EG-TYPE w"),
+    ("axis: x", "axis: [0, 0, 0]", 19, "joints.D.axis", "EG-RANGE length"),
+    ("axis: x", "axs: x", 19, "joints.D.axs", "EG-NAME-UNKNOWN 'axis'?"),
+    ("type: prismatic", "type: prismatik", 19, "joints.D.type", "EG-CHOICE prismatik 'prismatic'?"),
+    ("{type: prismatic, ", "{", 19, "joints.D.type", "EG-MISSING revolute"),
+    ("between: [ground, slider], axis", "axis", 19, "joints.D.between", "EG-MISSING"),
+    ("between: [ground, slider], axis", "between: [ground], axis", 19, "joints.D.between", "EG-TYPE two"),
+    ("ground, slider", "rod, rod.tip", 19, "joints.D.between", "EG-REFERENCE rod rod.tip"),
+    ("crank], c", "crank], sequence: xyz, c", 16, "joints.A.sequence", "EG-NAME-UNKNOWN revolute 'sequence'"),
+    ("coordinate: s}", "coordinates: [s, u]}", 19, "joints.D.coordinates", "EG-SHAPE 2 1"),
+    ("mass: m_s", "mass: -0.5", 14, "bodies.slider.mass", "EG-INERTIA -0.5"),
+    ("m_s: {value: 0.5", "m_s: {value: -0.5", 14, "bodies.slider.mass", "EG-INERTIA -0.5"),
+    ("mass: m_s", "com: [0, 0, 0]", 14, "bodies.slider.mass", "EG-MISSING"),
+    ("mass: m_s", "mass: heavy stuff", 14, "bodies.slider.mass", "EG-EXPRESSION heavy*stuff"),
+    ("mass: m_s", "mass: true", 14, "bodies.slider.mass", "EG-TYPE True"),
+    ("mass: m_s", "mass: .inf", 14, "bodies.slider.mass", "EG-NUMBER inf"),
+    ("mass: m_s", "mass: m_s, colour: red", 14, "bodies.slider.colour", "EG-NAME-UNKNOWN mass, com"),
+    ("slider: {mass: m_s}", "slider: 0.5", 14, "bodies.slider", "EG-TYPE mapping"),
+    ("mass: m_s", "mass: 1, inertia: [1, 1, 5]", 14, "bodies.slider.inertia", "EG-INERTIA 5"),
+    (": m_s", ": 1, inertia: {xx: 1, yy: 1, zz: 1, xy: 3}", 14, "bodies.slider.inertia", "EG-INERTIA -2"),
+    (": m_s", ": 1, inertia: [[1, r, 0], [0, 1, 0], [0, 0, 1]]", 14, "bodies.slider.inertia", "EG-INERTIA symmetric"),
+    ("mass: m_s", "mass: 1, inertia: {zx: 1}", 14, "bodies.slider.inertia.zx", "EG-NAME-UNKNOWN xz"),
+    ("mass: m_s}", "mass: m_s}\n  spare: {mass: 1}", 15, "bodies.spare", "EG-TOPOLOGY"),
+    ("mass: m_s}", "mass: m_s}\n  my-body: {mass: 1}", 15, "bodies.my-body", "EG-NAME-FORM"),
+    ("{tip: {at", "{t-p: [0, 0, 0], tip: {at", 13, "bodies.rod.markers.t-p", "EG-NAME-FORM"),
+    ("{tip: {at: [l, 0, 0]", "{tip: {at: [l, 0]", 13, "bodies.rod.markers.tip.at", "EG-TYPE three"),
+    ("type: torque", "type: tork", 21, "forces.motor.type", "EG-CHOICE tork 'torque'?"),
+    ("joint: A, value", "value", 21, "forces.motor", "EG-CONFLICT missing joint body"),
+    ("joint: A, value", "joint: A, body: rod, value", 21, "forces.motor", "EG-CONFLICT both joint body"),
+    ("joint: A, value", "joint: AA, value", 21, "forces.motor.joint", "EG-NAME-UNKNOWN AA 'A'?"),
+    ("stiffness: 200, ", "", 22, "forces.k1.stiffness", "EG-MISSING"),
+    ("stiffness: 200", "stiffnes: 200", 22, "forces.k1.stiffnes", "EG-NAME-UNKNOWN 'stiffness'?"),
+    ("independent: [theta]", "independent: [tetha]", 24, "independent[0]", "EG-NAME-UNKNOWN tetha 'theta'?"),
+    ("independent: [theta]", "independent: [theta, theta]", 24, "independent[1]", "EG-CONFLICT 'theta'"),
+    ("theta_dot: 10", "thetadot: 10", 25, "initial.thetadot", "EG-NAME-UNKNOWN 'theta_dot'?"),
+    ("theta_dot: 10", "theta_dot: q", 25, "initial.theta_dot", "EG-NAME-UNKNOWN q"),
+    ("end: 5", "end: -5", 26, "simulation.end", "EG-TYPE -5"),
+    ("method: DOP853", "method: DOP85", 26, "simulation.method", "EG-CHOICE DOP85 'DOP853'?"),
+    ("value: 0.1, unit", "value: m_c/2, unit", 4, "parameters.r.value", "EG-REFERENCE m_c"),
+    ("unit: m, doc", "unit: 3, doc", 4, "parameters.r.unit", "EG-TYPE 3"),
+    ("name: slider_crank", "name: slider-crank", 1, "name", "EG-NAME-FORM 'slider-crank'"),
+    ("name: slider_crank", "doc: none", 1, "name", "EG-MISSING"),
+    ("independent: [theta]", "independant: [theta]", 24, "independant", "EG-NAME-UNKNOWN 'independent'?"),
+    ("[0, -g, 0]", "[0, -g]", 2, "gravity", "EG-TYPE three"),
+    ("[0, -g, 0]", "[0, -g*t, 0]", 2, "gravity[1]", "EG-REFERENCE t"),
 ]
 
 
@@ -88,17 +89,10 @@ def changed(old: str, new: str, text: str = SLIDER_CRANK) -> str:
     return text.replace(old, new)
 
 
-@pytest.mark.parametrize(("old", "new", "line", "path", "message", "remedy"), BROKEN, ids=lambda x: str(x)[:30])
-def test_each_fault(old: str, new: str, line: int, path: str, message: str, remedy: str, tmp_path: Path) -> None:
-    problems = faults(tmp_path, changed(old, new))
-    found = [p for p in problems if p.path == path]
-    assert found, [str(p) for p in problems]
-    problem = next((p for p in found if message in p.message), found[0])
-    assert message in problem.message
-    assert remedy in problem.remedy
-    assert problem.file == str(tmp_path / "model.yaml")
-    assert problem.line == line, str(problem)
-    assert str(problem).startswith(f"{problem.file}:{line}: {path}: ")
+@pytest.mark.parametrize(("old", "new", "line", "path", "demand"), BROKEN, ids=lambda x: str(x)[:30])
+def test_each_fault(old: str, new: str, line: int, path: str, demand: str, tmp_path: Path) -> None:
+    with refused(f"{demand} {tmp_path / 'model.yaml'}:{line}: {path}:"):
+        load(tmp_path, changed(old, new)).check()
 
 
 def test_one_fault_is_reported_once(tmp_path: Path) -> None:
@@ -217,38 +211,33 @@ def test_faults_name_the_line_of_the_call() -> None:
 
 # -- files that are no model ------------------------------------------------------------------------------------------
 REFUSED = {
-    "alias": ("name: a\ngravity: &g [0, 0, 0]\nindependent: *g\n", 2, "the anchor &g"),
-    "undefined alias": ("name: *nothing\n", 1, "the alias *nothing"),
-    "tag": ("name: a\ndoc: !!python/object/apply:os.system [ls]\n", 2, "the tag"),
-    "duplicate key": ("name: a\nname: b\n", 2, "given twice, first in line 1"),
-    "deep brackets": ("gravity: " + "[" * 5000, 1, "nested too deeply"),
-    "deep blocks": ("".join(" " * k + "a:\n" for k in range(200)), None, "nested too deeply"),
-    "key that is a list": ("? [a, b]\n: 1\n", 1, "a key is not a name"),
-    "merge key": ("name: a\n<<: {doc: b}\n", 2, "unknown key"),
-    "two documents": ("name: a\n---\nname: b\n", 3, "a second YAML document"),
-    "empty": ("# nothing\n", 1, "the file is empty"),
-    "list": ("- a\n", 1, "is not a mapping"),
-    "tab": ("name: a\n\tdoc: b\n", 2, "not YAML"),
-    "open quote": ('name: a\ndoc: "b\n', 3, "not YAML"),
-    "control character": ("name: a\ndoc: \x01\n", 2, "not YAML"),
-    "section of the wrong kind": ("name: a\nbodies: [b, c]\n", 2, "is not a mapping"),
-    "text that a comma cut": ("name: a\nparameters: {r: {doc: length (m, in x)}}\n", 2, "needs quotes"),
-    "too many values": ("name: a\nindependent: [" + "a," * 120_000 + "a]\n", None, "too many values"),
-    "too large": ("# " + "x" * 2_000_000, None, "too large"),
+    "alias": ("name: a\ngravity: &g [0, 0, 0]\nindependent: *g\n", "EG-FILE-DAMAGED :2: gravity &g"),
+    "undefined alias": ("name: *nothing\n", "EG-FILE-DAMAGED :1: name *nothing"),
+    "tag": ("name: a\ndoc: !!python/object/apply:os.system [ls]\n", "EG-FILE-DAMAGED :2: doc tag"),
+    "duplicate key": ("name: a\nname: b\n", "EG-FILE-DAMAGED :2: name line 1"),
+    "deep brackets": ("gravity: " + "[" * 5000, "EG-TOO-LARGE :1: nested 12"),
+    "deep blocks": ("".join(" " * k + "a:\n" for k in range(200)), "EG-TOO-LARGE nested 12"),
+    "key that is a list": ("? [a, b]\n: 1\n", "EG-FILE-DAMAGED :1: file key"),
+    "merge key": ("name: a\n<<: {doc: b}\n", "EG-NAME-UNKNOWN :2: <<"),
+    "two documents": ("name: a\n---\nname: b\n", "EG-FILE-DAMAGED :3: second"),
+    "empty": ("# nothing\n", "EG-FILE-DAMAGED :1: empty"),
+    "list": ("- a\n", "EG-FILE-DAMAGED :1: mapping"),
+    "tab": ("name: a\n\tdoc: b\n", "EG-FILE-DAMAGED :2: \\t"),
+    "open quote": ('name: a\ndoc: "b\n', "EG-FILE-DAMAGED :3: YAML"),
+    "control character": ("name: a\ndoc: \x01\n", "EG-FILE-DAMAGED :2: YAML"),
+    "section of the wrong kind": ("name: a\nbodies: [b, c]\n", "EG-TYPE :2: bodies names"),
+    "text that a comma cut": ("name: a\nparameters: {r: {doc: length (m, in x)}}\n", "EG-NAME-UNKNOWN :2: parameters.r.in x) quotes"),
+    "too many values": ("name: a\nindependent: [" + "a," * 120_000 + "a]\n", "EG-TOO-LARGE values"),
+    "too large": ("# " + "x" * 2_000_000, "EG-TOO-LARGE 1000000"),
 }
-
-
 SLOW = pytest.param("too many values", marks=pytest.mark.thorough)
 
 
 @pytest.mark.parametrize("case", [SLOW if case == "too many values" else case for case in REFUSED])
 def test_refused(case: str, tmp_path: Path) -> None:
-    text, line, message = REFUSED[case]
-    problems = faults(tmp_path, text)
-    found = [p for p in problems if message in str(p)]
-    assert found, [str(p)[:500] for p in problems]
-    assert line is None or found[0].line == line
-    assert found[0].file.endswith("model.yaml")
+    text, demand = REFUSED[case]
+    with refused(f"{demand} model.yaml"):
+        load(tmp_path, text).check()
 
 
 def test_faults_of_the_file_and_of_the_model_come_together(tmp_path: Path) -> None:
@@ -259,7 +248,7 @@ def test_faults_of_the_file_and_of_the_model_come_together(tmp_path: Path) -> No
 def test_not_text(tmp_path: Path) -> None:
     path = tmp_path / "binary.yaml"
     path.write_bytes(b"name: a\ndoc: \xff\xfe\n")
-    with pytest.raises(eg.ModelError, match=r"binary.yaml:2: file: is not UTF-8 text"):
+    with refused("EG-FILE-DAMAGED binary.yaml:2: file: UTF-8"):
         eg.load(path)
 
 
@@ -273,14 +262,12 @@ def disc(joint: str, **keys: str) -> eg.Model:
 
 
 def test_a_disc_that_lies_flat_at_the_start_is_reported_with_the_remedy() -> None:
-    with pytest.raises(
-        eg.AssemblyError, match=r"constraints\.r: .*not finite.*the disc lies flat.*tilt the disc in initial"
-    ):
+    with refused("EG-NOT-FINITE constraints.r: flat initial"):
         disc("free").check()
 
 
 def test_a_disc_that_can_only_lie_flat_is_refused() -> None:
-    with pytest.raises(eg.ModelError, match=r"constraints\.r: d always lies flat"):
+    with refused("EG-UNDEFINED constraints.r: d flat"):
         disc("revolute").check()
 
 
@@ -290,7 +277,7 @@ def test_a_disc_that_has_fallen_flat_is_named() -> None:
     module = m.compile(target="numpy")
     x = np.zeros(module.n_x)
     x[module.x_names.index("f_e0")] = 1.0
-    with pytest.raises(eg.EvaluationError, match=r"constraint 'r': the disc lies flat"):
+    with refused("EG-NOT-FINITE 'r' flat"):
         module.rhs(0.0, x)
 
 
@@ -343,21 +330,17 @@ FINE = [
     four_bar("theta: 1.0, theta_dot: 3"),
     four_bar("psi: 1.0, psi_dot: 3"),
 ]
-WRONG = [  # the text, and the place and the words of the fault
-    (arm("tip_x: 3"), "initial.tip_x", "cannot close with tip_x = 3"),  # the rod is 1 m long
-    (arm("x(rod.tip): 3"), "initial.x(rod.tip)", "cannot close"),
-    (arm("q: 0.3, tip_x: 0.1"), "initial.tip_x", "inconsistent"),
-    (arm("q: 0, tip_vx: 1"), "initial.tip_vx", "inconsistent"),  # it moves across x there
-    (arm("tip_ax: 1"), "initial.tip_ax", "depends on accelerations"),
-    (arm("square: 1"), "initial.square", "not linearly"),
-    (arm("q: k", value=""), "parameters.k", "has no value"),
-    (arm("A_e0: 0.5, A_e1: 0.5", BALL), "", "length 0.707107, not 1"),
-    (
-        four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"),
-        "initial.theta_dot",
-        "velocities theta_dot = 1, psi_dot = 100",
-    ),
-    (four_bar("theta: 1.0, psi: 0.1"), "joints.C", "inconsistent"),
+WRONG = [  # the text, and the code, the place and the values that the fault tells
+    (arm("tip_x: 3"), "EG-LOOP-OPEN initial.tip_x: 3 2 1"),  # the rod is 1 m long
+    (arm("x(rod.tip): 3"), "EG-LOOP-OPEN initial.x(rod.tip): 3 2 1"),
+    (arm("q: 0.3, tip_x: 0.1"), "EG-LOOP-OPEN initial.tip_x: 0.1 0.955336"),
+    (arm("q: 0, tip_vx: 1"), "EG-CONTRADICTION initial.tip_vx: 1"),  # it moves across x there
+    (arm("tip_ax: 1"), "EG-UNSUPPORTED initial.tip_ax: accelerations"),
+    (arm("square: 1"), "EG-UNSUPPORTED initial.square: velocities"),
+    (arm("q: k", value=""), "EG-MISSING parameters.k:"),
+    (arm("A_e0: 0.5, A_e1: 0.5", BALL), "EG-CONTRADICTION A_e0 0.707107"),
+    (four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"), "EG-CONTRADICTION initial.theta_dot: psi_dot 100"),
+    (four_bar("theta: 1.0, psi: 0.1"), "EG-LOOP-OPEN joints.C: theta psi 0.1"),
 ]
 
 
@@ -369,21 +352,19 @@ def test_check_and_run_accept(text: str, tmp_path: Path) -> None:
     assert not any("not checked" in note for note in m.check().notes)
 
 
-@pytest.mark.parametrize(("text", "place", "said"), WRONG)
+@pytest.mark.parametrize(("text", "demand"), WRONG)
 @pytest.mark.filterwarnings("ignore")
-def test_check_and_run_refuse(text: str, place: str, said: str, tmp_path: Path) -> None:
+def test_check_and_run_refuse(text: str, demand: str, tmp_path: Path) -> None:
     m = load(tmp_path, text)
     with pytest.raises(eg.EomgenError):
         m.compile(target="numpy").simulate((0, 1e-3))
-    with pytest.raises((eg.AssemblyError, eg.ModelError)) as told:
+    with refused(demand):
         m.check()
-    assert place in str(told.value)
-    assert said in str(told.value)
 
 
 def test_a_start_beyond_a_limit_is_noted_as_a_run_warns(tmp_path: Path) -> None:
     mod = load(tmp_path, arm("q: 2")).compile(target="numpy")
-    with pytest.warns(UserWarning, match="passes limits of joints: q upper 1"):
+    with pytest.warns(UserWarning, match="q upper 1"):
         mod.simulate((0, 1e-3))
     (note,) = (note for note in load(tmp_path, arm("q: 2")).check().notes if "limit" in note)
     assert note.startswith("q starts at 2, beyond its upper limit 1")
