@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -37,3 +37,9 @@ def refused(demand: str, kind: type[Exception] = eg.EomgenError) -> Iterator[pyt
     faults = [(p.code, str(p)) for p in getattr(error, "problems", ())] or [(error.code, str(error))]
     lacking = [[value for value in values if not tells(text, value)] for known, text in faults if known == code]
     assert [] in lacking, f"{demand}: {min(lacking, key=len, default=code)} not in {faults}"
+
+
+def refuses(demand: str, call: Callable[..., object], /, *given: Any, **keys: Any) -> None:
+    """Demand such an error of one call."""
+    with refused(demand):
+        call(*given, **keys)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from .near_names import unknown
 from .room import read_number, with_numbers
 from .show_parts import load_show
 
@@ -62,7 +63,11 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    x, t = with_numbers("x", x), read_number("t", t)
+    x, t, layout = with_numbers("x", x), read_number("t", t), model.layout
+    known = (*layout.q, *layout.loops, *layout.v, *layout.loop_rates, *layout.y)
+    for name in named:
+        if name not in (*known, *layout.p) and name.isidentifier():  # a place of a marker is none
+            raise unknown("argument of draw or coordinate", name, ("ax", "t", "names", "axes", *known))
     drawn: Axes = load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
     return drawn
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base.texts import shown
 from ..errors import at_odds, ill_shaped, ill_typed, no_number
-from ..runtime.near_names import unknown
 from .branch_views import telling_values, telling_view
 from .build_scene import build_scene
 from .data import Array
@@ -56,11 +55,6 @@ def draw(
         if x is not None and not isinstance(x, Mapping):
             raise at_odds(f"give either a state or values by name, not both; {', '.join(named)} came beside {shown(x)}")
         x = {**(x or {}), **named}
-        layout = module.layout
-        known = (*layout.q, *layout.loops, *layout.v, *layout.loop_rates, *layout.y)
-        for name in named:
-            if name not in (*known, *layout.p) and name.isidentifier():  # a place of a marker is none
-                raise unknown("argument of draw or coordinate", name, ("ax", "t", "names", "axes", *known))
     scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
     return draw_scene(scene, ax)
 

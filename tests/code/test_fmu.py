@@ -17,6 +17,7 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
+from refusals import refuses
 from sweeps import part_of
 
 import eomgen as eg
@@ -276,8 +277,7 @@ def test_names_units_and_start_values(tmp_path: Path) -> None:
 def test_impacts_are_refused_by_name(tmp_path: Path) -> None:
     m = ball()
     m.event("gap", "h - 0.5", restitution=0.5)
-    with pytest.raises(eg.ModelError, match=r"events\.gap\.restitution: an FMU cannot hold an impact; describe"):
-        m.derive().write_fmu(tmp_path / "m.fmu")
+    refuses("EG-UNSUPPORTED events.gap.restitution FMU", lambda: m.derive().write_fmu(tmp_path / "m.fmu"))
     assert not list(tmp_path.iterdir())
 
 
@@ -305,10 +305,8 @@ def test_the_command_replaces_its_own_file_alone(tmp_path: Path) -> None:
 
 def test_wrong_names_and_versions(tmp_path: Path) -> None:
     equations = ball().derive()
-    with pytest.raises(eg.UsageError, match=r"no version '4' of FMI here; there are 2\.0, 3\.0"):
-        equations.write_fmu(tmp_path / "x.fmu", "4")
-    with pytest.raises(eg.UsageError, match=r"ends in \.fmu"):
-        equations.write_fmu(tmp_path / "x.zip")
+    refuses("EG-CHOICE 4 FMI 2.0 3.0", equations.write_fmu, tmp_path / "x.fmu", "4")
+    refuses("EG-FILE .fmu", equations.write_fmu, tmp_path / "x.zip")
 
 
 # Before a unit runs: start values, what follows from them, and its derivatives.

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import sympy
 from force_judges import TREE_METHODS, P, Q, Seen, Wrench, problems, read_back
+from refusals import refused, refuses
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS
 from sympy.physics import biomechanics
@@ -396,11 +397,9 @@ def test_a_force_that_is_undefined_is_named(target: str) -> None:
     mod = m.compile(target=target, **({} if target == "numpy" else {"optimize": 0}))
     for s, name in ((0.0, "oil"), (1.0, "strut"), (2.0, "balls"), (-6.0, "root")):
         for call in (mod.rhs, mod.jacobian):
-            with pytest.raises(eg.NonFiniteError, match=f"the loads of {name} are not"):
-                call(0.0, np.array([s, 0.5]))
+            refuses(f"EG-NOT-FINITE {name}", call, 0.0, np.array([s, 0.5]))
     assert np.isfinite(mod.rhs(0.0, np.array([3.0, 0.5]))).all()
-    with pytest.raises(eg.NonFiniteError, match="the loads of oil are not"):
-        mod.simulate((0, 1), initial={"s": 0.0, "s_dot": 1.0})
+    refuses("EG-NOT-FINITE oil", mod.simulate, (0, 1), initial={"s": 0.0, "s_dot": 1.0})
 
 
 @pytest.mark.quick
@@ -467,8 +466,7 @@ def test_an_angle_between_axes_that_do_not_stay_in_line_is_refused() -> None:
     b = m.body("b", mass=1, inertia=(1, 1, 1))
     m.spherical("ball", m.ground, b)
     m.torsional_element("motor", m.ground, b, law="-rate")
-    with pytest.raises(eg.ModelError, match=r"forces.motor: the z axes of its two markers do not stay in line"):
-        m.compile(target="numpy")
+    refuses("EG-UNDEFINED forces.motor", m.compile, target="numpy")
 
 
 def test_a_torque_on_a_length_is_a_force_in_newton() -> None:
@@ -486,16 +484,12 @@ def test_a_torque_on_a_length_is_a_force_in_newton() -> None:
 def test_a_force_on_a_joint_is_refused_with_the_remedy(tmp_path: Path) -> None:
     m, _ = slider()
     m.force("push", "s", (1, 0, 0))
-    with pytest.raises(
-        eg.ModelError, match=r"forces\.push\.marker: a force acts at a marker, and 's' is not a marker; .*torque"
-    ):
-        m.check()
+    refuses("EG-TYPE forces.push.marker s", m.check)
     m, b = slider()
     handle = m.revolute("r", b, m.body("c", mass=1))
-    with pytest.raises(eg.UsageError, match="'push' acts at a marker.*use torque or actuator"):
-        m.force("push", handle, (1, 0, 0))
+    refuses("EG-TYPE push", m.force, "push", handle, (1, 0, 0))
     file = tmp_path / "slider.yaml"
     file.write_text(slider()[0].to_yaml() + "forces: {push: {type: force, joint: s, value: 3}}\n")
-    with pytest.raises(eg.ModelError, match=r"forces\.push\.joint: a force acts at a marker") as caught:
+    with refused("EG-TYPE forces.push.joint") as caught:
         eg.load(file).check()
     assert len(caught.value.problems) == 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from force_judges import differences, read_back
+from refusals import refuses
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
@@ -177,14 +177,14 @@ def test_the_same_in_python_and_in_a_file(tmp_path: Any) -> None:
 @pytest.mark.parametrize(
     ("outputs", "law", "message"),
     [
-        ({"h": "ax(b.tip)"}, "-h", "the output 'h' depends on the acceleration 'ax(b.tip)'"),
-        ({"h": "2*g", "g": "h + 1"}, "-h", "depends on itself: h -> g -> h"),
-        ({}, "ax(b.tip)", "the acceleration of a marker 'ax(b.tip)' cannot be used here"),
-        ({}, "angle(a, b.tip)", "the z axes of the two markers of angle(a, b.tip) do not stay in line"),
-        ({}, "distance(a)", "distance() takes two markers"),
-        ({}, "x(a, in=c)", "no body 'c'"),
-        ({}, "x(a, at=b)", "x() takes no at="),
-        ({}, "x(a, from=com)", "the centre of mass of all bodies is no marker"),
+        ({"h": "ax(b.tip)"}, "-h", "EG-REFERENCE forces.M.value h ax(b.tip)"),
+        ({"h": "2*g", "g": "h + 1"}, "-h", "EG-CIRCLE outputs.h h -> g -> h"),
+        ({}, "ax(b.tip)", "EG-REFERENCE forces.M.value ax(b.tip)"),
+        ({}, "angle(a, b.tip)", "EG-UNDEFINED forces.M b.tip"),
+        ({}, "distance(a)", "EG-EXPRESSION forces.M.value"),
+        ({}, "x(a, in=c)", "EG-EXPRESSION forces.M.value c"),
+        ({}, "x(a, at=b)", "EG-EXPRESSION forces.M.value at="),
+        ({}, "x(a, from=com)", "EG-EXPRESSION forces.M.value"),
     ],
 )
 def test_what_a_law_cannot_know(outputs: dict[str, str], law: str, message: str) -> None:
@@ -192,8 +192,7 @@ def test_what_a_law_cannot_know(outputs: dict[str, str], law: str, message: str)
     for name, text in outputs.items():
         m.output(name, text)
     m.torque("M", "A", law)
-    with pytest.raises(eg.ModelError, match=re.escape(message)):
-        m.derive()
+    refuses(message, m.derive)
 
 
 def machine() -> tuple[eg.Model, dict[str, Any]]:
@@ -296,25 +295,23 @@ def test_a_law_may_use_the_force_of_another_element() -> None:
 @pytest.mark.parametrize(
     ("law", "message"),
     [
-        ("force(spring2)", "no force element 'spring2'"),
-        ("force(load)", "'load' does not act along a path; power(load) is known of every element"),
-        ("force(extra)", "algebraic loop between laws: force(extra) -> force(extra)"),
-        ("force(1 + k)", "force() takes the name of one force element"),
+        ("force(spring2)", "EG-EXPRESSION forces.extra.value spring2"),
+        ("force(load)", "EG-UNSUPPORTED forces.extra.value load"),
+        ("force(extra)", "EG-CIRCLE forces.extra"),
+        ("force(1 + k)", "EG-EXPRESSION forces.extra.value"),
     ],
 )
 def test_what_cannot_be_requested(law: str, message: str) -> None:
     m, _ = machine()
     m.torque("extra", "A", law)
-    with pytest.raises(eg.ModelError, match=re.escape(message)):
-        m.derive()
+    refuses(message, m.derive)
 
 
 def test_laws_that_use_each_other_are_refused() -> None:
     m, _ = machine()
     m.torque("one", "A", "force(two)")
     m.torque("two", "B", "0.5*force(one)")
-    with pytest.raises(eg.ModelError, match=r"algebraic loop between laws: force\(two\) -> force\(one\)"):
-        m.derive()
+    refuses("EG-CIRCLE forces.two", m.derive)
 
 
 def test_forces_in_components() -> None:
@@ -383,12 +380,10 @@ def test_the_derivative_of_drag_at_rest_is_zero(law: str) -> None:
 )
 def test_what_has_no_derivative_is_refused_by_the_call_that_takes_it(force: tuple[str, str, str]) -> None:
     mod = falling(*force).compile(target="numpy")
-    with pytest.raises(eg.NonFiniteError, match="jacobian at t = 0.*a root of 0, which has no derivative"):
-        mod.jacobian(0.0, np.zeros(6))
+    refuses("EG-NOT-FINITE jacobian 0", mod.jacobian, 0.0, np.zeros(6))
     if "vz(b) +" not in force[2] and "cos" not in force[2]:
         for method in ("Radau", "BDF"):
-            with pytest.raises(eg.SimulationError, match="Last failure: jacobian at t = 0"):
-                mod.simulate(1.0, method=method)
+            refuses("EG-STALLED jacobian 0", mod.simulate, 1.0, method=method)
         assert np.isfinite(mod.simulate(0.5).x).all()
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from force_judges import problems
+from refusals import refuses
 
 import eomgen as eg
 
@@ -119,8 +119,7 @@ def test_the_law_of_hertz_needs_radii() -> None:
     body = m.body("b", mass=1, inertia=(1e-3,) * 3)
     m.prismatic("x", m.ground, body, axis="x")
     m.sphere_sphere("touch", m.ground, body, radii=(0, 0.1), **STEEL)
-    with pytest.raises(eg.ModelError, match=r"radii\[0\]: is 0; the law of Hertz from moduli needs both radii"):
-        m.derive()
+    refuses("EG-RANGE forces.touch.radii[0]", m.derive)
 
 
 def test_a_stop_with_the_linear_law() -> None:
@@ -135,22 +134,22 @@ def test_a_stop_with_the_linear_law() -> None:
 
 
 WRONG = [
-    ({"stiffness": 1, "normal_law": "cubic"}, "normal_law", "cubic"),
-    ({"normal_law": "linear"}, "stiffness", "is missing"),
-    ({"normal_law": "linear", "stiffness": 1, "dissipation": 2}, "dissipation", "has no meaning in normal_law: linear"),
-    ({"stiffness": 1, "damping": 2}, "damping", "belongs to normal_law: linear"),
-    ({"normal_law": "hertz", "stiffness": 1, "exponent": 1.2}, "exponent", "is 3/2 in the law of Hertz"),
-    ({"normal_law": "hertz"}, "stiffness", "give it, or moduli and poisson"),
-    ({**STEEL, "stiffness": 1}, "stiffness", "follows from moduli"),
-    ({"normal_law": "hertz", "moduli": (1e9, 1e9)}, "poisson", "is missing; give moduli and poisson together"),
-    ({**STEEL, "poisson": (0.3, 0.7)}, "poisson[1]", "is 0.7"),
+    ({"stiffness": 1, "normal_law": "cubic"}, "EG-CHOICE normal_law: cubic"),
+    ({"normal_law": "linear"}, "EG-MISSING stiffness:"),
+    ({"normal_law": "linear", "stiffness": 1, "dissipation": 2}, "EG-CONFLICT dissipation: normal_law"),
+    ({"stiffness": 1, "damping": 2}, "EG-CONFLICT damping: normal_law"),
+    ({"normal_law": "hertz", "stiffness": 1, "exponent": 1.2}, "EG-CONFLICT exponent: 3/2"),
+    ({"normal_law": "hertz"}, "EG-MISSING stiffness:"),
+    ({**STEEL, "stiffness": 1}, "EG-CONFLICT stiffness:"),
+    ({"normal_law": "hertz", "moduli": (1e9, 1e9)}, "EG-MISSING poisson:"),
+    ({**STEEL, "poisson": (0.3, 0.7)}, "EG-RANGE poisson[1]: 0.7"),
 ]
 
 
-@pytest.mark.parametrize(("law", "place", "told"), WRONG)
-def test_what_is_wrong_with_a_law_is_reported(law: dict[str, Any], place: str, told: str) -> None:
+@pytest.mark.parametrize(("law", "told"), WRONG)
+def test_what_is_wrong_with_a_law_is_reported(law: dict[str, Any], told: str) -> None:
     for bulk in (False, True):
-        assert told in problems(ball(law, bulk))[f"forces.touch.{place}"]
+        refuses(told, ball(law, bulk).derive)
 
 
 def test_shapes_without_a_radius_take_no_moduli() -> None:
@@ -159,8 +158,7 @@ def test_shapes_without_a_radius_take_no_moduli() -> None:
     m.free("j", m.ground, body)
     rod = {"shape": "capsule", "on": body, "length": 0.2, "radius": 0.02}
     m.contacts("touch", rod, {"shape": "half_space", "on": m.ground}, STEEL)
-    with pytest.raises(eg.ModelError, match="a capsule has no radius for Hertz's law from moduli; give stiffness"):
-        m.derive()
+    refuses("EG-CONFLICT forces.touch.first", m.derive)
 
 
 def test_units_of_the_linear_law() -> None:
@@ -171,5 +169,4 @@ def test_units_of_the_linear_law() -> None:
         if right:
             m.derive()
         else:
-            with pytest.raises(eg.ModelError, match="stiffness"):
-                m.derive()
+            refuses("EG-DIMENSION forces.touch.stiffness", m.derive)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from force_judges import differences, read_back
+from refusals import refuses
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS
 
@@ -182,12 +183,12 @@ def test_file_components_and_states(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("reaction(B).x", "no joint 'B'.*known: A"),
-        ("reaction(A)", r"a reaction has several parts.*write reaction\(joint\).part"),
-        ("reaction(A).q", "a reaction has no part 'q'"),
-        ("reaction(A, in=rod).size", "the part size does not depend on axes"),
-        ("multiplier(C)", "no constraint or joint 'C'"),
-        ("multiplier(A)", "'A' has no equation.*joints have equations where they close a loop"),
+        ("reaction(B).x", "EG-EXPRESSION outputs.N.expression B A"),
+        ("reaction(A)", "EG-EXPRESSION outputs.N.expression reaction(joint).part"),
+        ("reaction(A).q", "EG-EXPRESSION outputs.N.expression q part"),
+        ("reaction(A, in=rod).size", "EG-EXPRESSION outputs.N.expression size"),
+        ("multiplier(C)", "EG-EXPRESSION outputs.N.expression C"),
+        ("multiplier(A)", "EG-NAME-UNKNOWN outputs.N.expression A"),
     ],
 )
 def test_what_is_wrong_is_reported(text: str, told: str) -> None:
@@ -195,8 +196,7 @@ def test_what_is_wrong_is_reported(text: str, told: str) -> None:
     rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
     m.revolute("A", m.ground, rod)
     m.output("N", text)
-    with pytest.raises(eg.ModelError, match=told):
-        m.compile(target="numpy")
+    refuses(told, m.compile, target="numpy")
 
 
 def test_a_force_that_can_let_go_is_judged_while_it_has_let_go() -> None:
@@ -210,8 +210,7 @@ def test_a_force_that_can_let_go_is_judged_while_it_has_let_go() -> None:
     m.torque("pull", "x", m.input("pull", -1.0))
     mod = m.compile(target="numpy")
     assert mod.rhs(0.0, np.zeros(4))[2] == pytest.approx(-0.5, rel=1e-14)
-    with pytest.raises(eg.NonFiniteError, match="Painleve"):
-        mod.rhs(0.0, np.array([1.5, 0.0, 0.0, 0.0]))
+    refuses("EG-NOT-FINITE Painleve", mod.rhs, 0.0, np.array([1.5, 0.0, 0.0, 0.0]))
 
 
 def door() -> eg.Model:
@@ -229,8 +228,7 @@ def test_what_two_hinges_share_is_refused_by_name(joint: str) -> None:
     for part in ("x", "z", "my", "size"):
         m = door()
         m.output("o", f"reaction({joint}).{part}")
-        with pytest.raises(eg.ModelError, match=rf"outputs\.o.*reaction\({joint}\)\.{part} is undetermined.*spherical"):
-            m.derive()
+        refuses(f"EG-UNDETERMINED outputs.o {joint} {part}", m.derive)
     m = door()
     m.output("o", f"reaction({joint}).mz")
     assert m.compile(target="numpy").outputs(0.0, [0.3, 2.0]) == pytest.approx(0.0, abs=1e-12)
@@ -247,8 +245,7 @@ def test_laws_refuse_what_two_hinges_share(place: str) -> None:
         m.event("breaks", f"{load} - 30")
     else:
         m.state("wear", load)
-    with pytest.raises(eg.ModelError, match="h2.*undetermined"):
-        m.compile(target="numpy")
+    refuses("EG-UNDETERMINED h2", m.compile, target="numpy")
 
 
 def test_tension_of_a_rope_over_a_massless_pulley():
@@ -374,5 +371,4 @@ def test_a_law_of_too_many_pieces_is_named() -> None:
     m.prismatic("A", m.ground, m.body("b", mass=1.0, inertia={"zz": 0.1}), axis="x")
     product = "*".join(f"max({k}, reaction(A).y)" for k in range(1, 8))
     m.force("f", "b", (0, f"0.001*{product}", 0))
-    with pytest.raises(eg.ModelError, match=r"forces.f: its law of a reaction has more than 64 pieces.*sum of terms"):
-        m.compile(target="numpy")
+    refuses("EG-TOO-LARGE forces.f 64", m.compile, target="numpy")

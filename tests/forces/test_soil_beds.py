@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from force_judges import differences
+from refusals import refuses
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from sweeps import seeds
@@ -325,21 +326,20 @@ def test_momentum_targets_jacobian_and_rebound_parameters() -> None:
 @pytest.mark.parametrize(
     ("shape", "bed", "law", "told"),
     [
-        (WHEEL, {"cells": 0}, {"soil": "dry_sand"}, "cells"),
-        (WHEEL, {}, {"soil": "dry_sand", "lateral": False}, "lateral.*has no meaning for a bed"),
-        (WHEEL, {}, {"soil": "dry_sand", "peak_angle": [0.4, 0.3]}, "peak_angle"),
-        ({"shape": "circle", "radius": 0.5}, {}, {"stiffness": 1e5}, "belongs to soil"),
-        ({"shape": "box", "size": (1, 1)}, {}, {"soil": "dry_sand"}, "box"),
+        (WHEEL, {"cells": 0}, {"soil": "dry_sand"}, "EG-RANGE forces.soil.second[0].cells: 0"),
+        (WHEEL, {}, {"soil": "dry_sand", "lateral": False}, "EG-CONFLICT forces.soil.lateral:"),
+        (WHEEL, {}, {"soil": "dry_sand", "peak_angle": [0.4, 0.3]}, "EG-CONFLICT forces.soil.peak_angle:"),
+        ({"shape": "circle", "radius": 0.5}, {}, {"stiffness": 1e5}, "EG-CONFLICT forces.soil.second:"),
+        ({"shape": "box", "size": (1, 1)}, {}, {"soil": "dry_sand"}, "EG-CONFLICT forces.soil.first: box"),
         (WHEEL, {}, {"soil": "own", "sinkage_exponent": 1, "cohesive_modulus": 1e3, "frictional_modulus": 1e6,
-                     "cohesion": 0, "friction_angle": 0.5, "shear_modulus": 0.01}, "recovery"),
+                     "cohesion": 0, "friction_angle": 0.5, "shear_modulus": 0.01}, "EG-MISSING forces.soil.recovery:"),
     ],
 )  # fmt: skip
 def test_what_is_refused(shape: Any, bed: Any, law: Any, told: str) -> None:
     m = eg.Model("bed")
     m.planar("j", m.ground, m.body("b", mass=1.0, inertia={"zz": 1.0}))
     m.contacts("soil", {**shape, "on": "b"}, {"shape": "bed", "on": m.ground, "length": 2.0, "cells": 5, **bed}, law)
-    with pytest.raises(eg.ModelError, match=f"(?s){told}"):
-        m.derive()
+    refuses(told, m.derive)
 
 
 # -- drives -----------------------------------------------------------------------------------------------------------

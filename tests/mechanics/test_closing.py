@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -117,12 +118,12 @@ def test_closing_by_ida() -> None:
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"closes": "x2 - x3"}, "constraints.latch.closes: unknown name 'x3'"),
-        ({"closes": "x1_ddot"}, "constraints.latch.closes: the acceleration 'x1_ddot'"),
-        ({"closes": "x1", "releases": ["lach"]}, r"constraints.latch.releases\[0\]: 'lach' is no other constraint"),
-        ({"closes": "t > 1"}, "constraints.latch.closes: 't > 1' is a comparison.*1 - t for"),
-        ({"closes": "2*size - 1"}, "constraints.latch.closes: .* is constant"),
-        ({"closes": "x1", "stabilisation": "size - 2"}, "constraints.latch.stabilisation: is 0; must be greater"),
+        ({"closes": "x2 - x3"}, "EG-NAME-UNKNOWN constraints.latch.closes x3"),
+        ({"closes": "x1_ddot"}, "EG-REFERENCE constraints.latch.closes x1_ddot"),
+        ({"closes": "x1", "releases": ["lach"]}, "EG-NAME-UNKNOWN constraints.latch.releases[0] lach"),
+        ({"closes": "t > 1"}, "EG-EXPRESSION constraints.latch.closes 1"),
+        ({"closes": "2*size - 1"}, "EG-EXPRESSION constraints.latch.closes"),
+        ({"closes": "x1", "stabilisation": "size - 2"}, "EG-RANGE constraints.latch.stabilisation 0"),
     ],
 )
 def test_what_is_wrong_is_reported(keys: dict[str, object], told: str) -> None:
@@ -131,8 +132,7 @@ def test_what_is_wrong_is_reported(keys: dict[str, object], told: str) -> None:
     for name in ("x1", "x2"):
         m.prismatic(name, m.ground, m.body(f"b_{name}", mass=2.0), axis="x")
     m.coupling("latch", {"x1": 1, "x2": -1}, **keys)
-    with pytest.raises(eg.ModelError, match=told):
-        m.check()
+    refuses(told, m.check)
 
 
 # -- Joints ------------------------------------------------------------------------------------------------------------
@@ -258,13 +258,10 @@ simulation: {end: 2}
     run = eg.load(file).compile(target="numpy").simulate()
     assert run["A_dot"][-1] == pytest.approx((J1 * W1 + J2 * W2) / (J1 + J2), rel=1e-12)
     file.write_text(text.replace("closes: 1 - t", "closes: 1 < t"))
-    with pytest.raises(eg.ModelError, match=r"joints.S.closes: '1 < t' is a comparison"):
-        eg.load(file).check()
+    refuses("EG-EXPRESSION joints.S.closes 1", lambda: eg.load(file).check())
     file.write_text(text.replace("closes: 1 - t, opens: 3 - t", "stabilisation: 3"))
-    with pytest.raises(eg.ModelError, match=r"joints.S: is neither closed nor opened"):
-        eg.load(file).check()
+    refuses("EG-MISSING joints.S", lambda: eg.load(file).check())
     m = eg.Model("w")
     m.weld("W", m.ground, m.body("c", mass=1))
     m.lock("brake", "W", closes="1 - t")
-    with pytest.raises(eg.ModelError, match=r"constraints.brake.joint: 'W' has no coordinates to lock"):
-        m.check()
+    refuses("EG-REFERENCE constraints.brake.joint W", m.check)

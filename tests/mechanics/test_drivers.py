@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.interpolate
 from models import rotation
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -122,26 +123,19 @@ def slider_crank(value: str = "10*t", l: float = 0.3, r: float = 0.1, e: float =
 @pytest.mark.parametrize(
     ("second", "said"),
     [
-        (("A", "11*t"), r"d2 is off by 0.01 rad at t = 0.01 s"),  # contradicts a little later
-        (("A", "0.2 + 10*t"), r"d2 is off by 0.2 rad at t = 0 s"),
-        (("D", "0.3 + 0.1*t"), r"d2 is off by 0.1 m at t = 0 s"),
+        (("A", "11*t"), "0.01 rad"),  # contradicts a little later
+        (("A", "0.2 + 10*t"), "0.2 rad"),
+        (("D", "0.3 + 0.1*t"), "0.1 m"),
     ],
 )
 def test_contradictory_drivers_are_reported_by_name_and_residual(second: tuple[str, str], said: str) -> None:
     m = slider_crank()
     m.driver("d2", *second)
-    with pytest.raises(
-        eg.ModelError, match=f"constraints.d2: .*over-driven: it has 1 degree.*drive moves it.*{said}"
-    ) as e:
-        m.check()
-    assert "remove one of drive, d2" in str(e.value)
+    refuses(f"EG-CONTRADICTION constraints.d2: 1 drive {said} d2,", m.check)
 
 
 def test_a_driver_out_of_reach_is_reported() -> None:
-    with pytest.raises(
-        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*off \(drive by .* rad\); give the drivers"
-    ):
-        slider_crank("1.5 + t", l=0.2, r=0.3).check()
+    refuses("EG-CONTRADICTION constraints.drive C.r_y drive", lambda: slider_crank("1.5 + t", l=0.2, r=0.3).check())
 
 
 # -- Published ---------------------------------------------------------------------------------------------------------
@@ -238,10 +232,7 @@ def lever() -> tuple[eg.Model, eg.Body]:
 def test_a_driver_of_a_distance_that_no_motion_changes() -> None:
     m, a = lever()
     m.driver("d", between=[m.ground.at(0, 0, 0), a.at(1, 0, 0)], value="1 + 0.1*t")
-    with pytest.raises(
-        eg.ModelError, match="has no effect: no motion of the mechanism changes the quantity that it prescribes"
-    ):
-        m.check()
+    refuses("EG-REDUNDANT constraints.d", m.check)
 
 
 # -- Corners and ends --------------------------------------------------------------------------------------------------
@@ -255,7 +246,4 @@ def driven(value: str) -> eg.Model:
 
 def test_a_motion_that_ends_is_reported_as_such() -> None:
     mod = driven("sqrt(1 - t)").compile(target="numpy")
-    with pytest.raises(
-        eg.SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a division by zero, or a root"
-    ):
-        mod.simulate((0, 2))
+    refuses("EG-STALLED 1 motor", mod.simulate, (0, 2))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from refusals import refused, refuses
 from sweeps import TARGETS, part_of
 
 import eomgen as eg
@@ -50,15 +51,12 @@ def test_planar_four_bar_of_spatial_joints_loses_the_rows_that_vanish() -> None:
 
 
 def test_open_loop_is_an_assembly_error_that_names_the_joint() -> None:
-    with pytest.raises(eg.AssemblyError, match=r"[ABCD]\.r_"):
-        crank_rocker(d=0.5).derive()
+    refuses("EG-LOOP-OPEN .r_", lambda: crank_rocker(d=0.5).derive())
 
 
 def test_bad_independent_coordinates_are_refused() -> None:
-    with pytest.raises(eg.ModelError, match=r"independent.*'thet'.*did you mean 'theta'"):
-        crank_rocker().derive(independent=["thet"])
-    with pytest.raises(eg.ModelError, match="1 degree of freedom;"):
-        crank_rocker().derive(independent=["theta", "phi"])
+    refuses("EG-NAME-UNKNOWN independent thet 'theta'?", lambda: crank_rocker().derive(independent=["thet"]))
+    refuses("EG-PARTITION independent 1", lambda: crank_rocker().derive(independent=["theta", "phi"]))
 
 
 def four_bar_and_wheel() -> eg.Model:
@@ -79,10 +77,8 @@ def four_bar_and_wheel() -> eg.Model:
 def test_coordinates_that_cannot_be_independent_together_are_refused() -> None:
     model = four_bar_and_wheel()
     model.revolute("F", model.ground, model.body("x", mass=1, inertia={"zz": 0.3}), coordinate="f")
-    with pytest.raises(eg.ModelError, match="q, s cannot vary independently of each other"):
-        model.derive(independent=["q", "s"])
-    with pytest.raises(eg.ModelError, match="e: named twice"):
-        model.derive(independent=["e", "e_dot"])
+    refuses("EG-PARTITION independent q", model.derive, independent=["q", "s"])
+    refuses("EG-PARTITION independent e", model.derive, independent=["e", "e_dot"])
     model.independent("C_dot", "f")  # as linearize takes them
     assert model.derive().independent == ("C", "e", "f")
 
@@ -99,7 +95,7 @@ def test_rank_needs_no_parameter_values() -> None:
     assert equations.report.assumed
     assert equations.report.degrees_of_freedom == 1
     assert equations.mass_matrix.shape == (1, 1)
-    with pytest.raises(eg.ModelError, match=r"parameters\.l: has no value") as caught:
+    with refused("EG-MODEL parameters.l") as caught:
         equations.compile()
     assert [p.path for p in caught.value.problems] == ["parameters.r", "parameters.l"]
 
@@ -142,11 +138,7 @@ def test_contradictory_constraints_are_named_with_their_gap() -> None:
     m = four_bar((0.3, 0.9, 0.7, 0.8))
     for name, length in (("one", 0.8), ("two", 0.9)):
         m.distance(name, m.bodies["crank"].at(0.15, 0, 0), m.bodies["rocker"].at(0.35, 0, 0), length)
-    with pytest.raises(eg.AssemblyError, match="contradict each other") as caught:
-        m.derive()
-    assert "one.length" in str(caught.value)
-    assert "two.length" in str(caught.value)
-    assert "remove one of them" in str(caught.value)
+    refuses("EG-LOOP-OPEN one.length two.length", m.derive)
 
 
 # -- Other independent coordinates -------------------------------------------------------------------------------------
@@ -239,12 +231,10 @@ def test_it_moves_as_with_one_weld(target: str) -> None:
 @pytest.mark.parametrize("target", TARGETS)
 def test_rebound_values_that_open_it_are_refused(target: str) -> None:
     mod = twice_welded().compile(target=target)
-    with pytest.raises(eg.AssemblyError, match=r"W1\.r_x \(off by 0\.1\) can never hold: no coordinate changes it"):
-        mod.simulate(0.1, initial={"theta": 0.3}, parameters={"l3": 0.4})
+    refuses("EG-LOOP-OPEN W1.r_x 0.1", mod.simulate, 0.1, initial={"theta": 0.3}, parameters={"l3": 0.4})
     bound = mod.bind(p={"l3": 0.4})
     for call in (lambda: bound.rhs(0, np.zeros(2)), lambda: bound.project(np.zeros(2))):
-        with pytest.raises(eg.ProjectionError, match=r"largest residual at W1\.r_x, 0\.1"):
-            call()
+        refuses("EG-PROJECTION W1.r_x 0.1", call)
     agreeing = mod.bind(p={"l3": 0.4, "l1": 0.2})
     assert np.isfinite(agreeing.rhs(0, np.zeros(2))).all()
 
@@ -252,13 +242,12 @@ def test_rebound_values_that_open_it_are_refused(target: str) -> None:
 x, x_dot, d, t, u = sp.symbols("x x_dot d t u")
 
 
-@pytest.mark.parametrize(("row", "what"), [(sp.sin(t) - d * t, "depends on t"), (u - 1, "depends on u")])
+@pytest.mark.parametrize(("row", "what"), [(sp.sin(t) - d * t, "t"), (u - 1, "u")])
 def test_rows_of_time_or_inputs_alone_are_refused(row: sp.Expr, what: str) -> None:
     m = eg.Model.from_lagrangian(
         "of_time", x_dot**2 / 2, [x], constraints=[row], parameters={"d": 1.0} if row.has(d) else {}, inputs={"u": 1.0}
     )
-    with pytest.raises(eg.ModelError, match=f"{what} but on no coordinate, so no motion can satisfy it"):
-        m.check()
+    refuses(f"EG-CONTRADICTION lagrangian.constraints: constraint_1 {what}", m.check)
 
 
 @pytest.mark.parametrize("start", [{}, {"x_1": 1.0, "y_2": 0.5}])
@@ -269,8 +258,7 @@ def test_a_constraint_that_is_a_square_is_named(distance: str, start: dict[str, 
     kinetic = " + ".join(f"{name}_dot**2/2" for name in names)
     model = eg.Model.from_lagrangian("points", kinetic, names, constraints=[distance])
     model.initial(**start)
-    with pytest.raises(eg.ModelError, match=r"constraint_1 is 0 only where it is least.*write each component"):
-        model.check()
+    refuses("EG-REDUNDANT lagrangian.constraints constraint_1 0", model.check)
     components = eg.Model.from_lagrangian("points", kinetic, names, constraints=["x_1 - x_2", "y_1 - y_2"])
     assert components.check().degrees_of_freedom == 2
 
@@ -289,8 +277,7 @@ def out_of_plane(offset: float) -> eg.Model:
 
 @pytest.mark.parametrize("offset", [1e-9, 1e-4, 5e-3])
 def test_a_gap_across_the_plane_is_reported(offset: float) -> None:
-    with pytest.raises(eg.AssemblyError, match=r"C\.r_z"):
-        out_of_plane(offset).derive()
+    refuses("EG-LOOP-OPEN C.r_z", lambda: out_of_plane(offset).derive())
 
 
 # -- Bodies out of the plane -------------------------------------------------------------------------------------------

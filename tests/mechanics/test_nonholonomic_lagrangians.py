@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from refusals import refuses
 
 import eomgen as eg
 
@@ -68,25 +69,18 @@ def test_holonomic_and_nonholonomic_rows_together_and_driven() -> None:
         np.testing.assert_allclose(J, np.array(slopes).T, atol=1e-6 * np.abs(J).max())
     states = modules[0].project(np.random.default_rng(2).uniform(0.3, 0.9, (6, 4)), t=0.3)
     np.testing.assert_allclose(modules[0].rhs(0.3, states), modules[1].rhs(0.3, states), rtol=1e-10)
-    with pytest.raises(eg.UsageError, match="nonholonomic constraints restrict velocities but not positions"):
-        _ = modules[0].minimal
+    refuses("EG-UNSUPPORTED nonholonomic", getattr, modules[0], "minimal")
 
 
 def test_dependent_velocities_given_too_are_an_error() -> None:
     module = knife_edge().compile(target="numpy")
-    with pytest.raises(eg.AssemblyError, match="y_dot = 0.5 cannot be reached.*across a blade.*give x_dot or phi_dot"):
-        module.x0(x_dot=1.0, y_dot=0.5, phi_dot=0.0)
+    refuses("EG-CONTRADICTION y_dot 0.5 x_dot phi_dot", module.x0, x_dot=1.0, y_dot=0.5, phi_dot=0.0)
 
 
 @pytest.mark.parametrize(
     ("text", "fault"),
-    [
-        ("x_dot**2 - y_dot", "is not linear in the velocities"),
-        ("sin(x_dot)", "not linear"),
-        ("x_ddot", "cannot be used"),
-    ],
+    [("x_dot**2 - y_dot", "EG-EXPRESSION"), ("sin(x_dot)", "EG-EXPRESSION"), ("x_ddot", "EG-REFERENCE 'x_ddot'")],
 )
 def test_other_constraints_are_refused_by_name(text: str, fault: str) -> None:
     model = eg.Model.from_lagrangian("s", "x_dot**2 + y_dot**2", ["x", "y"], constraints=[text])
-    with pytest.raises(eg.ModelError, match=rf"lagrangian.constraints\[0\].*{fault}"):
-        model.derive()
+    refuses(f"{fault} lagrangian.constraints[0]:", model.derive)

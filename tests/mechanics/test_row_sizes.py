@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -129,8 +130,7 @@ def test_a_relation_that_cancels_at_the_declared_values_is_refused_where_it_stan
     m.parameter("k1", k1)
     m.parameter("k2", k2)
     m.coupling("none", equation="(3*k1 - k2)*sin(A)")
-    with pytest.raises(eg.ModelError, match=r"constraints.none: none.equation holds nothing with the declared k1, k2"):
-        m.check()
+    refuses("EG-REDUNDANT constraints.none none.equation k1 k2", m.check)
 
 
 # -- Far from the origin -----------------------------------------------------------------------------------------------
@@ -207,8 +207,7 @@ def test_what_rounding_leaves_of_a_zero_is_no_inertia(target, polar):
     m.revolute("phi", m.ground, a, axis="z")
     m.revolute("theta", a, b, axis="x")
     mod = m.compile(target=target)
-    with pytest.raises(eg.SingularMassMatrixError, match="phi"):
-        mod.rhs(0.0, mod.x0(theta=polar))
+    refuses("EG-SINGULAR phi", lambda: mod.rhs(0.0, mod.x0(theta=polar)))
     assert np.isfinite(mod.rhs(0.0, mod.x0(theta=polar + 1e-6))).all()  # sizes 1 and 1e-12
 
 

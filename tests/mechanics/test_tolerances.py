@@ -13,6 +13,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from refusals import refused
 
 import eomgen as eg
 
@@ -36,7 +37,7 @@ def test_rows_that_agree_to_ten_digits_are_met_halfway_and_no_others() -> None:
     for gap in (1e-11, 1e-10):
         assert mod.bind(p={"gap": gap}).project(start)[0] == pytest.approx(gap / 2, abs=1e-15)
     for gap in (1e-9, 1e-6, 0.1):
-        with pytest.raises(eg.ProjectionError, match="largest residual"):
+        with refused("EG-PROJECTION residual"):
             mod.bind(p={"gap": gap}).project(start)
 
 
@@ -52,7 +53,7 @@ def test_chosen_coordinates_may_move_others_fast() -> None:
     kernels = ["rhs", "project", "mass_matrix", "kinematics", "constraint_jacobian", "constraints"]
     mod = slides({"x": 1, "y": 1e-7}).compile(target="numpy", independent=["x", "z"], kernels=kernels)
     np.testing.assert_allclose(mod.kinematics([0.0, 0.2], [1.0, 0.0])[1], [1.0, -1e7, 0.0], rtol=1e-9)
-    with pytest.raises(eg.ModelError, match="x, z cannot move the mechanism"):
+    with refused("EG-PARTITION independent x"):
         slides({"x": 1, "y": 3e-9}).compile(target="numpy", independent=["x", "z"], kernels=kernels)
 
 

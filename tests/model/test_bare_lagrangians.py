@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from model_files import load
+from refusals import refused, refuses
 from sympy.physics.mechanics import dynamicsymbols
 
 import eomgen as eg
@@ -68,8 +69,7 @@ def test_parameters_are_found_and_values_are_needed() -> None:
 
 def test_faults_of_a_lagrangian() -> None:
     q, z = dynamicsymbols("q z")
-    with pytest.raises(eg.ModelError, match=r"lagrangian.coordinates\[1\]: q\(t\)\*\*2 is not a coordinate"):
-        eg.Model.from_lagrangian("p", q, [q, q**2])
+    refuses("EG-TYPE lagrangian.coordinates[1] q(t)**2", eg.Model.from_lagrangian, "p", q, [q, q**2])
     bad = eg.Model.from_lagrangian(
         "p", q.diff() ** 2 + z + q.diff().diff(), [q], forces={z: 1}, constraints=[sympy.gamma(q)]
     )
@@ -85,10 +85,8 @@ def test_faults_of_a_lagrangian() -> None:
 def test_a_clash_of_names() -> None:
     v = sympy.Symbol("q_dot")
     clash = eg.Model.from_lagrangian("p", v**2, ["q"], inputs={"q_dot": 1})
-    with pytest.raises(eg.ModelError, match="'q_dot' is already used"):
-        clash.check()
-    with pytest.raises(eg.ModelError, match="there are no coordinates; name at least one"):
-        eg.Model.from_lagrangian("p", v**2, []).check()
+    refuses("EG-NAME-TAKEN lagrangian.coordinates[0] q_dot", clash.check)
+    refuses("EG-MISSING lagrangian.coordinates", lambda: eg.Model.from_lagrangian("p", v**2, []).check())
 
 
 def test_faults_of_a_file_have_their_lines(tmp_path: Path) -> None:
@@ -101,9 +99,7 @@ def test_faults_of_a_file_have_their_lines(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["a_dot**4/4 - a**2/2", "-sqrt(1 - a_dot**2)", "sin(a_dot)*a"])
 def test_a_lagrangian_that_is_not_quadratic_in_the_velocities_is_named(text: str) -> None:
-    with pytest.raises(
-        eg.ModelError, match=r"lagrangian.expression: is not quadratic in the velocities.*a_dot; write T"
-    ):
+    with refused("EG-EXPRESSION lagrangian.expression a_dot T"):
         eg.Model.from_lagrangian("powers", text, ["a"]).derive()
 
 
@@ -188,8 +184,7 @@ def test_a_name_that_is_taken_is_reported() -> None:
     m.input("u")
     m.parameter("u_ddot", 1.0)
     m.driver("lead", coordinate="s", value="u")
-    with pytest.raises(eg.ModelError, match=r"u_ddot.*rate of input 'u', whose rate the driver 'lead' needs"):
-        m.check()
+    refuses("EG-NAME-TAKEN parameters.u_ddot u lead", m.check)
 
 
 REEL = """
@@ -209,7 +204,7 @@ def test_an_expression_over_time_brings_its_rates(tmp_path: Path) -> None:
     assert np.abs(run["l_dot"] - 6.0 * run.t).max() < 1e-12
     assert abs(mod.simulate(1.0, start, inputs={"l": "1 + t"}, **tight)["th_dot"][-1] - 0.25) < 1e-9
     assert mod.simulate(1.0, start, inputs={"l": 2.0})["th_dot"][-1] == 1.0
-    with pytest.raises(eg.ModelError, match="l_dot is needed, but the signal depends on 'th_dot', whose rate is not"):
+    with refused("EG-UNSUPPORTED inputs.l.signal th_dot l_dot"):
         load(tmp_path, REEL.replace("1 + k*t**2", "1 + th_dot")).check()
 
 
@@ -224,7 +219,6 @@ def test_what_jumps_in_time_by_a_condition_is_refused(factor: str, jumps: bool) 
     m.prismatic("s", m.ground, m.body("b", mass=1), axis="x")
     m.coupling("led", equation=f"s - 0.1*({factor})")
     if jumps:
-        with pytest.raises(eg.ModelError, match=r"constraints.led: the constraint 'led' .* makes it jump"):
-            m.check()
+        refuses("EG-JUMP constraints.led", m.check)
     else:
         assert m.check().degrees_of_freedom == 0

@@ -11,6 +11,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_files import load, schema_faults
+from refusals import refused, refuses
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
@@ -95,58 +96,56 @@ def test_points_add_to_a_body() -> None:
     np.testing.assert_allclose(alone, wanted, rtol=0, atol=1e-13)
 
 
-def refused(**given: Any) -> dict[str, tuple[str, str]]:
+def faults_of(**given: Any) -> dict[str, tuple[str, str]]:
     with pytest.raises(eg.ModelError) as error:
         model_of(**given).check()
     return {p.path: (p.message, p.remedy) for p in error.value.problems}
 
 
 def test_ways_that_exclude_each_other_are_reported_at_once() -> None:
-    found = refused(mass=1, com=(0, 0, 0), first_moment=(0, 0, 0), inertia=(1, 1, 1), principal=(1, 1, 1))
+    found = faults_of(mass=1, com=(0, 0, 0), first_moment=(0, 0, 0), inertia=(1, 1, 1), principal=(1, 1, 1))
     assert set(found) == {"bodies.b.first_moment", "bodies.b.principal"}
-    found = refused(solids=[{"type": "sphere", "radius": 1, "mass": 1}], mass=1, com=(0, 0, 0), about="origin")
+    found = faults_of(solids=[{"type": "sphere", "radius": 1, "mass": 1}], mass=1, com=(0, 0, 0), about="origin")
     assert set(found) == {"bodies.b.mass", "bodies.b.com", "bodies.b.about"}
 
 
 @pytest.mark.parametrize(
-    ("given", "path", "message"),
+    ("given", "demand"),
     [
-        ({"com": (0, 0, 0)}, "mass", "is missing"),
-        ({"inertia": (1, 1, 1), "points": [{"mass": 1}]}, "mass", "is missing"),
-        ({"mass": 1, "axes": (0, 0, 0)}, "axes", "without an inertia"),
-        ({"mass": 1, "inertia": (1, 1, 1), "about": "tp"}, "about", "no marker 'tp'"),
-        ({"mass": 1, "inertia": (1, 1, 1), "about": 3}, "about", "is not com, origin"),
-        ({"mass": 1, "inertia": (1, 1, 1), "about": "tip", "axes": (0, 0, 1)}, "axes", "beside a marker"),
-        ({"mass": 1, "principal": np.eye(3)}, "principal", "is not three numbers"),
-        ({"mass": 0, "first_moment": (1, 0, 0)}, "first_moment", "without mass"),
-        ({"mass": 1, "points": [{"at": (1, 0, 0)}]}, "points[0].mass", "is missing"),
-        ({"mass": 1, "points": {"mass": 1}}, "points", "is not a list of points"),
-        ({"mass": 1, "inertia": [[1, 2, 0], [0, 1, 0], [0, 0, 1]], "axes": (1, 0, 0)}, "inertia", "not symmetric"),
-        ({"mass": 1, "check_inertia": "no"}, "check_inertia", "true or false"),
+        ({"com": (0, 0, 0)}, "EG-MISSING mass:"),
+        ({"inertia": (1, 1, 1), "points": [{"mass": 1}]}, "EG-MISSING mass:"),
+        ({"mass": 1, "axes": (0, 0, 0)}, "EG-MISSING axes: inertia"),
+        ({"mass": 1, "inertia": (1, 1, 1), "about": "tp"}, "EG-NAME-UNKNOWN about: 'tip'?"),
+        ({"mass": 1, "inertia": (1, 1, 1), "about": 3}, "EG-TYPE about: 3"),
+        ({"mass": 1, "inertia": (1, 1, 1), "about": "tip", "axes": (0, 0, 1)}, "EG-CONFLICT axes:"),
+        ({"mass": 1, "principal": np.eye(3)}, "EG-TYPE principal: three"),
+        ({"mass": 0, "first_moment": (1, 0, 0)}, "EG-NO-INERTIA first_moment:"),
+        ({"mass": 1, "points": [{"at": (1, 0, 0)}]}, "EG-MISSING points[0].mass:"),
+        ({"mass": 1, "points": {"mass": 1}}, "EG-TYPE points: list"),
+        ({"mass": 1, "inertia": [[1, 2, 0], [0, 1, 0], [0, 0, 1]], "axes": (1, 0, 0)}, "EG-INERTIA inertia: symmetric"),
+        ({"mass": 1, "check_inertia": "no"}, "EG-TYPE check_inertia: 'no'"),
     ],
     ids=str,
 )
-def test_faults(given: dict, path: str, message: str) -> None:
-    assert message in refused(**given)[f"bodies.b.{path}"][0]
+def test_faults(given: dict, demand: str) -> None:
+    refuses(demand, lambda: model_of(**given).check())
 
 
 IMPOSSIBLE = [
-    ({"mass": -1}, "mass", "is -1"),
-    ({"mass": 1, "inertia": (1, 1, 2.5)}, "inertia", "exceeds the sum of the others"),
-    ({"mass": 1, "principal": (1, 5, 1), "axes": (1, 2, 3)}, "inertia", "exceeds the sum of the others"),
-    ({"mass": 1, "inertia": (1, 1, -0.1)}, "inertia", "negative principal moment"),
-    ({"mass": 1, "inertia": {"xx": 1, "yy": 1, "zz": 1, "xy": 1.5}}, "inertia", "negative principal moment"),
-    ({"mass": 1, "com": (1, 0, 0), "inertia": (0.5, 0.5, 0.5), "about": "origin"}, "inertia", "negative principal"),
-    ({"mass": 1, "com": (1, 0, 0), "inertia": {"zz": 0.5}, "about": "origin"}, "inertia", "moment about the centre"),
-    ({"mass": 1, "inertia": {"zz": -0.5}}, "inertia", "moment about the centre"),
+    ({"mass": -1}, "EG-INERTIA mass: -1"),
+    ({"mass": 1, "inertia": (1, 1, 2.5)}, "EG-INERTIA inertia: 2.5"),
+    ({"mass": 1, "principal": (1, 5, 1), "axes": (1, 2, 3)}, "EG-INERTIA inertia: 5"),
+    ({"mass": 1, "inertia": (1, 1, -0.1)}, "EG-INERTIA inertia: -0.1"),
+    ({"mass": 1, "inertia": {"xx": 1, "yy": 1, "zz": 1, "xy": 1.5}}, "EG-INERTIA inertia: -0.5"),
+    ({"mass": 1, "com": (1, 0, 0), "inertia": (0.5, 0.5, 0.5), "about": "origin"}, "EG-INERTIA inertia: -0.5"),
+    ({"mass": 1, "com": (1, 0, 0), "inertia": {"zz": 0.5}, "about": "origin"}, "EG-INERTIA inertia: -0.5"),
+    ({"mass": 1, "inertia": {"zz": -0.5}}, "EG-INERTIA inertia: -0.5"),
 ]
 
 
-@pytest.mark.parametrize(("given", "path", "message"), IMPOSSIBLE, ids=str)
-def test_an_impossible_body_is_refused_unless_the_check_is_off(given: dict[str, Any], path: str, message: str) -> None:
-    said, remedy = refused(**given)[f"bodies.b.{path}"]
-    assert message in said
-    assert "check_inertia: note" in remedy
+@pytest.mark.parametrize(("given", "demand"), IMPOSSIBLE, ids=str)
+def test_an_impossible_body_is_refused_unless_the_check_is_off(given: dict[str, Any], demand: str) -> None:
+    refuses(f"{demand} check_inertia:", lambda: model_of(**given).check())
     for of_model in (False, True):
         m = eg.Model("off", check_inertia=not of_model)
         m.weld("J", m.ground, m.body("b", **given, **({} if of_model else {"check_inertia": False})))
@@ -182,10 +181,9 @@ def test_parameters_decide_at_their_declared_values_and_later() -> None:
         m.parameter("J", value)
         m.free("W", m.ground, m.body("b", mass=1, inertia=(1, 1, "J")))
         if not fine:
-            with pytest.raises(eg.ModelError, match="exceeds the sum"):
-                m.check()
+            refuses("EG-INERTIA bodies.b.inertia", m.check)
             continue
-        with pytest.raises(eg.ParameterError, match="exceeds the sum"):
+        with refused("EG-RANGE bodies.b.inertia", eg.ParameterError):
             m.compile(target="numpy", kernels=["mass_matrix"]).bind(p={"J": 3.0})
 
 
@@ -279,21 +277,20 @@ def test_a_matrix_of_numbers_and_one_of_expressions() -> None:
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"axes": {"x": "x"}}, "is not a mapping of two of x, y, z"),
-        ({"axes": {"x": "x", "w": "y"}}, "is not a mapping of two of x, y, z"),
-        ({"axes": {"x": "x", "y": (1, 1, 0)}}, "the directions of x and y are not at right angles"),
-        ({"matrix": np.eye(2)}, "is not a list of rows"),
-        ({"matrix": 2 * np.eye(3)}, "is not a rotation"),
-        ({"matrix": np.diag([1, 1, -1])}, "is not a rotation"),
-        ({"matrix": np.eye(3), "rpy": (0, 0, 1)}, "rpy is given too"),
-        ({"matrix": np.eye(3), "axes": {"x": "x", "y": "y"}}, "axes is given too"),
+        ({"axes": {"x": "x"}}, "EG-TYPE bodies.ground.markers.m.axes"),
+        ({"axes": {"x": "x", "w": "y"}}, "EG-TYPE bodies.ground.markers.m.axes"),
+        ({"axes": {"x": "x", "y": (1, 1, 0)}}, "EG-RANGE bodies.ground.markers.m.axes"),
+        ({"matrix": np.eye(2)}, "EG-TYPE bodies.ground.markers.m.matrix"),
+        ({"matrix": 2 * np.eye(3)}, "EG-RANGE bodies.ground.markers.m.matrix"),
+        ({"matrix": np.diag([1, 1, -1])}, "EG-RANGE bodies.ground.markers.m.matrix"),
+        ({"matrix": np.eye(3), "rpy": (0, 0, 1)}, "EG-CONFLICT bodies.ground.markers.m.matrix"),
+        ({"matrix": np.eye(3), "axes": {"x": "x", "y": "y"}}, "EG-CONFLICT bodies.ground.markers.m.matrix"),
     ],
 )
 def test_faults_of_turns(keys: dict[str, object], told: str) -> None:
     m = with_angle()
     m.ground.marker("m", **keys)
-    with pytest.raises(eg.ModelError, match=told):
-        m.check()
+    refuses(told, m.check)
 
 
 @settings(max_examples=8, deadline=None)
@@ -352,13 +349,12 @@ def test_markers_may_be_given_with_the_body() -> None:
 @pytest.mark.parametrize(
     ("markers", "place"),
     [
-        (["tip"], r"bodies.arm.markers: .*a mapping of marker names"),
-        ({"tip": 3}, r"bodies.arm.markers.tip"),
-        ({"tip": {"att": (0, 0, 0)}}, r"bodies.arm.markers.tip.*did you mean .at."),
+        (["tip"], "EG-TYPE bodies.arm.markers"),
+        ({"tip": 3}, "EG-TYPE bodies.arm.markers.tip"),
+        ({"tip": {"att": (0, 0, 0)}}, "EG-NAME-UNKNOWN bodies.arm.markers.tip.att"),
     ],
 )
 def test_markers_that_cannot_be_are_reported_with_their_place(markers: object, place: str) -> None:
     m = eg.Model("arm")
     m.revolute("A", m.ground, m.body("arm", mass=1, inertia={"zz": 1}, markers=markers))
-    with pytest.raises(eg.ModelError, match=place):
-        m.check()
+    refuses(place, m.check)

@@ -16,6 +16,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_files import load
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -103,7 +104,7 @@ def test_expressions_of_sympy_are_written_as_texts(tmp_path: Path) -> None:
         with pytest.raises((eg.UsageError, eg.ModelError)):
             model([wrong]).to_yaml()
     long = sympy.expand((a + b) ** 60) + sympy.gamma(a)
-    with pytest.raises(eg.UsageError, match=r"cannot be written as a text: .*gamma") as caught:
+    with refused("EG-UNSUPPORTED gamma") as caught:
         model([long]).to_yaml()
     assert len(str(caught.value)) < 400
 
@@ -271,50 +272,24 @@ def test_hostile_text_is_refused_and_nothing_runs(tmp_path: Path) -> None:
 
 
 #: What is typed -> what the message must say, and the column it points at.
-SLIPS = {
-    "2pi*A": ("a multiplication sign is missing", 2, "write 2*pi"),
-    "2a": ("a multiplication sign is missing", 2, "write 2*a"),
-    "2(a + b)": ("a multiplication sign is missing", 2, "write 2*("),
-    "(a + b)(2)": ("a multiplication sign is missing", 8, "write * between ) and ("),
-    "3 mm": ("a number with a unit is not an expression", 3, "write 0.003, the number in m, or 3*mm if mm is a name"),
-    "5 N*m": ("a number with a unit is not an expression", 3, "write 5, the number in N*m"),
-    "0.5m": ("a number with a unit is not an expression", 4, "write 0.5, the number in m, or 0.5*m"),
-    "9.81 m/s^2": ("a number with a unit is not an expression", 6, "write 9.81, the number in m/s^2"),
-    "30 rpm": ("a number with a unit is not an expression", 4, "write 3.14159265359, the number in rad/s"),
-    "10 %": ("a number with a unit is not an expression", 4, "write 0.1"),
-    "30°": ("a number with a unit is not an expression", 3, "write deg(30)"),
-    "sin(30°)": ("'°' is not allowed", 7, "write deg(30)"),
-    "deg 30": ("'deg' is a function", 1, "write deg(30)"),
-    "sin a": ("'sin' is a function", 1, "write sin(a)"),
-    "1,5": ("a comma is not a decimal point", 2, "write 1.5"),
-    "2,5*a": ("a comma is not a decimal point", 2, "write 2.5"),
-    "2e3.5": ("the power of ten behind e must be a whole number", 1, "write 2*10**3.5"),
-    "1 000": ("a number has no spaces", 1, "write 1000"),
-    "1.5.2": ("a number has one decimal point", 1, "leave one"),
-    "a^2": ("'^' is not allowed", 2, "write ** for powers"),
-    "a²": ("'²' is not allowed", 2, "write **2"),
-    "a·b": ("'·' is not allowed", 2, "write *"),
-    "\u22123": ("is not allowed", 1, "write -"),
-    "√2": ("'√' is not allowed", 1, "write sqrt(...)"),
-    "π/2": ("'π' is not allowed", 1, "write pi"),
-    "µ*a": ("is not allowed", 1, "names have the letters a to z"),
-    "|a|": ("'|' is not allowed", 1, "write abs(a)"),
-    "a b": ("an operator is missing between 'a' and 'b'", 3, "write a*b"),
-    "a**": ("nothing follows '**'", 4, "write what comes after it"),
-    "a = 2": ("this is a statement", 3, "write only what stands on the right"),
-    "a//b": ("the operator // is not allowed", 1, "write / for a quotient"),
-    "ln(a)": ("unknown function 'ln'", 1, "did you mean 'log'"),
-    "arctan(a)": ("unknown function 'arctan'", 1, "did you mean 'atan'"),
-    "2*(a": ("'(' was never closed", 3, "close the bracket"),
-}
+SLIPS = {  # the column, and what to write
+    "2pi*A": (2, "2*pi"), "2a": (2, "2*a"), "2(a + b)": (2, "2*("), "(a + b)(2)": (8, "* between"),
+    "3 mm": (3, "0.003, the number in m"), "5 N*m": (3, "5, the number in N*m"), "0.5m": (4, "0.5, the number in m"),
+    "9.81 m/s^2": (6, "9.81, the number in m/s^2"), "30 rpm": (4, "3.14159265359, the number in rad/s"),
+    "10 %": (4, "0.1"), "30°": (3, "deg(30)"), "sin(30°)": (7, "deg(30)"), "deg 30": (1, "deg(30)"),
+    "sin a": (1, "sin(a)"), "1,5": (2, "1.5"), "2,5*a": (2, "2.5"), "2e3.5": (1, "2*10**3.5"), "1 000": (1, "1000"),
+    "1.5.2": (1, "one"), "a^2": (2, "**"), "a²": (2, "**2"), "a·b": (2, "*"), "\u22123": (1, "-"),
+    "√2": (1, "sqrt(...)"), "π/2": (1, "pi"), "µ*a": (1, "letters"), "|a|": (1, "abs(a)"), "a b": (3, "a*b"),
+    "a**": (4, "what comes after"), "a = 2": (3, "right"), "a//b": (1, "/ for"), "ln(a)": (1, "'log'"),
+    "arctan(a)": (1, "'atan'"), "2*(a": (3, "bracket"),
+}  # fmt: skip
 
 
 @pytest.mark.quick
 def test_a_slip_is_reported_with_what_to_write() -> None:
     for text, fault in zip(SLIPS, faults(list(SLIPS)), strict=True):
-        message, place, remedy = SLIPS[text]
-        assert message in fault.message, text
-        assert column(fault) == place, text
+        place, remedy = SLIPS[text]
+        assert (fault.code, column(fault)) == ("EG-EXPRESSION", place), text
         assert remedy in fault.remedy, text
 
 
@@ -331,5 +306,4 @@ def test_markers_only_where_they_can_be_located() -> None:
         assert faults([text])[0] is not None, text
     m = model([])
     m.body("other", mass="x(wheel)")
-    with pytest.raises(eg.ModelError, match="in outputs, events and the laws of force elements"):
-        m.check()
+    refuses("EG-EXPRESSION bodies.other.mass", m.check)

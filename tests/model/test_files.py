@@ -16,6 +16,7 @@ import command
 import numpy as np
 import pytest
 from model_files import EXAMPLES
+from refusals import refuses
 
 import eomgen as eg
 
@@ -64,24 +65,20 @@ def other(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("suffix", ["yaml", "urdf", "xml"])
 def test_a_model_is_read_from_a_plain_file(suffix: str, other: tuple[str, str]) -> None:
-    with pytest.raises(eg.UsageError, match=f"^odd.{suffix} is not a plain file but {other[1]}"):
-        eg.load(f"odd.{suffix}")
+    refuses(f"EG-FILE odd.{suffix} {other[1].split()[-1]}", eg.load, f"odd.{suffix}")
     found = command.run("check", f"odd.{suffix}")
     assert (found.code, f"odd.{suffix} is {other[1]}, not a plain file" in found.err) == (2, True)
 
 
 def test_what_else_is_read_is_a_plain_file(other: tuple[str, str]) -> None:
     Path("mesh.yaml").write_text("name: m\nbodies: {b: {solids: [{type: mesh, file: odd.stl, density: 1}]}}\n")
-    with pytest.raises(eg.ModelError, match=r"not a plain file|outside the folder"):
-        eg.load("mesh.yaml").check()
+    refuses("EG-FILE-DAMAGED bodies.b.solids[0].file", lambda: eg.load("mesh.yaml").check())
     Path("native.yaml").write_text("name: n\nfunctions: {f: {type: native, source: odd.c, arguments: 1}}\n")
-    with pytest.raises(eg.ModelError, match="odd.c is not a plain file"):
-        eg.load("native.yaml", allow_native=True).check()
+    refuses("EG-FILE functions.f.source odd.c", lambda: eg.load("native.yaml", allow_native=True).check())
     found = command.run("ensemble", "model.yaml", "--target", "numpy", "--cases", "odd.csv", "--end", "0.1")
     assert found.code == 2
     assert f"odd.csv is not a plain file but {other[1]}" in found.err or "'odd.csv' is a directory" in found.err
-    with pytest.raises(eg.UsageError, match="not a plain file"):
-        eg.load_trajectory("odd.npz")
+    refuses("EG-FILE-DAMAGED file", eg.load_trajectory, "odd.npz")
     os.renames("store/manifest.json", "pendulum/model.json")
     found = command.run("generate", "model.yaml", "--out", ".", "--target", "numpy")
     assert (found.code, "is not a generated package" in found.err) == (2, True)
@@ -100,10 +97,7 @@ NO_PATHS = (b"a.yaml", "", None, 3, ["a.yaml"], "a\0.yaml", "\ud800.yaml", Odd()
 def test_what_is_no_path_is_refused_with_the_same_message(run: Any) -> None:
     for door in (eg.load, eg.load_trajectory, eg.load(EXAMPLE).save, run.save):
         for given in NO_PATHS:
-            with pytest.raises(
-                eg.UsageError, match="^path must be the name of a file or folder, as text or Path, not "
-            ):
-                door(given)
+            refuses("EG-TYPE folder", door, given)
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------
@@ -151,8 +145,7 @@ def test_no_writer_follows_a_link(tmp_path: Path, run: Any) -> None:
     victim.write_text("precious")
     for name, write in writers(run).items():
         (tmp_path / name).symlink_to(victim)
-        with pytest.raises(eg.UsageError, match="symbolic link"):
-            write(tmp_path / name)
+        refuses("EG-FILE symbolic", write, tmp_path / name)
     assert victim.read_text() == "precious"
 
 

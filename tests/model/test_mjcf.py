@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from model_files import described
 from mujoco_judge import Judge
+from refusals import refuses
 from robot_comparison import Compiled, largest_differences
 from shipped_robots import mjcf_models
 
@@ -286,8 +287,7 @@ def test_springs_drives_tendons_and_joint_chains_equal_mujoco(rotation: str, tmp
 def test_it_floats_by_its_own_key(tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     path.write_text(EVERYTHING)
-    with pytest.raises(eg.UsageError, match="itself defines which bodies float"):
-        eg.load(path, floating=True)
+    refuses("EG-CONFLICT defines", eg.load, path, floating=True)
 
 
 def test_a_warning_of_mujoco_is_a_note_and_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

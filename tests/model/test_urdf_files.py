@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from model_files import EXAMPLES, described, load, schema_faults
+from refusals import refused, refuses
 from shipped_robots import EXAMPLES as SHIPPED
 
 import eomgen as eg
@@ -97,13 +98,13 @@ def test_python_and_model_files_know_the_data(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        ("limits: {lower: 2, upper: 1}", "joints.a.limits: lower 2 is above upper 1"),
-        ("limits: {lower: [1, 2]}", "joints.a.limits.lower: 2 values for 1 coordinates"),
-        ("limits: {effort: -1}", "joints.a.limits.effort: is -1"),
-        ("limits: {torque: 1}", "joints.a.limits.torque: unknown key"),
-        ("limits: 3", "joints.a.limits: 3 is not a mapping of lower, upper"),
-        ("dry_friction: -1", "joints.a.dry_friction: is -1"),
-        ("armature: -1", "joints.a.armature: is -1"),
+        ("limits: {lower: 2, upper: 1}", "EG-RANGE joints.a.limits 2 1"),
+        ("limits: {lower: [1, 2]}", "EG-SHAPE joints.a.limits.lower 2 1"),
+        ("limits: {effort: -1}", "EG-RANGE joints.a.limits.effort -1"),
+        ("limits: {torque: 1}", "EG-NAME-UNKNOWN joints.a.limits.torque"),
+        ("limits: 3", "EG-TYPE joints.a.limits 3"),
+        ("dry_friction: -1", "EG-RANGE joints.a.dry_friction -1"),
+        ("armature: -1", "EG-RANGE joints.a.armature -1"),
     ],
 )
 def test_wrong_data_is_reported(data: str, said: str, tmp_path: Path) -> None:
@@ -111,8 +112,7 @@ def test_wrong_data_is_reported(data: str, said: str, tmp_path: Path) -> None:
         f"name: m\nbodies: {{r: {{mass: 1, inertia: [1, 1, 1]}}}}\n"
         f"joints: {{a: {{type: revolute, between: [ground, r], {data}}}}}"
     )
-    with pytest.raises(eg.ModelError, match=said.replace("[", r"\[")):
-        load(tmp_path, text).check()
+    refuses(said, lambda: load(tmp_path, text).check())
 
 
 def test_dry_friction_acts_where_it_is_requested() -> None:
@@ -244,17 +244,16 @@ FOUR_BAR = f"""<robot name="four_bar"><link name="base"/><link name="a">{INERTIA
 
 
 REFUSED = [
-    ('<loop_joint name="l" type="floating"><link1 link="b"/><link2 link="c"/></loop_joint>', "no loop is closed by"),
-    ('<loop_joint name="l" type="fixed"><link1 link="b"/></loop_joint>', "loop_joint.l.link2: is missing"),
-    ('<loop_joint name="l" type="fixed"><link1 link="b"/><link2 link="d"/></loop_joint>', "loop.l: no link 'd'"),
-    ('<loop_joint name="l"><axis xyz="0 0 0"/><link1 link="b"/><link2 link="c"/></loop_joint>', "axis has no length"),
+    ('<loop_joint name="l" type="floating"><link1 link="b"/><link2 link="c"/></loop_joint>', "EG-CHOICE"),
+    ('<loop_joint name="l" type="fixed"><link1 link="b"/></loop_joint>', "EG-MISSING loop_joint.l.link2:"),
+    ('<loop_joint name="l" type="fixed"><link1 link="b"/><link2 link="d"/></loop_joint>', "EG-NAME-UNKNOWN 'd'"),
+    ('<loop_joint name="l"><axis xyz="0 0 0"/><link1 link="b"/><link2 link="c"/></loop_joint>', "EG-RANGE axis"),
 ]
 
 
 @pytest.mark.parametrize(("loop", "said"), REFUSED)
 def test_faults_of_loops_are_reported_with_their_line(loop: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(eg.ModelError, match=f"robot.urdf:7: .*{said}"):
-        urdf(tmp_path, FOUR_BAR.format(loop))
+    refuses(f"{said} robot.urdf:7: l", lambda: urdf(tmp_path, FOUR_BAR.format(loop)))
 
 
 STRANGE = """<robot name="strange" mood="sad"><link name="base"/><wheel size="3"/>
@@ -359,9 +358,9 @@ def test_stops_hold(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("word", "told"),
     [
-        ("limits: stop", "limits: 'stop' is an option of robot files"),
-        ("limits: stops", "limits: 'stops' is not known"),
-        ("check_inertia: maybe", "check_inertia: 'maybe' is not true or false, error, note or off"),
+        ("limits: stop", "EG-CHOICE limits stop"),
+        ("limits: stops", "EG-CHOICE limits stops"),
+        ("check_inertia: maybe", "EG-TYPE check_inertia maybe"),
     ],
 )
 def test_a_word_that_does_nothing_in_a_model_file_is_refused(word: str, told: str, tmp_path: Path) -> None:
@@ -369,8 +368,7 @@ def test_a_word_that_does_nothing_in_a_model_file_is_refused(word: str, told: st
         f"name: rod\n{word}\nbodies: {{rod: {{mass: 1, inertia: {{zz: 1}}}}}}\n"
         "joints: {A: {type: revolute, between: [ground, rod], limits: {lower: -1, upper: 1}}}\n"
     )
-    with pytest.raises(eg.ModelError, match=told):
-        load(tmp_path, text).check()
+    refuses(told, lambda: load(tmp_path, text).check())
 
 
 # -- inertias ---------------------------------------------------------------------------------------------------------
@@ -397,11 +395,11 @@ ROUNDING = [
     {"com": "0 0 0", "xx": "-1e-18", "yy": "1e-18", "zz": "0"},
 ]
 SLIPS = [
-    ({"xx": "-1e-3"}, "negative principal moment"),
-    ({"xx": "-1e-8"}, "negative principal moment"),  # 1e-6 of m l^2: far above its rounding
-    ({"zz": "4e-3"}, "exceeds the sum"),
-    ({"xx": "1e-9", "yy": "2e-9", "zz": "9e-9"}, "exceeds the sum"),
-    ({"mass": 0, "xx": "-1e-9", "yy": "1e-9", "zz": "1e-9"}, "negative principal moment"),
+    ({"xx": "-1e-3"}, "negative"),
+    ({"xx": "-1e-8"}, "negative"),  # 1e-6 of m l^2: far above its rounding
+    ({"zz": "4e-3"}, "exceeds"),
+    ({"xx": "1e-9", "yy": "2e-9", "zz": "9e-9"}, "exceeds"),
+    ({"mass": 0, "xx": "-1e-9", "yy": "1e-9", "zz": "1e-9"}, "negative"),
 ]
 
 
@@ -420,17 +418,16 @@ def test_what_rounding_leaves_passes(given: dict[str, Any], tmp_path: Path) -> N
 def test_a_slip_of_the_pen_is_reported(given: dict[str, Any], said: str, tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(two_links(given))
-    if said == "exceeds the sum":  # taken by default, as other loaders do, and told
+    demand = f"EG-INERTIA bodies.upper.inertia {said}"
+    if said == "exceeds":  # taken by default, as other loaders do, and told
         taken = eg.load(path)
         assert any("bodies.upper.inertia" in note and said in note for note in taken.notes)
         taken.check()
     else:
-        with pytest.raises(eg.ModelError, match=said):
-            eg.load(path).check()
-    with pytest.raises(eg.ModelError, match=said) as caught:
+        refuses(demand, lambda: eg.load(path).check())
+    with refused(f"{demand} check_inertia") as caught:
         eg.load(path, check_inertia="error").check()
-    (problem,) = caught.value.problems
-    assert "check_inertia" in problem.remedy
+    assert len(caught.value.problems) == 1
     noted = eg.load(path, check_inertia="note")
     assert any("bodies.upper.inertia" in note and said in note for note in noted.notes)
     noted.check()
@@ -441,18 +438,15 @@ def test_a_slip_of_the_pen_is_reported(given: dict[str, Any], said: str, tmp_pat
     again = eg.load(tmp_path / "arm.yaml")  # a model file keeps the word and says it again
     assert any(said in note for note in again.notes)
     assert eg.load(tmp_path / "arm.yaml", check_inertia="off").notes == ()
-    with pytest.raises(eg.ModelError, match=said):
-        eg.load(tmp_path / "arm.yaml", check_inertia="error").check()
+    refuses(demand, lambda: eg.load(tmp_path / "arm.yaml", check_inertia="error").check())
 
 
 def test_romeo_whose_fingers_have_no_mass_moves() -> None:
     path = SHIPPED / "romeo_description/urdf/romeo.urdf"
-    with pytest.raises(eg.ModelError, match="check_inertia='note'"):
-        eg.load(path)
+    refuses("EG-NO-INERTIA joint.LHand note check_inertia=", eg.load, path)
     model = eg.load(path, check_inertia="note")
     assert any("kinematics only" in note and "LFinger12" in note for note in model.notes)
     module = model.compile(target="numpy", kernels=["rhs", "poses", "embedded_mass_matrix", "jacobian"])
     x = np.zeros(module.n_x)
     for call in (module.rhs, module.jacobian):
-        with pytest.raises(eg.SingularMassMatrixError, match=r"kinematics only: .*bodies without mass .*LFinger11Link"):
-            call(0.0, x)
+        refuses("EG-SINGULAR LFinger11Link", call, 0.0, x)

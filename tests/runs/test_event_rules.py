@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refused, refuses
 from scipy.integrate import DOP853
 from sweeps import TARGETS, part_of
 
@@ -163,10 +164,9 @@ def test_resets_that_die_away_are_named_by_every_loop(modules: dict[str, Any], n
     events = levels(n)
     for target, methods in {"cython": ["RK45", "DOP853", "Radau", "Taylor"], "numpy": STEPPED}.items():
         for method in methods:
-            with pytest.raises(eg.ZenoError, match=r"floor .*near t = 1\.354"):
+            with refused("EG-ZENO floor"):
                 modules[target].simulate((0, 10), parameters={"e": 0.5}, events=events, method=method)
-    with pytest.raises(eg.ZenoError, match=r"floor .*near t = 1\.35"):
-        modules["numpy"].dae.solve((0, 10), parameters={"e": 0.5}, events=events)
+    refuses("EG-ZENO floor", lambda: modules["numpy"].dae.solve((0, 10), parameters={"e": 0.5}, events=events))
     many = modules["cython"].simulate_many((0, 10), {"h": np.ones(2)}, {"e": 0.5}, events=events, method="RK45")
     assert not many.ok.any()
 
@@ -252,5 +252,4 @@ def test_a_solver_that_ends_early_in_silence_is_named(modules: dict[str, Any]) -
                 self.status = "finished"
             return message
 
-    with pytest.raises(eg.SimulationError, match=r"reports the end, t = 2 s, but stopped at t = 1\."):
-        modules["numpy"].simulate((0, END), method=Lazy)
+    refuses("EG-STALLED 2", lambda: modules["numpy"].simulate((0, END), method=Lazy))

@@ -9,6 +9,7 @@ import models
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refused, refuses
 from scipy.integrate import DOP853, solve_ivp
 from sweeps import TARGETS
 
@@ -69,8 +70,7 @@ def test_events_are_a_mapping_by_name_and_a_list_by_number(bouncing: Any) -> Non
             assert values in found
         assert found.get("ceiling") is None
     assert "floor" in pickle.loads(pickle.dumps(run.t_events))
-    with pytest.raises(eg.UsageError, match="did you mean floor"):
-        run.t_events["flor"]
+    refuses("EG-NAME-UNKNOWN floor?", lambda: run.t_events["flor"])
 
 
 def two_bars() -> eg.Model:
@@ -172,7 +172,7 @@ def test_a_run_ends_at_the_times_requested(swing: Any, times: Any, count: int) -
 @pytest.mark.parametrize("method", ["DOP853", "BDF"])
 def test_an_event_without_a_value_is_reported(swing: Any, method: str) -> None:
     q = swing.q_names[0]
-    with pytest.warns(UserWarning, match="event gap: the value was not a number") as told:
+    with pytest.warns(UserWarning, match="event gap") as told:
         run = swing.simulate((0, 1.5), {q: 0.5}, events={"gap": f"log(-1 - {q}**2)", "low": q}, method=method)
     assert told[0].filename == __file__
     assert [len(run.t_events[k]) for k in ("gap", "low")] == [0, 1]
@@ -181,16 +181,15 @@ def test_an_event_without_a_value_is_reported(swing: Any, method: str) -> None:
 @pytest.mark.parametrize(
     ("events", "words"),
     [
-        ("thteta", "no name in event"),
-        ("__import__('os')", "not allowed in an expression"),
-        (3.0, "must be a name, an expression or a function"),
-        ({"a": {"expression": "t - 1", "direction": 2}}, "direction must be 1, -1 or 0"),
-        ({"a": {"expresion": "t - 1"}}, "did you mean expression"),
+        ("thteta", "EG-NAME-UNKNOWN 'thteta'"),
+        ("__import__('os')", "EG-EXPRESSION expression"),
+        (3.0, "EG-TYPE expression"),
+        ({"a": {"expression": "t - 1", "direction": 2}}, "EG-CHOICE direction 1 -1 0"),
+        ({"a": {"expresion": "t - 1"}}, "EG-NAME-UNKNOWN expression?"),
     ],
 )
 def test_wrong_events(swing: Any, events: Any, words: str) -> None:
-    with pytest.raises(eg.UsageError, match=words):
-        swing.simulate((0, 1), events=events)
+    refuses(words, swing.simulate, (0, 1), events=events)
 
 
 def test_a_zero_at_the_start_is_as_in_scipy(swing: Any) -> None:
@@ -227,8 +226,7 @@ def test_a_reset_at_the_very_end_and_at_a_corner() -> None:
 
 
 def test_a_single_step_passes_over_no_reset(bouncing: Any) -> None:
-    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step finds no events"):
-        bouncing.step(0.0, bouncing.x0(), 0.5)
+    refuses("EG-UNSUPPORTED events", lambda: bouncing.step(0.0, bouncing.x0(), 0.5))
 
 
 @pytest.mark.parametrize("method", ["DOP853", "LSODA"])
@@ -312,15 +310,12 @@ def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None
 
     methods = ("DOP853", "RK45", "RK23", "Radau", "LSODA")
     for method in methods:
-        with pytest.raises(eg.UsageError, match=r"event broken is nan at t = [\d.]+ s; its function must return"):
-            mod.simulate((0, 1), events=[broken], method=method)
+        refuses("EG-NUMBER broken nan", mod.simulate, (0, 1), events=[broken], method=method)
         run = mod.simulate((0, 1), events=[lambda t, x: t - 0.75 if t <= 1 else np.nan], method=method)
         assert run.t_events[-1] == pytest.approx([0.75], abs=1e-9)
-    with pytest.raises(eg.UsageError, match="event broken is nan"):
-        mod.dae.solve((0, 1), events=[broken])
-    for value, text in ((None, "None"), (1j, "1j"), (np.ones(2), r"array\(\[1"), ("a", "'a'")):
+    refuses("EG-NUMBER broken nan", mod.dae.solve, (0, 1), events=[broken])
+    for value, text in ((None, "None"), (1j, "1j"), (np.ones(2), "array([1."), ("a", "'a'")):
         for method in ("DOP853", "LSODA"):
-            with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
+            with refused(f"EG-NUMBER odd {text}"):
                 mod.simulate((0, 1), events={"odd": lambda t, x, value=value: value}, method=method)
-        with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
-            mod.dae.solve((0, 1), events={"odd": lambda t, x, value=value: value})
+        refuses(f"EG-NUMBER odd {text}", mod.dae.solve, (0, 1), events={"odd": lambda t, x, value=value: value})

@@ -12,6 +12,7 @@ import judges
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refused, refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -139,14 +140,12 @@ def test_balls_on_a_line() -> None:
 
 def test_jammed_between_two_walls() -> None:
     mod = linear([2.0], [[1.0], [-1.0]])
-    with pytest.raises(eg.UsageError, match=r"the gaps g\d.* cannot open together.*give them restitution 0"):
-        strike(mod, [3.0], [1.0, 1.0])
+    refuses("EG-CONTRADICTION restitution 0", strike, mod, [3.0], [1.0, 1.0])
     hit = strike(mod, [3.0], [0.0, 0.0])
     np.testing.assert_allclose([hit.x[1], hit["g0"], hit["g1"], hit.energy_lost], [0.0, 0.0, 6.0, 9.0], atol=1e-12)
     np.testing.assert_allclose(strike(mod, [3.0], [0.5, 0.5]).x[1], 0.0, atol=1e-10)  # to and fro until it stands
     wedge = linear([1.0, 1.0], [[1.0, 0.0], [-1.0, 1e-7]])
-    with pytest.raises(eg.UsageError, match="g0, g1 cannot open together"):
-        strike(wedge, [-1.0, -1e8], [1.0, 1.0])
+    refuses("EG-CONTRADICTION g0 g1", strike, wedge, [-1.0, -1e8], [1.0, 1.0])
 
 
 def test_what_drivers_impose() -> None:
@@ -154,10 +153,8 @@ def test_what_drivers_impose() -> None:
     m.revolute("A", m.ground, m.body("b", mass=1.0), coordinate="a")
     m.driver("d", "A", value="-2*t")
     mod = m.compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="gap a closes at the rate -2, which drivers or constraints prescribe"):
-        mod.impact(0.0, mod.x0(), {"a": 0.5})
-    with pytest.raises(eg.UsageError, match="has no degree of freedom"):
-        mod.simulate_impacts(1.0, {"a": 0.5})
+    refuses("EG-CONTRADICTION a -2", lambda: mod.impact(0.0, mod.x0(), {"a": 0.5}))
+    refuses("EG-UNSUPPORTED freedom", mod.simulate_impacts, 1.0, {"a": 0.5})
 
 
 @pytest.mark.parametrize("e", [0.0, 0.6])
@@ -251,8 +248,7 @@ def test_an_event_of_the_model_ends_a_run_with_impacts() -> None:
     run = m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})
     assert (run.ended, run.t[-1], len(run.impacts)) == ("event", pytest.approx(0.6, abs=1e-9), 1)
     m.event("often", "h - 0.5", terminal=2)
-    with pytest.raises(eg.UsageError, match="event often ends a run after 2 times"):
-        m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})
+    refuses("EG-UNSUPPORTED often 2", lambda: m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5}))
 
 
 def held_rod() -> Any:
@@ -344,10 +340,8 @@ def test_a_hit_takes_the_speed_of_the_floor(racket: Any, way: str, method: str) 
 
 
 def test_a_floor_whose_rate_is_not_known_is_refused(racket: Any) -> None:
-    with pytest.raises(eg.UsageError, match="its rate u_dot, and the rate of a function is not known"):
-        racket.simulate(0.6, inputs={"u": lambda t, x: SPEED * t})
-    with pytest.raises(eg.UsageError, match="the gap depends on the input u"):
-        racket.simulate(0.6, inputs={"u": "0.1*s"})
+    refuses("EG-UNSUPPORTED u_dot", racket.simulate, 0.6, inputs={"u": lambda t, x: SPEED * t})
+    refuses("EG-UNSUPPORTED u", racket.simulate, 0.6, inputs={"u": "0.1*s"})
     given = {"u": lambda t, x: SPEED * t, "u_dot": SPEED}
     run = racket.simulate(0.6, inputs=given, rtol=1e-10, atol=1e-12)
     assert abs(run["s_dot"][-1] + TEN * (0.6 - HIT) - AFTER) < 1e-8
@@ -361,8 +355,7 @@ def test_gaps_given_for_a_run_or_an_impact_move_with_their_inputs() -> None:
         assert abs(run.impacts[0][0] - HIT) < 1e-9
         assert abs(run["s_dot"][-1] + TEN * (0.6 - HIT) - AFTER) < 1e-8
     for given in ("0.1*s", lambda t, x: 0.1 * x[0]):
-        with pytest.raises(eg.UsageError, match="input u depends on the state"):
-            mod.simulate_impacts(0.6, {"over": 1.0}, inputs={"u": given})
+        refuses("EG-UNSUPPORTED u", mod.simulate_impacts, 0.6, {"over": 1.0}, inputs={"u": given})
     mod = ball_on_input("numpy")
     hit = mod.impact(0.0, [0.3, -2.0], {"over": 0.5}, u={"u": 0.3, "u_dot": 1.0})
     assert abs(hit.x[1] - (1.0 + 0.5 * 3.0)) < 1e-12  # leaves at e times the speed of approach
@@ -374,28 +367,25 @@ def test_what_impacts_refuse() -> None:
     mod = compiled("slider_crank")
     x = mod.x0()
     for words, message in (
-        ({}, "an impact needs gaps"),
-        ({"gaps": {"ss": 0.5}}, r"gaps: no coordinate or output 'ss'"),
-        ({"gaps": {"s": 1.5}}, "restitution of s must be between 0 and 1"),
-        ({"gaps": {"s": [0.5]}}, "restitution of s must be a number"),
-        ({"gaps": ["s"]}, "gaps must be a mapping"),
-        ({"lock": [0]}, "lock must be a list"),
-        ({"lock": ["tau"]}, "lock: no coordinate or output 'tau'"),
-        ({"gaps": {"speed": 0.5}}, "depends on velocities"),
-        ({"gaps": {"s": 0.5}}, r"gap s is 0\.\d+ m \(open\); an impact needs a gap of 0"),
+        ({}, "EG-MISSING gaps"),
+        ({"gaps": {"ss": 0.5}}, "EG-NAME-UNKNOWN ss"),
+        ({"gaps": {"s": 1.5}}, "EG-RANGE restitution 0 1"),
+        ({"gaps": {"s": [0.5]}}, "EG-NUMBER restitution"),
+        ({"gaps": ["s"]}, "EG-TYPE gaps"),
+        ({"lock": [0]}, "EG-TYPE lock"),
+        ({"lock": ["tau"]}, "EG-NAME-UNKNOWN tau"),
+        ({"gaps": {"speed": 0.5}}, "EG-UNSUPPORTED velocities"),
+        ({"gaps": {"s": 0.5}}, "EG-EVENT s 0"),
     ):
-        with pytest.raises(eg.UsageError, match=message):
-            mod.impact(0.0, x, **words)
-    with pytest.raises(eg.UsageError, match="t must be a number"):
-        mod.impact("a", x, lock=["s"])
-    with pytest.raises(eg.UsageError, match=r"gap z is -0\.1 m \(closed too far\)"):
-        ball().impact(0.0, [-0.1, -1.0], {"z": 0.5})
+        refuses(message, mod.impact, 0.0, x, **words)
+    refuses("EG-NUMBER t", mod.impact, "a", x, lock=["s"])
+    refuses("EG-EVENT z -0.1", lambda: ball().impact(0.0, [-0.1, -1.0], {"z": 0.5}))
     for words, message in (
-        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap must be 0 or positive"),
-        ({"span": -1.0}, "forward in time"),
-        ({"gaps": {}}, "needs gaps"),
-        ({"most": 0}, "most, the number of impacts, must be a whole number of at least 1, not 0"),
-        ({"t_eval": [0.0]}, r"no t_eval=; use t_events of the run that it returns, and at\(t\)"),
+        ({"initial": {"z": 0.0}}, "EG-RANGE -0.1 0"),
+        ({"span": -1.0}, "EG-UNSUPPORTED time"),
+        ({"gaps": {}}, "EG-MISSING gaps"),
+        ({"most": 0}, "EG-RANGE most 1 0"),
+        ({"t_eval": [0.0]}, "EG-NAME-UNKNOWN t_eval= t_events"),
     ):
-        with pytest.raises(eg.UsageError, match=message):
+        with refused(message):
             ball().simulate_impacts(**{"span": 1.0, "gaps": {"gap": 0.5}, "initial": {"z": 1.0}, **words})

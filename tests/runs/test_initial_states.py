@@ -8,6 +8,7 @@ import models
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refuses
 from scipy.integrate import solve_ivp
 from sweeps import TARGETS, part_of
 
@@ -55,31 +56,28 @@ def test_assembly_with_other_parameters(crank: eg.Module) -> None:
     p = {"r": 0.2, "l": 0.6, "e": 0.02}
     x = crank.x0({"theta": 0.7}, p=p)
     assert x[[0, 2]] == pytest.approx([0.7, placed(0.7, **p)], abs=1e-12)
-    with pytest.raises(eg.AssemblyError, match=r"C\.r_y|C\.y|off by"):
-        crank.x0({"theta": 0.7}, p={"e": 3.0})
+    refuses("EG-LOOP-OPEN C.r_y", crank.x0, {"theta": 0.7}, p={"e": 3.0})
 
 
 @pytest.mark.parametrize(
-    ("values", "error", "words"),
+    ("values", "demand"),
     [
-        ({"theta": 0.3, "s": 0.2}, eg.AssemblyError, "inconsistent: 2 values for 1 degree of freedom"),
-        ({"s": 2.0}, eg.AssemblyError, "cannot close with s = 2"),
-        ({"theta": 0.3, "theta_dot": 1.0, "s_dot": 1.0}, eg.AssemblyError, "theta_dot = 1, s_dot = 1"),
-        ({"thetta": 0.3}, eg.UsageError, "did you mean theta"),
-        ({"l": 0.3}, eg.UsageError, "parameter, not a coordinate"),
-        ({"theta": np.nan}, eg.UsageError, "finite"),
+        ({"theta": 0.3, "s": 0.2}, "EG-LOOP-OPEN theta 0.3 s 0.2 2 1"),
+        ({"s": 2.0}, "EG-LOOP-OPEN s 2"),
+        ({"theta": 0.3, "theta_dot": 1.0, "s_dot": 1.0}, "EG-CONTRADICTION theta_dot s_dot 1"),
+        ({"thetta": 0.3}, "EG-NAME-UNKNOWN 'thetta' theta"),
+        ({"l": 0.3}, "EG-NAME-UNKNOWN 'l' parameter"),
+        ({"theta": np.nan}, "EG-NUMBER theta nan"),
     ],
 )
-def test_initial_values_that_do_not_fit(crank: eg.Module, values: Any, error: type[Exception], words: str) -> None:
-    with pytest.raises(error, match=words):
-        crank.x0(values)
+def test_initial_values_that_do_not_fit(crank: eg.Module, values: Any, demand: str) -> None:
+    refuses(demand, crank.x0, values)
 
 
 def test_more_than_needed_is_taken_where_it_fits(crank: eg.Module) -> None:
     x = crank.x0(theta=0.3)
     np.testing.assert_array_equal(crank.x0(dict(zip(crank.q_names, x, strict=False)))[:3], x[:3])
-    with pytest.raises(eg.UsageError, match="positions only"):
-        crank.assemble(theta_dot=1.0)
+    refuses("EG-REFERENCE positions", crank.assemble, theta_dot=1.0)
 
 
 @pytest.mark.parametrize("case", ["inline", "offset"])
@@ -102,8 +100,7 @@ def test_kinematics_equal_the_closed_form_over_a_full_turn(crank: eg.Module, cas
 
 def test_the_slider_cannot_be_given_a_velocity_at_a_dead_centre(crank: eg.Module) -> None:
     mod, r, l = crank.bind({"e": 0.0}), 0.15, 0.5
-    with pytest.raises(eg.AssemblyError, match=r"s_dot = 1 cannot .* dead centre.*; give theta_dot"):
-        mod.x0(s=r + l, s_dot=1.0)
+    refuses("EG-CONTRADICTION s_dot 1 theta_dot", mod.x0, s=r + l, s_dot=1.0)
     x = mod.x0(s=r + l, theta_dot=2.0)
     assert abs(x[mod.x_names.index("s_dot")]) < 1e-4
     theta = 0.01  # near, and the closed form still holds
@@ -116,15 +113,13 @@ def test_kinematics_is_pure_and_says_when_the_way_is_blocked(crank: eg.Module) -
     batch = crank.kinematics(targets)[0]
     for j in (4, 1, 0):
         np.testing.assert_array_equal(crank.kinematics(targets[:, j])[0], batch[:, j])
-    with pytest.raises(eg.UsageError, match="q_i must have shape"):
-        crank.kinematics(np.zeros(2))
+    refuses("EG-SHAPE q_i", crank.kinematics, np.zeros(2))
     other = crank.kinematics([0.5], guess=crank.branches(theta=0.5)[1])[0]
     assert other[2] == pytest.approx(0.3 * np.cos(0.5) - placed(0.5), abs=1e-12)
     model = models.build("offset_slider_crank")
     model.independent = ["s"]
     model.initial = {"s": 0.6}
-    with pytest.raises((eg.ProjectionError, eg.PartitionError), match=r"path to s = 0\.7 is blocked"):
-        model.compile(target="numpy").kinematics([0.7])
+    refuses("EG-PROJECTION s 0.7", lambda: model.compile(target="numpy").kinematics([0.7]))
 
 
 def test_the_minimal_form(crank: eg.Module) -> None:
@@ -140,10 +135,8 @@ def test_the_minimal_form(crank: eg.Module) -> None:
     crank.minimal.reset()
     far = crank.minimal.expand(np.array([30.0, 1.0]))
     np.testing.assert_allclose(far[:3], crank.kinematics([30.0])[0], atol=1e-12)
-    with pytest.raises(eg.UsageError, match="module.bind"):
-        crank.minimal.rhs(0.0, [0.3, 1.0], p=[1.0])
-    with pytest.raises(eg.UsageError, match=r"shape \(2,\)"):
-        crank.minimal.rhs(0.0, np.zeros(6))
+    refuses("EG-CONFLICT module.bind", crank.minimal.rhs, 0.0, [0.3, 1.0], p=[1.0])
+    refuses("EG-SHAPE (2,)", crank.minimal.rhs, 0.0, np.zeros(6))
     model = models.build("offset_slider_crank")
     model.independent = ["s"]
     model.initial = {"s": 0.6, "s_dot": 1.0}
@@ -158,8 +151,7 @@ def test_coordinates_called_like_arguments_go_in_a_dict() -> None:
     m = eg.Model("named")
     m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="u")
     mod = m.compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="give the coordinate 'u' in a dict: {'u': ...}"):
-        mod.x0(u=0.4)
+    refuses("EG-REFERENCE u", mod.x0, u=0.4)
     assert mod.x0({"u": 0.4})[0] == 0.4
 
 
@@ -194,7 +186,7 @@ def test_leaving_the_branch_is_reported() -> None:
     """A rocker beyond its dead centre: there is a position on another branch, which x0 does not take silently."""
     mod = models.build("four_bar").compile(target="numpy")
     psi = float(mod.x0()[mod.q_names.index("psi")]) - 3.0
-    with pytest.warns(UserWarning, match=r"psi = .* cannot be reached .* on the same branch: .* blocked after"):
+    with pytest.warns(UserWarning, match="psi = .* branch"):
         x = mod.x0(psi=psi)
     assert np.abs(mod.constraints(x[: mod.n_q], rows="all")).max() < 1e-12
     assert mod.branch(x) == -1

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -121,22 +122,20 @@ def test_direct_calls_have_rates_as_inputs(ring: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("given", "demand"),
     [
-        (lambda t, x: 1.0 + t, ["input l", "l_dot", "rate of a function is not known", "give l_dot too"]),
-        (Rated(lambda t: 1.0 + t, lambda t: 1.0), ["input l", "l_ddot", "not known"]),
-        (([0.0, 0.5], [1.0, 1.5]), ["l_ddot", "its slope jumps", "linear table at t = 0.5 s", '"cubic"']),
-        (eg.Signal([0.0, 0.5], [1.0, 2.0], "zero-order"), ["l_dot", "its value jumps", "t = 0.5 s"]),
-        ("1 + 0.1*x_dot", ["l_dot", "'1 + 0.1*x_dot'", "acceleration"]),
-        ("1 + 0.1*x", ["l_ddot", "x_dot", "acceleration"]),
-        ("1 + max(0, t - 0.25)", ["L", "l_ddot", "jumps at t = 0.25 s"]),
-        ("1 + (t > 0.3)", ["l_dot", "jumps at t = 0.3 s"]),
+        (lambda t, x: 1.0 + t, "EG-UNSUPPORTED l_dot"),
+        (Rated(lambda t: 1.0 + t, lambda t: 1.0), "EG-UNSUPPORTED l_ddot"),
+        (([0.0, 0.5], [1.0, 1.5]), "EG-JUMP l_ddot slope 0.5 cubic"),
+        (eg.Signal([0.0, 0.5], [1.0, 2.0], "zero-order"), "EG-JUMP l_dot value 0.5"),
+        ("1 + 0.1*x_dot", "EG-UNSUPPORTED l_dot acceleration"),
+        ("1 + 0.1*x", "EG-UNSUPPORTED l_ddot x_dot acceleration"),
+        ("1 + max(0, t - 0.25)", "EG-JUMP l_ddot 0.25"),
+        ("1 + (t > 0.3)", "EG-JUMP l_dot 0.3"),
     ],
 )
-def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[str]) -> None:
-    with pytest.raises(eg.UsageError) as caught:
-        ring.simulate(1.0, START, inputs={"l": given})
-    assert all(word in str(caught.value) for word in words[words[0] == "L" :])
+def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, demand: str) -> None:
+    refuses(demand, ring.simulate, 1.0, START, inputs={"l": given})
 
 
 @pytest.mark.parametrize(
@@ -152,30 +151,24 @@ def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[
 )
 def test_a_rate_that_contradicts_its_input_is_refused(given: Any) -> None:
     winch = build("winch", "numpy")
-    with pytest.raises(
-        eg.UsageError, match=r"input l_dot is not the rate of l: at t = .* l changes by|jumps at t = 0\.3 s"
-    ):
+    with refused("EG-JUMP l l_dot 0.3" if callable(given["l"]) and given["l_dot"] == 0 else "EG-CONTRADICTION l l_dot"):
         winch.simulate(1.0, {"th_dot": 1.0}, inputs=given)
 
 
 def test_a_rate_that_is_bound_of_a_held_input_is_refused() -> None:
     bound = build("winch", "numpy").bind(u={"l": 1.0, "l_dot": 1.0})
-    refused: Any = {"match": "input l_dot is bound to 1, but it is the rate of l, which is constant"}
-    with pytest.raises(eg.UsageError, **refused):
-        bound.simulate(1.0, {"th_dot": 1.0})
-    with pytest.raises(eg.UsageError, **refused):
-        bound.sensitivities(["th"], 1.0, {"th_dot": 1.0})
-    with pytest.raises(eg.UsageError, **refused):
-        bound.simulate_many(1.0, {"th_dot": 1.0}, count=2)
+    refuses("EG-CONTRADICTION l_dot l 1", bound.simulate, 1.0, {"th_dot": 1.0})
+    refuses("EG-CONTRADICTION l_dot l 1", bound.sensitivities, ["th"], 1.0, {"th_dot": 1.0})
+    refuses("EG-CONTRADICTION l_dot l 1", bound.simulate_many, 1.0, {"th_dot": 1.0}, count=2)
     let_out = bound.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + t"}, **TIGHT)
     assert abs(let_out["th_dot"][-1] - 0.25) < 1e-9
-    with pytest.raises(eg.UsageError, match="l_dot is not the rate of l, which is a number in each run"):
+    with refused("EG-CONTRADICTION l_dot l"):
         bound.simulate_many(1.0, {"th_dot": 1.0}, inputs={"l": [1.0, 2.0], "l_dot": [1.0, 2.0]})
 
 
 def test_a_short_pulse_is_a_jump() -> None:
     pulse = "where(t > 0.5, 1, 0)*where(t < 0.501, 1, 0)"
-    with pytest.raises(eg.UsageError, match=r"l_dot, but it jumps at t = 0\.5"):
+    with refused("EG-JUMP l_dot 0.5"):
         build("winch", "numpy").simulate(1.0, {"th_dot": 1.0}, inputs={"l": f"1 + 0.1*{pulse}"})
 
 
@@ -212,5 +205,4 @@ def test_inputs_that_move_everything_are_integrated() -> None:
     run = mod.simulate(1.0, inputs={"l": "t**3"}, **TIGHT)
     assert np.abs(run["x"] - run.t**3).max() < 1e-12
     assert np.abs(run["x_ddot"] - 6.0 * run.t).max() < 1e-9
-    with pytest.raises(eg.UsageError, match="leave method= out"):
-        mod.simulate(1.0, inputs={"l": "t**3"}, method="kinematic")
+    refuses("EG-UNSUPPORTED method=", mod.simulate, 1.0, inputs={"l": "t**3"}, method="kinematic")

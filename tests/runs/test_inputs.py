@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused, refuses
 from scipy.interpolate import CubicSpline
 from sweeps import TARGETS
 
@@ -126,46 +127,39 @@ def test_signals_that_the_model_declares(target: str, tmp_path: Path) -> None:
     other.prismatic("J", other.ground, other.body("cart", mass=1.0), axis="x", coordinate="s")
     other.input("w")
     other.input("u", signal="w + s_ddot")
-    with pytest.raises(eg.ModelError, match="the acceleration 's_ddot' cannot(.|\n)*the input 'w' cannot be used here"):
-        other.compile()
+    refuses("EG-REFERENCE inputs.u.signal s_ddot", other.compile)
 
 
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        ("k*r", "no name in input u 'r'"),
-        ("u + 1", "no name in input u 'u'"),
-        ("k*", "input u: .*not a valid expression"),
-        ("().__class__", "input u"),
-        (([0, 1], [1, 2, 3]), "input u: times and values"),
-        ([1, 2, 3], "a Signal, an expression as text"),
-        (([0.0, 0.0], [1.0, 2.0]), "times must increase, not go from 0.0 to 0.0"),
-        (([0, 1], [1, np.nan]), "must be finite"),
-        (lambda t, x: x, "one number at each time"),
-        (
-            lambda t: t,
-            r"input u: its function must be callable as f\(t, x\), and .*lambda>\(t\) is not; write it with both",
-        ),
-        (lambda t, x, gain: gain, "bind its other arguments"),
-        (lambda t, x: np.nan, "input u is nan at t = 0 s"),
-        (lambda t, x: None if t > 0.25 else 0.0, "input u .* returned None at t = 0.[23]"),
+        ("k*r", "EG-NAME-UNKNOWN r"),
+        ("u + 1", "EG-NAME-UNKNOWN u"),
+        ("k*", "EG-EXPRESSION u"),
+        ("().__class__", "EG-EXPRESSION u"),
+        (([0, 1], [1, 2, 3]), "EG-SHAPE u"),
+        ([1, 2, 3], "EG-TYPE expression"),
+        (([0.0, 0.0], [1.0, 2.0]), "EG-RANGE 0.0"),
+        (([0, 1], [1, np.nan]), "EG-NUMBER finite"),
+        (lambda t, x: x, "EG-SHAPE time"),
+        (lambda t: t, "EG-TYPE u"),
+        (lambda t, x, gain: gain, "EG-TYPE arguments"),
+        (lambda t, x: np.nan, "EG-NOT-FINITE u 0"),
+        (lambda t, x: None if t > 0.25 else 0.0, "EG-SHAPE u"),
     ],
 )
 def test_wrong_inputs(cart: Any, value: Any, words: str) -> None:
-    with pytest.raises(eg.UsageError, match=words):
-        cart.simulate((0, 1), inputs={"u": value})
+    refuses(words, cart.simulate, (0, 1), inputs={"u": value})
 
 
 def test_wrong_signals_and_names(cart: Any) -> None:
-    with pytest.raises(eg.UsageError, match="no interpolation 'quintic'; there are linear, zero-order, cubic"):
-        eg.Signal([0, 1], [1, 2], "quintic")
-    for inputs, words in (({"v": 1.0}, "'v'"), (3.0, "mapping")):
-        with pytest.raises(eg.UsageError, match=words):
-            cart.simulate(1.0, inputs=inputs)
+    refuses("EG-NAME-UNKNOWN quintic", eg.Signal, [0, 1], [1, 2], "quintic")
+    for inputs, words in (({"v": 1.0}, "EG-NAME-UNKNOWN v"), (3.0, "EG-TYPE mapping")):
+        refuses(words, cart.simulate, 1.0, inputs=inputs)
     with pytest.raises(ZeroDivisionError) as caught:
         cart.simulate(1.0, inputs={"u": lambda t, x: 1 / 0})
     assert caught.value.__notes__ == ["raised by the function of input u, called as f(0, x)"]
-    with pytest.raises(eg.SimulationError, match=r"stopped near .*input u is inf at t = 0.[23]"):
+    with refused("EG-STALLED u"):
         cart.simulate(1.0, inputs={"u": lambda t, x: 0.0 if t < 0.25 else np.inf}, method="LSODA", max_step=0.1)
 
 

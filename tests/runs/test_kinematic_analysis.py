@@ -9,6 +9,7 @@ from __future__ import annotations
 import models
 import numpy as np
 import pytest
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -123,23 +124,20 @@ def test_starting_at_a_change_point_is_refused() -> None:
     m = parallelogram("2*pi*t")
     m.guess(bend=0, psi=0)
     mod = m.compile(target="numpy")
-    with pytest.raises(eg.PartitionError, match="the initial position is singular.*branches meet there"):
-        mod.kinematic_analysis(t=[0.0, 0.1])
-    with pytest.raises(eg.PartitionError, match="the initial position is singular"):
-        mod.simulate(0.1)
+    refuses("EG-PARTITION branches", mod.kinematic_analysis, t=[0.0, 0.1])
+    refuses("EG-PARTITION singular", mod.simulate, 0.1)
 
 
 def test_a_driver_that_goes_too_far_stops_at_the_dead_centre(crank: eg.Module) -> None:
     """With the crank longer than the rod, it stops where the rod stands across the guide: sin(theta) = l / r."""
     mod = crank.bind(p={"r": 0.3, "l": 0.2})
-    with pytest.raises(eg.PartitionError, match=r"cannot be followed to its end: stop at t = 0.0729727.*joints C") as e:
+    with refused("EG-PARTITION C 0.0729727656") as e:
         mod.kinematic_analysis(t=np.linspace(0, 1, 101))
     part = e.value.reached
     assert (len(part), part.complete) == (8, False)
     assert part.stop.t == pytest.approx(np.arcsin(2 / 3) / 10, abs=1e-12)
     assert np.isfinite(part.a).all()
-    with pytest.raises(eg.SimulationError, match=r"t = 0.0729728 s.*C.r_y stays open by 0.\d+ m; change the drivers"):
-        mod.simulate(1.0)
+    refuses("EG-STALLED 0.0729728 C.r_y", mod.simulate, 1.0)
 
 
 def test_any_coordinate_leads_and_gives_the_same_motion(four_bar: eg.Module) -> None:
@@ -197,26 +195,24 @@ def test_a_led_slider_stops_at_its_dead_centres(free_crank: eg.Module) -> None:
     assert stop.moving == ("theta", "bend")
     assert (len(part), part["s"][-1]) == (21, pytest.approx(0.4))  # the stop itself is one of the points
     assert np.isfinite(part.a[:, :-1]).all()
-    with pytest.raises(eg.PartitionError, match="s cannot be prescribed from the initial position.*branches meet"):
-        free_crank.kinematic_analysis(s=[0.4, 0.3], initial={"theta": 0.0})
+    refuses("EG-PARTITION s", free_crank.kinematic_analysis, s=[0.4, 0.3], initial={"theta": 0.0})
 
 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({}, "there is no range"),
-        ({"theta": [0, 1], "s": [0.3, 0.4]}, "theta, s cannot all be prescribed: 1 degree of freedom"),
-        ({"thet": [0, 1]}, "no coordinate or rate 'thet'.*theta"),
-        ({"theta": [0, 1], "s_dot": 1}, "s_dot is given without values of s"),
-        ({"theta": [0, 1, 2], "theta_dot": [1, 2]}, "one length, not theta: 3, theta_dot: 2"),
-        ({"t": [0, 1], "theta": [0, 1]}, "theta varies with t: give theta_dot"),
-        ({"theta": [0, 1], "initial": {"theta_dot": 1}}, "positions only, not theta_dot"),
-        ({"theta": [0, 1], "initial": [0, 1]}, r"initial must name values or have shape \(3,\)"),
+        ({}, "EG-MISSING range"),
+        ({"theta": [0, 1], "s": [0.3, 0.4]}, "EG-PARTITION theta 1"),
+        ({"thet": [0, 1]}, "EG-NAME-UNKNOWN thet"),
+        ({"theta": [0, 1], "s_dot": 1}, "EG-MISSING s_dot"),
+        ({"theta": [0, 1, 2], "theta_dot": [1, 2]}, "EG-SHAPE 3 theta_dot 2"),
+        ({"t": [0, 1], "theta": [0, 1]}, "EG-MISSING theta theta_dot"),
+        ({"theta": [0, 1], "initial": {"theta_dot": 1}}, "EG-REFERENCE theta_dot"),
+        ({"theta": [0, 1], "initial": [0, 1]}, "EG-SHAPE (3,)"),
     ],
 )
 def test_what_cannot_be_requested(free_crank: eg.Module, asked: dict[str, object], said: str) -> None:
-    with pytest.raises(eg.UsageError, match=said):
-        free_crank.kinematic_analysis(**asked)
+    refuses(said, free_crank.kinematic_analysis, **asked)
 
 
 def test_limits_of_every_coordinate(four_bar: eg.Module, free_crank: eg.Module) -> None:
@@ -229,8 +225,7 @@ def test_limits_of_every_coordinate(four_bar: eg.Module, free_crank: eg.Module) 
     assert (stroke.lower, stroke.upper) == pytest.approx((0.2, 0.4), abs=1e-14)
     near = free_crank.motion_range("s", within=(0.3, 0.5), initial={"s": 0.35})
     assert (near.lower, near.upper, near.stops[0]) == (0.3, pytest.approx(0.4), None)
-    with pytest.raises(eg.UsageError, match="is not within"):
-        free_crank.motion_range("s", within=(0.5, 0.6), initial={"s": 0.35})
+    refuses("EG-RANGE within", free_crank.motion_range, "s", within=(0.5, 0.6), initial={"s": 0.35})
 
 
 def test_how_long_drivers_can_go_on(crank: eg.Module) -> None:
@@ -268,8 +263,7 @@ def test_values_in_any_order_are_those_of_the_sweep(four_bar: eg.Module, crank: 
     ):
         np.testing.assert_allclose(found.x[:, order], swept.x, atol=1e-11)
         np.testing.assert_allclose(found.a[:, order], swept.a, atol=1e-9)
-    with pytest.raises(eg.UsageError, match=r"159155 turns"):
-        four_bar.kinematic_analysis(theta=[0.0, 1e6])
+    refuses("EG-TOO-LARGE 159155", four_bar.kinematic_analysis, theta=[0.0, 1e6])
 
 
 def test_solving_and_integrating_agree(crank: eg.Module) -> None:
@@ -303,10 +297,7 @@ def test_events_of_driven_runs_are_located(crank: eg.Module) -> None:
 
 
 def test_what_driven_runs_refuse(crank: eg.Module) -> None:
-    with pytest.raises(eg.AssemblyError, match="theta = 0.5"):
-        crank.simulate(1.0, initial={"theta": 0.5})
-    with pytest.raises(eg.UsageError, match="has no option 'lband'"):
-        crank.simulate(1.0, lband=1)
+    refuses("EG-LOOP-OPEN 0.5 theta", crank.simulate, 1.0, initial={"theta": 0.5})
+    refuses("EG-NAME-UNKNOWN lband", crank.simulate, 1.0, lband=1)
     pendulum = eg.load_example("pendulum").compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="'kinematic' is for mechanisms without degrees of freedom"):
-        pendulum.simulate(1.0, method="kinematic")
+    refuses("EG-UNSUPPORTED kinematic", pendulum.simulate, 1.0, method="kinematic")

@@ -12,6 +12,7 @@ import pytest
 import scipy.linalg
 import scipy.signal
 from analysed import compiled
+from refusals import refuses
 
 import eomgen as eg
 
@@ -81,8 +82,7 @@ def test_the_full_form() -> None:
         expected = np.stack([judges.first(partial(mod.outputs, 0.0), x, e, h=1e-4) for e in np.eye(mod.n_x)], 1)
         np.testing.assert_allclose(full.C, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
         assert full.states == mod.x_names
-        with pytest.raises(eg.UsageError, match="full form"):
-            full.second_order()
+        refuses("EG-UNSUPPORTED full", full.second_order)
 
 
 def test_a_rolling_disc_is_stable_above_the_critical_spin() -> None:
@@ -156,8 +156,7 @@ def test_state_space_names_and_display() -> None:
     np.testing.assert_allclose(gain[0, 0], 1.0, rtol=1e-12)
     vectors = found.eigenvectors
     np.testing.assert_allclose(found.A @ vectors, vectors * found.eigenvalues, rtol=0, atol=1e-9)
-    with pytest.raises(eg.UsageError, match="no inputs"):
-        compiled("spring_four_bar").linearize().state_space()
+    refuses("EG-UNSUPPORTED inputs", lambda: compiled("spring_four_bar").linearize().state_space())
 
 
 def test_choices_and_mistakes() -> None:
@@ -167,13 +166,12 @@ def test_choices_and_mistakes() -> None:
     assert by_slider.states == ("s", "s_dot")
     assert by_crank.states == ("theta", "theta_dot")
     for wrong, message in (
-        ({"independent": ["s", "theta"]}, "must name 1 different"),
-        ({"independent": ["thetta"]}, "did you mean theta"),
-        ({"form": "big"}, "minimal, full"),
-        ({"x": [1.0]}, "must have shape"),
+        ({"independent": ["s", "theta"]}, "EG-PARTITION 1"),
+        ({"independent": ["thetta"]}, "EG-NAME-UNKNOWN theta"),
+        ({"form": "big"}, "EG-CHOICE full"),
+        ({"x": [1.0]}, "EG-SHAPE shape"),
     ):
-        with pytest.raises(eg.UsageError, match=message):
-            mod.linearize(**wrong)
+        refuses(message, mod.linearize, **wrong)
 
 
 def changes(mod: object, x: np.ndarray) -> None:
@@ -261,8 +259,7 @@ def test_rigid_body_modes_and_modes_that_diverge() -> None:
 
 def test_no_equilibrium_no_modes() -> None:
     mod = compiled("slider_crank")
-    with pytest.raises(eg.UsageError, match="needs an equilibrium, and at this state"):
-        mod.modes(mod.x0())
+    refuses("EG-UNSUPPORTED equilibrium", lambda: mod.modes(mod.x0()))
     assert mod.modes().frequencies.shape == (1,)
 
 
@@ -274,8 +271,7 @@ def test_a_position_by_names() -> None:
     np.testing.assert_allclose(mod.modes({"A": 0.0}).frequencies, np.sqrt(9.81 / 0.5), rtol=1e-12)
     turned = mod.linearize({"A": 0.1, "A_dot": 0.0})
     np.testing.assert_allclose(turned.A, [[0.0, 1.0], [-9.81 / 0.5 * np.cos(0.1), 0.0]], rtol=1e-12)
-    with pytest.raises(eg.UsageError, match="B"):
-        mod.modes({"B": 0.1})
+    refuses("EG-NAME-UNKNOWN B", mod.modes, {"B": 0.1})
     double = compiled("double_pendulum")
     by_output = double.modes({"theta1": 0, "theta2": 0}).frequencies  # theta2 = theta1 + bend, an output
     np.testing.assert_allclose(by_output, double.modes({"theta1": 0, "bend": 0}).frequencies, rtol=1e-9)

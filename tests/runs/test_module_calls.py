@@ -14,6 +14,7 @@ import models
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -51,11 +52,9 @@ def test_shapes_of_every_call_for_one_state_and_a_batch(target: str) -> None:
         with pytest.raises(eg.UsageError):
             call(*before, np.zeros(n + 1))
         for wrong in ([0.0] * max(1, result.size), np.zeros(shape, np.float32), np.zeros((2, *shape))):
-            with pytest.raises(eg.UsageError, match="out"):
-                call(*before, one, out=wrong)
+            refuses("EG-SHAPE out", call, *before, one, out=wrong)
     assert mod.inverse_dynamics(batch[:n_q], batch[n_q:], batch[n_q:]).shape == (mod.n_v, 4)
-    with pytest.raises(eg.UsageError, match="independent"):
-        mod.constraints(x[:n_q], rows="some")
+    refuses("EG-CHOICE independent", mod.constraints, x[:n_q], rows="some")
     assert "redundant at the reference" in mod.report()
     assert "1 degree of freedom" in repr(mod)
 
@@ -197,16 +196,16 @@ def test_calls_take_values_by_name_under_either_name(turning: eg.Module) -> None
 @pytest.mark.parametrize("name", ["rhs", "project", "mass_matrix", "inverse_dynamics"])
 def test_what_is_given_twice_or_not_known_is_refused(turning: eg.Module, name: str) -> None:
     given, call = arguments(turning, name, turning.x0()), getattr(turning, name)
-    with pytest.raises(eg.UsageError, match="p and parameters are the same argument; give one of them"):
-        call(*given, p={"m_r": 1.0}, parameters={"m_r": 1.0})
-    with pytest.raises(eg.UsageError, match="p and parameters are the same argument; give one of them"):
-        call(*given, *([0.0] if name == "project" else []), turning.p, parameters={"m_r": 1.0})  # its second is t
-    with pytest.raises(eg.UsageError, match="u and inputs are the same argument; give one of them"):
-        call(*given, u=[0.0], inputs={"tau": 0.0})
-    with pytest.raises(eg.UsageError, match=r"m_x.*(m_r|parameter)"):
-        call(*given, p={"m_x": 1.0})
-    with pytest.raises(eg.UsageError, match="tau"):
-        call(*given, inputs={"tau": "fast"})
+    second = [0.0] if name == "project" else []  # t
+    for keys, places in (
+        ({"p": {"m_r": 1.0}, "parameters": {"m_r": 1.0}}, ()),
+        ({"parameters": {"m_r": 1.0}}, (*second, turning.p)),
+        ({"u": [0.0], "inputs": {"tau": 0.0}}, ()),
+    ):
+        with pytest.raises(eg.UsageError, match="argument; give one"):  # the code of a compiled call is EG-SHAPE
+            call(*given, *places, **keys)
+    refuses("EG-NAME-UNKNOWN m_x", call, *given, p={"m_x": 1.0})
+    refuses("EG-NUMBER tau", call, *given, inputs={"tau": "fast"})
 
 
 @pytest.fixture(scope="module")
@@ -237,8 +236,7 @@ def test_a_run_goes_on_from_the_last_state_of_another(links: Any) -> None:
     many = links.simulate_many(1.0, initial=first, parameters={"g": [9.81, 1.62]})
     np.testing.assert_array_equal(many.x[:, 0], links.simulate((0, 1.0), first).x[:, -1])
     other = models.build("slider_crank").compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="the run has states theta1.*the model has theta, B"):
-        other.simulate(1.0, first)
+    refuses("EG-SHAPE theta1 B", other.simulate, 1.0, first)
     loop = other.simulate((0.0, 0.5))
     np.testing.assert_allclose(other.simulate((0.5, 0.6), loop).x[:, 0], loop.x[:, -1], rtol=0, atol=1e-12)
 
@@ -246,7 +244,7 @@ def test_a_run_goes_on_from_the_last_state_of_another(links: Any) -> None:
 @pytest.mark.parametrize("call", [lambda m: m.x0(theta=90), lambda m: m.simulate(0.01, initial={"theta": 90.0})])
 def test_an_initial_angle_of_many_turns_is_noted(call: Callable[[Any], Any]) -> None:
     module = eg.load_example("pendulum").compile(target="numpy")
-    with pytest.warns(UserWarning, match=r"theta = 90 is an angle of 14.3 turns.*write deg\(90\)") as noted:
+    with pytest.warns(UserWarning, match=r"theta = 90 .*14.3 .*deg\(90\)") as noted:
         call(module)
     assert [Path(str(one.filename)).name for one in noted] == [Path(__file__).name]
     module.x0(theta=12.0)
@@ -274,5 +272,4 @@ def test_a_wrong_name_is_reported_with_the_nearest(held: dict[str, Any], kind: s
             getattr(held[kind], name)
         assert not hasattr(held[kind], name)
         assert getattr(held[kind], name, 3) == 3
-    with pytest.raises(AttributeError, match=f"^{kind} has no attribute 'zzz'; there are .*, "):
-        _ = held[kind].zzz
+    refuses(f"EG-UNAVAILABLE {kind} 'zzz'", getattr, held[kind], "zzz")

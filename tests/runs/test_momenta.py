@@ -7,6 +7,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -105,5 +106,4 @@ def pendulum(text: str, mass: object = 1, body: str = "bob") -> eg.Model:
 
 @pytest.mark.parametrize("text", ["x(com)", "total_mass"])
 def test_a_mechanism_without_mass_has_no_sums(text: str) -> None:
-    with pytest.raises(eg.ModelError, match="no body has a mass"):
-        pendulum(text, mass=0).check()
+    refuses("EG-NO-INERTIA outputs", lambda: pendulum(text, mass=0).check())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refuses
 from sweeps import TARGETS
 
 import eomgen as eg
@@ -96,9 +97,7 @@ def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> 
 @pytest.mark.parametrize("target", TARGETS)
 def test_welds_that_rebound_values_part_are_named(target: str) -> None:
     mod = held_twice().compile(target=target)
-    with pytest.raises(eg.AssemblyError, match=r"off by 0\.1\) can never hold: no coordinate changes it"):
-        mod.simulate(1.0, parameters={"l3": 0.4})
+    refuses("EG-LOOP-OPEN 0.1", mod.simulate, 1.0, parameters={"l3": 0.4})
     bound = mod.bind(p={"l3": 0.4})
     for call in (lambda: bound.rhs(0, []), lambda: bound.project([]), lambda: bound.reactions(0, [])):
-        with pytest.raises(eg.ProjectionError, match=r"largest residual at \w\.r_x, 0\.1"):
-            call()
+        refuses("EG-PROJECTION .r_x 0.1", call)

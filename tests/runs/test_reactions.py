@@ -16,6 +16,7 @@ import sympy
 import yaml
 from analysed import compiled
 from random_models import Placement
+from refusals import refuses
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
@@ -339,22 +340,17 @@ def test_inputs_that_change_from_state_to_state() -> None:
     for k in range(3):
         np.testing.assert_allclose(found[..., k], module.reactions(0.0, x[:, k], u=u[:, k]), atol=1e-10)
     assert np.abs(found[..., 2] - module.reactions(0.0, x[:, 2])).max() > 1.0
-    with pytest.raises(eg.EomgenError, match=r"u must have shape \(1,\), or \(1, k\) for k states"):
-        module.multipliers(0.0, x, u=np.zeros((1, 2)))
+    refuses("EG-SHAPE u (1,)", module.multipliers, 0.0, x, u=np.zeros((1, 2)))
 
 
 def test_what_reactions_refuse() -> None:
     module = compiled("slider_crank")
-    with pytest.raises(eg.EomgenError, match=r"x must have shape \(6,\) or \(6, k\)"):
-        module.reactions(0.0, np.zeros(4))
-    with pytest.raises(eg.EomgenError, match=r"t must be a number or have shape \(2,\)"):
-        module.reactions(np.zeros(3), np.repeat(module.x0()[:, None], 2, axis=1))
-    with pytest.raises(eg.EomgenError, match="out must be"):
-        module.reactions(0.0, module.x0(), out=np.zeros(3))
+    refuses("EG-SHAPE x (6,)", module.reactions, 0.0, np.zeros(4))
+    refuses("EG-SHAPE t (2,)", lambda: module.reactions(np.zeros(3), np.repeat(module.x0()[:, None], 2, axis=1)))
+    refuses("EG-SHAPE out", lambda: module.reactions(0.0, module.x0(), out=np.zeros(3)))
     s, s_dot = sympy.symbols("s s_dot")
     bare = eg.Model.from_lagrangian("bare", s_dot**2 / 2 - s**2, [s]).compile(target="numpy")
-    with pytest.raises(eg.EomgenError, match="no joints between bodies"):
-        bare.reactions(0.0, bare.x0())
+    refuses("EG-UNSUPPORTED between", lambda: bare.reactions(0.0, bare.x0()))
 
 
 def test_parameters_by_name_serve_multipliers_and_reactions() -> None:
@@ -363,8 +359,6 @@ def test_parameters_by_name_serve_multipliers_and_reactions() -> None:
     np.testing.assert_array_equal(mod.reactions(0.0, x, p={"m_s": 2.0}), bound.reactions(0.0, x))
     np.testing.assert_array_equal(mod.multipliers(0.0, x, p={"m_s": 2.0}), bound.multipliers(0.0, x))
     assert np.abs(mod.reactions(0.0, x) - bound.reactions(0.0, x)).max() > 1e-3
-    with pytest.raises(eg.UsageError, match="kk"):
-        mod.reactions(0.0, x, p={"kk": 1.0})
+    refuses("EG-NAME-UNKNOWN kk", mod.reactions, 0.0, x, p={"kk": 1.0})
     for call in (mod.reactions, mod.actuator_forces):
-        with pytest.raises(eg.UsageError, match="^t must be a number"):
-            call("a", x)
+        refuses("EG-NUMBER t", call, "a", x)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused, refuses
 from rigid_scenes import SHAPES, G, on_floor, rigid
 from sweeps import TARGETS
 
@@ -22,40 +23,37 @@ def ball() -> Any:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({}, "needs step="),
-        ({"step": 0.0}, "step must be greater than 0 s"),
-        ({"step": -1e-3}, "step must be greater than 0 s"),
-        ({"step": "fast"}, "step"),
-        ({"step": 1e-3, "rtol": 1e-6}, "rtol"),
-        ({"step": 1e-3, "contact_tolerence": 1e-6}, "contact_tolerance"),
-        ({"step": 1e-3, "contact_tolerance": 0.0}, "contact_tolerance must be greater than 0"),
-        ({"step": 1e-3, "contact_iterations": 0}, "contact_iterations must be a whole number from 1"),
-        ({"step": 1e-3, "events": "j_y"}, "watches no events"),
-        ({"step": 1e-3, "dense_output": True}, "dense_output"),
-        ({"step": 1e-3, "t_eval": [0.5, 0.1]}, "t_eval"),
-        ({"step": 1e-3, "span": (1.0, 0.0)}, "forwards only"),
+        ({}, "EG-MISSING step="),
+        ({"step": 0.0}, "EG-RANGE step 0"),
+        ({"step": -1e-3}, "EG-RANGE step 0"),
+        ({"step": "fast"}, "EG-NUMBER step"),
+        ({"step": 1e-3, "rtol": 1e-6}, "EG-NAME-UNKNOWN rtol"),
+        ({"step": 1e-3, "contact_tolerence": 1e-6}, "EG-NAME-UNKNOWN contact_tolerance"),
+        ({"step": 1e-3, "contact_tolerance": 0.0}, "EG-RANGE contact_tolerance 0"),
+        ({"step": 1e-3, "contact_iterations": 0}, "EG-RANGE contact_iterations 1"),
+        ({"step": 1e-3, "events": "j_y"}, "EG-UNSUPPORTED events"),
+        ({"step": 1e-3, "dense_output": True}, "EG-NAME-UNKNOWN dense_output"),
+        ({"step": 1e-3, "t_eval": [0.5, 0.1]}, "EG-RANGE t_eval"),
+        ({"step": 1e-3, "span": (1.0, 0.0)}, "EG-UNSUPPORTED forwards"),
     ],
 )
 def test_options(ball: Any, options: dict[str, Any], told: str) -> None:
-    with pytest.raises(eg.UsageError, match=told):
-        ball.simulate(options.pop("span", 0.2), {"j_y": 0.2}, method="moreau", **options)
+    refuses(told, lambda: ball.simulate(options.pop("span", 0.2), {"j_y": 0.2}, method="moreau", **options))
 
 
 def test_deep_start(ball: Any) -> None:
-    with pytest.raises(eg.UsageError, match=r"starts with shapes inside each other; contacts 'c': .* 0.05 m deep"):
-        ball.simulate(0.2, {"j_y": 0.05}, method="moreau", step=1e-3)
+    refuses("EG-CONTRADICTION c 0.05", ball.simulate, 0.2, {"j_y": 0.05}, method="moreau", step=1e-3)
 
 
 @pytest.mark.parametrize("method", [None, "Radau"])
 def test_other_methods_have_no_force_for_it(ball: Any, method: str | None) -> None:
-    with pytest.raises(eg.UsageError, match="have normal_law: rigid, which exerts impulses"):
-        ball.simulate(0.2, {"j_y": 0.2}, method=method)
+    refuses("EG-UNSUPPORTED normal_law", ball.simulate, 0.2, {"j_y": 0.2}, method=method)
 
 
 def test_residual_that_is_not_reached() -> None:
     """Few iterations: the run goes on, and a warning says in how many steps and by how much."""
     block = on_floor({"shape": "box", "size": (0.6, 0.2)}, {"friction": 0.4}, 0.1, 0.03, target="numpy")
-    with pytest.warns(UserWarning, match=r"of 20 steps leave a residual of the contact laws of up to .* m/s"):
+    with pytest.warns(UserWarning, match="of 20 steps"):
         run = block.simulate(
             0.02,
             {"j_y": 0.1, "j_x_dot": 1.0},
@@ -118,9 +116,7 @@ def test_what_has_no_impulses_says_so(target: str) -> None:
     floor = on_floor(SHAPES["circle"], {"friction": 0.3}, target=target)
     for entry, call in ENTRIES.items():
         what = "linearize" if entry == "modes" else entry
-        told = rf"^{what} is not available for .* contacts 'c' of 'on_floor'.*moreau"
-        with pytest.raises(eg.UnavailableError, match=told):
-            call(floor)
+        refuses(f"EG-UNAVAILABLE {what} 'c' 'on_floor' moreau", call, floor)
 
 
 @pytest.mark.parametrize("asked", ["power(c)", "force(c, on=b).y"])
@@ -132,12 +128,11 @@ def test_forces_of_rigid_contacts_as_outputs(asked: str) -> None:
     m.contacts("c", {**SHAPES["circle"], "on": body}, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.3))
     run = m.compile(target="numpy").simulate(0.01, {"j_y": 0.5}, method="moreau", step=1e-3, contact_forces=True)
     m.output("f", asked)
-    with pytest.raises(eg.ModelError, match=r"'c'.*normal_law: rigid.*exerts impulses, not forces") as told:
+    with refused(
+        "EG-UNSUPPORTED outputs.f.expression run.contact_forces.on(BODY)" + " normal(c)" * ("on=" not in asked)
+    ):
         m.compile(target="numpy")
-    if "on=" not in asked:
-        assert "normal(c)" in str(told.value)
-        assert {"normal(c)", "friction(c)"} <= set(run.columns.names)
-    assert "run.contact_forces.on(BODY)" in str(told.value)
+    assert {"normal(c)", "friction(c)"} <= set(run.columns.names)
     assert run.contact_forces.on("b").shape == (6, len(run))
 
 

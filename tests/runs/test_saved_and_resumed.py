@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from analysed import compiled
 from children import HANGS
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -130,7 +131,7 @@ def test_functions_as_inputs_go_on_and_others_are_refused(crank: Any, tmp_path: 
         return lambda t, x: size * np.sin(t) * x[1]
 
     go_through(crank, tmp_path / "run.ckpt", killed, 2, span=1, rtol=1e-6, inputs={"tau": drive(0.1)})
-    with pytest.raises(eg.UsageError, match=r"belongs to another run: inputs\.tau differ"):
+    with refused("EG-FILE-DAMAGED inputs.tau"):
         crank.simulate(1, rtol=1e-6, inputs={"tau": drive(0.2)}, checkpoint=tmp_path / "run.ckpt")
 
 
@@ -165,11 +166,11 @@ def test_kill_9(pendulum: Any, tmp_path: Path) -> None:
 
 
 CHANGES: list[tuple[dict[str, Any], str]] = [
-    ({"span": 2}, r"span, corners"),
+    ({"span": 2}, "span, corners"),
     ({"method": "RK45"}, "method"),
-    ({"rtol": 1e-5}, r"options\.rtol"),
-    ({"max_step": 0.1}, r"options\.max_step"),
-    ({"parameters": {"m2": 1.5}}, r"initial, parameters\.m2|parameters\.m2"),
+    ({"rtol": 1e-5}, "options.rtol"),
+    ({"max_step": 0.1}, "options.max_step"),
+    ({"parameters": {"m2": 1.5}}, "parameters.m2"),
     ({"initial": {"theta1": 0.1}}, "initial"),
     ({"events": ["theta1"]}, "events"),
     ({"t_eval": [0.5]}, "t_eval"),
@@ -182,12 +183,9 @@ def test_another_run_is_refused_by_name(pendulum: Any, plain: Any, crank: Any, t
     run = {"span": 1, "rtol": 1e-6}
     pendulum.simulate(checkpoint=file, **run)
     for change, names in CHANGES:
-        with pytest.raises(eg.UsageError, match=rf"belongs to another run: ({names}) differ; name another file"):
-            pendulum.simulate(checkpoint=file, **(run | change))
-    with pytest.raises(eg.UsageError, match="belongs to another run: code differ"):
-        plain.simulate(checkpoint=file, **run)
-    with pytest.raises(eg.UsageError, match="belongs to another run: model, model_digest, code"):
-        crank.simulate(checkpoint=file, **run)
+        refuses(f"EG-FILE-DAMAGED {names}", pendulum.simulate, checkpoint=file, **(run | change))
+    refuses("EG-FILE-DAMAGED code", plain.simulate, checkpoint=file, **run)
+    refuses("EG-FILE-DAMAGED model_digest", crank.simulate, checkpoint=file, **run)
     again = pendulum.simulate(checkpoint=file, resume=False, **(run | {"rtol": 1e-5}))
     require_same(pendulum.simulate(checkpoint=file, **(run | {"rtol": 1e-5})), again)
 
@@ -195,19 +193,17 @@ def test_another_run_is_refused_by_name(pendulum: Any, plain: Any, crank: Any, t
 def test_what_no_checkpoint_can_be_kept_of_is_refused(pendulum: Any, plain: Any, tmp_path: Path) -> None:
     file = tmp_path / "run.ckpt"
     for options, words in (
-        ({"method": "LSODA"}, "a run with method LSODA cannot keep a checkpoint"),
-        ({"method": "BDF", "dense_output": True}, "keeps no continuous solution"),
-        ({"checkpoint_every": -1}, "checkpoint_every must be a number of seconds"),
-        ({"checkpoint_every": float("nan")}, "checkpoint_every must be finite"),
-        ({"resume": "yes"}, "resume must be True, False or None"),
-        ({"resume": True}, "there is no checkpoint"),
-        ({"checkpoint": 3}, "must be the name of a file"),
-        ({"checkpoint": "a\0b"}, "must be the name of a file"),
+        ({"method": "LSODA"}, "EG-UNSUPPORTED LSODA"),
+        ({"method": "BDF", "dense_output": True}, "EG-UNSUPPORTED continuous"),
+        ({"checkpoint_every": -1}, "EG-RANGE checkpoint_every"),
+        ({"checkpoint_every": float("nan")}, "EG-NUMBER checkpoint_every"),
+        ({"resume": "yes"}, "EG-CHOICE resume"),
+        ({"resume": True}, "EG-FILE checkpoint"),
+        ({"checkpoint": 3}, "EG-TYPE file"),
+        ({"checkpoint": "a\0b"}, "EG-TYPE file"),
     ):
-        with pytest.raises(eg.UsageError, match=words):
-            plain.simulate(1, **{"checkpoint": file, **options})
-    with pytest.raises(eg.UsageError, match="resume needs checkpoint="):
-        pendulum.simulate(1, resume=True)
+        refuses(words, plain.simulate, 1, **{"checkpoint": file, **options})
+    refuses("EG-MISSING resume checkpoint=", pendulum.simulate, 1, resume=True)
     assert not file.exists()
 
 
@@ -220,7 +216,7 @@ def test_a_full_disk_does_not_end_the_run(pendulum: Any, tmp_path: Path, monkeyp
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(np, "savez", full)
-    with pytest.warns(UserWarning, match="the run goes on, but its checkpoint cannot be written"):
+    with pytest.warns(UserWarning, match="checkpoint"):
         again = pendulum.simulate(1, checkpoint=file, rtol=1e-6, resume=False)
     require_same(whole, again)
     assert file.read_bytes() == kept
@@ -264,12 +260,12 @@ def test_hostile_numbers_are_refused(pendulum: Any, tmp_path: Path, killed: Any)
     bad += [{"times": np.zeros((2, 2))}, {"notes": np.full((1, notes.shape[1]), 9.0)}, {"header": np.zeros(3)}]
     for change in bad:
         file.write_bytes(rewritten(file, **change))
-        with pytest.raises(eg.UsageError, match=r"is damaged, or is not a checkpoint|belongs to another run"):
+        with refused("EG-FILE-DAMAGED damaged"):
             pendulum.simulate(checkpoint=file, **run)
             pytest.fail(f"taken: {change}")
         file.write_bytes(good)
     file.write_bytes(rewritten(file, block=np.full_like(block, np.nan)))
-    with pytest.raises(eg.UsageError, match="damaged"):  # NaN is no row
+    with refused("EG-FILE-DAMAGED damaged"):  # NaN is no row
         pendulum.simulate(checkpoint=file, **run)
 
 
@@ -327,8 +323,7 @@ def test_hostile_files_are_refused(what: str, tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
     data = HOSTILE[what]
     file.write_bytes(data() if callable(data) else data)
-    with pytest.raises(eg.UsageError, match="is not a trajectory saved by eomgen"):
-        eg.load_trajectory(file)
+    refuses("EG-FILE-DAMAGED trajectory", eg.load_trajectory, file)
 
 
 def test_every_cut_of_a_trajectory_is_refused_or_whole(tmp_path: Path) -> None:
@@ -361,19 +356,16 @@ def test_a_trajectory_with_other_arrays_is_refused_by_name(tmp_path: Path) -> No
         damaged.append({**arrays, "header": np.array(text)})
     for changed in damaged:
         np.savez(file, **changed)
-        with pytest.raises(eg.UsageError, match=r"run\.npz is not a trajectory saved by eomgen"):
-            eg.load_trajectory(file)
+        refuses("EG-FILE-DAMAGED run.npz", eg.load_trajectory, file)
     np.savez(file, **arrays)  # as another program would write the same arrays
     assert eg.load_trajectory(file).t_events[0].shape == arrays["t_events_0"].shape
 
 
 def test_files_that_are_no_runs(tmp_path: Path) -> None:
     np.savez(tmp_path / "y.npz", header=np.array(json.dumps({"format": "other"})))
-    with pytest.raises(eg.UsageError, match="not a trajectory .* no seal, which is another format"):
-        eg.load_trajectory(tmp_path / "y.npz")
+    refuses("EG-FILE-DAMAGED format", eg.load_trajectory, tmp_path / "y.npz")
     with pytest.raises(FileNotFoundError):
         eg.load_trajectory(tmp_path / "none.npz")
     run = models.build("pendulum").compile(target="numpy").simulate(0.1)
     for name in ("run.xls", "run.xlsx.gz"):
-        with pytest.raises(eg.UsageError, match=r"\.npz or \.csv"):
-            run.save(tmp_path / name)
+        refuses("EG-FILE .npz .csv", run.save, tmp_path / name)

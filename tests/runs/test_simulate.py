@@ -10,6 +10,7 @@ import models
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refused, refuses
 from scipy.integrate import DOP853, RK45, solve_ivp
 from sweeps import TARGETS
 
@@ -92,8 +93,7 @@ def test_values_between_the_steps(crank: eg.Module, target: str) -> None:
     np.testing.assert_allclose(there["x_ddot"], exact["x_ddot"], atol=1e-4)
     assert there.residuals.position < 1e-13
     assert run.at(0.1)["theta"].shape == (1,)
-    with pytest.raises(eg.UsageError, match=r"within the run, 0 .. 0\.4 s"):
-        run.at(0.5)
+    refuses("EG-RANGE 0 0.4", run.at, 0.5)
     plain, kept = (mod.simulate(0.1, dense_output=keep) for keep in (False, True))
     np.testing.assert_array_equal(plain.at(0.05).x, kept.at(0.05).x)
 
@@ -113,36 +113,36 @@ def test_events_are_projected_and_counted_across_corners() -> None:
 
 #: Options of a run of 1 s and what is said of them; those of every method first.
 TOLERANCES: list[tuple[dict[str, Any], str]] = [
-    ({"rtol": -1}, "rtol must not be negative and must be finite, not -1"),
-    ({"atol": float("nan")}, "atol must not be negative and must be finite, not nan"),
-    ({"atol": "small"}, "atol must be a number, not 'small'"),
-    ({"atol": [1e-9]}, r"atol must be a number or have shape \(2,\)"),
-    ({"max_step": -1}, "max_step must be greater than 0 s, not -1"),
-    ({"max_step": "long"}, "max_step must be a number, not 'long'"),
-    ({"first_step": 0}, "first_step must be greater than 0 s and finite, not 0"),
-    ({"first_step": 2}, "first_step must not exceed the span of 1 s, not 2"),
+    ({"rtol": -1}, "EG-RANGE rtol -1"),
+    ({"atol": float("nan")}, "EG-RANGE atol"),
+    ({"atol": "small"}, "EG-NUMBER small"),
+    ({"atol": [1e-9]}, "EG-SHAPE (2,)"),
+    ({"max_step": -1}, "EG-RANGE max_step 0 -1"),
+    ({"max_step": "long"}, "EG-NUMBER long max_step"),
+    ({"first_step": 0}, "EG-RANGE first_step 0"),
+    ({"first_step": 2}, "EG-RANGE first_step 1 2"),
 ]
 OPTIONS: list[tuple[dict[str, Any], str]] = [
-    ({"method": "RK54"}, "did you mean RK4 or RK45"),
-    ({"method": "taylor"}, "did you mean Taylor"),
-    ({"method": 3}, "OdeSolver"),
-    ({"method": "RK4"}, "RK4 needs step="),
-    ({"method": "RK4", "step": "fine"}, "step must be a number, not 'fine'"),
-    ({"method": "RK4", "step": -0.1}, "step must be greater than 0 s, not -0.1"),
-    ({"method": "LSODA", "min_step": -1}, "min_step must not be negative"),
-    ({"min_step": 1e-3}, "'min_step'"),
-    ({"rtoll": 1e-3}, "'rtoll'; did you mean rtol"),
-    ({"span": (0, 1, 2)}, "span must be"),
-    ({"span": ("now", "then")}, r"span must be \(start, end\) in seconds"),
-    ({"t_eval": [0.5, 0.2]}, "t_eval must be times in order"),
-    ({"t_eval": [0.5, 20.0]}, "t_eval must be times in order"),
-    ({"t_eval": [0, "end"]}, "t_eval must be a number, not 'end'"),
-    ({"initial": np.zeros(3)}, r"shape \(2,\) \[theta, theta_dot\]"),
-    ({"initial": {"thetta": 1.0}}, "did you mean theta"),
-    ({"parameters": {"q": 1.0}}, "no parameter 'q'"),
-    ({"events": 3}, "event must be a name, an expression or a function"),
-    ({"events": {"low": {"expression": "theta", "terminal": "once"}}}, "event low: terminal .* not 'once'"),
-    ({"dense_output": 1}, "dense_output must be True or False"),
+    ({"method": "RK54"}, "EG-NAME-UNKNOWN RK45?"),
+    ({"method": "taylor"}, "EG-NAME-UNKNOWN Taylor"),
+    ({"method": 3}, "EG-CHOICE OdeSolver"),
+    ({"method": "RK4"}, "EG-MISSING RK4 step="),
+    ({"method": "RK4", "step": "fine"}, "EG-NUMBER fine"),
+    ({"method": "RK4", "step": -0.1}, "EG-RANGE step -0.1"),
+    ({"method": "LSODA", "min_step": -1}, "EG-RANGE min_step"),
+    ({"min_step": 1e-3}, "EG-NAME-UNKNOWN min_step"),
+    ({"rtoll": 1e-3}, "EG-NAME-UNKNOWN rtoll"),
+    ({"span": (0, 1, 2)}, "EG-TYPE span"),
+    ({"span": ("now", "then")}, "EG-NUMBER span"),
+    ({"t_eval": [0.5, 0.2]}, "EG-RANGE t_eval"),
+    ({"t_eval": [0.5, 20.0]}, "EG-RANGE t_eval"),
+    ({"t_eval": [0, "end"]}, "EG-NUMBER end t_eval"),
+    ({"initial": np.zeros(3)}, "EG-SHAPE (2,) theta_dot"),
+    ({"initial": {"thetta": 1.0}}, "EG-NAME-UNKNOWN theta"),
+    ({"parameters": {"q": 1.0}}, "EG-NAME-UNKNOWN q"),
+    ({"events": 3}, "EG-TYPE expression"),
+    ({"events": {"low": {"expression": "theta", "terminal": "once"}}}, "EG-RANGE once"),
+    ({"dense_output": 1}, "EG-TYPE dense_output"),
 ]
 
 
@@ -152,8 +152,7 @@ def test_wrong_options_are_reported(swing: eg.Module) -> None:
         *(({"method": m, **given}, words) for m in METHODS for given, words in TOLERANCES),
     ]:
         for _ in range(2):  # what was found for a run before is no excuse
-            with pytest.raises(eg.UsageError, match=words):
-                swing.simulate(**({"span": 1.0} | options))
+            refuses(words, swing.simulate, **({"span": 1.0} | options))
 
     class Mine(DOP853):
         def __init__(self, *args: Any, anything: Any = None, **options: Any) -> None:
@@ -182,7 +181,7 @@ def rooted(request: pytest.FixtureRequest) -> eg.Module:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_failure_on_the_way_becomes_a_simulation_error_with_its_cause(rooted: eg.Module, method: str) -> None:
-    with pytest.raises(eg.SimulationError, match=rf"{method} stopped near t = .*x = 1(\.0|,)") as caught:
+    with refused(f"EG-STALLED {method} near") as caught:
         rooted.simulate(3.0, {"x": 0.0, "x_dot": 6.0}, method=method)
     assert isinstance(caught.value.__cause__, eg.EvaluationError)
     assert 0.1 < caught.value.__cause__.time < 0.3
@@ -195,8 +194,7 @@ def test_a_passing_failure_only_shortens_the_step(rooted: eg.Module) -> None:
 
 
 def test_a_failure_at_the_start_is_no_simulation_error(swing: eg.Module, rooted: eg.Module) -> None:
-    with pytest.raises(eg.EomgenError, match="m is the mass of body 'bob'"):
-        swing.simulate(1.0, parameters={"m": 0.0})
+    refuses("EG-SHAPE bob m", swing.simulate, 1.0, parameters={"m": 0.0})
     with pytest.raises(eg.NonFiniteError):
         rooted.simulate(1.0, {"x": 2.0})
 
@@ -206,8 +204,7 @@ def test_unbounded_motion_is_named(target: str) -> None:
     m = eg.Model("burst")
     m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
     m.torque("push", "J", "2*s**3")  # s = 1/(1 - t) from s = s' = 1
-    with pytest.raises(eg.SimulationError, match=r"at t = (1|0\.99\d*) s|grows without bound|not finite"):
-        m.compile(target=target).simulate(3.0, {"s": 1.0, "s_dot": 1.0})
+    refuses("EG-STALLED", lambda: m.compile(target=target).simulate(3.0, {"s": 1.0, "s_dot": 1.0}))
 
 
 def test_an_initial_array_is_projected(crank: eg.Module) -> None:

@@ -119,7 +119,7 @@ CAUSES = [
     ({"w": 0.0}, 0.0, [0.0], eg.SingularMassMatrixError, "moving theta meets no inertia"),
     ({}, 1e200, [0.0], eg.NonFiniteError, "squares of theta, bend, psi, theta_dot, bend_dot, psi_dot overflow"),
     ({}, 0.0, [np.nan], eg.NonFiniteError, "look for an input that is not a number"),
-    ({}, np.nan, [0.0], eg.NonFiniteError, "already are not; check the state"),
+    ({}, np.nan, [0.0], eg.NonFiniteError, "are given; check the state"),
 ]
 
 
