@@ -35,8 +35,14 @@ FAULTS = (
     ),
     Fault(
         "rounding-of-products", "ROWS",
-        "abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1]",
-        "abs(x[0]) * e[1] + e[0] * e[1]",
+        "Operation('mul', ARITHMETIC, operator.mul, np.multiply, '{}*{}', '{} * {}', 2, (lambda g, y, a, b: "
+        "b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: abs(a)), error=lambda y, x, e: "
+        "abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1], rule=lambda g, a, b: g.mul(a, b), sympy=lambda "
+        "s, a, b: a * b, commutative=True, analytic=True, dimension='product')",
+        "Operation('mul', ARITHMETIC, operator.mul, np.multiply, '{}*{}', '{} * {}', 2, (lambda g, y, a, b: "
+        "b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: 0.0), error=lambda y, x, e: "
+        "abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1], rule=lambda g, a, b: g.mul(a, b), sympy=lambda "
+        "s, a, b: a * b, commutative=True, analytic=True, dimension='product')",
         "bounds of rounding lose that of a product's second factor",
         "tests/core/test_operations.py::test_identities_hold_nothing_and_what_is_small_does",
     ),
