@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
 import subprocess
 import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import models
 import numpy as np
 import pytest
@@ -232,6 +235,20 @@ def test_random_calls_neither_crash_nor_leak(model: Any, version: str, tmp_path:
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run(["./abuse", "150"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_functions_are_those_of_the_headers_of_the_standard(version: str, tmp_path: Path) -> None:
+    """A compiler compares the declarations of the standard, as FMPy has them; every function of a unit is exported."""
+    with zipfile.ZipFile(ball().derive().write_fmu(tmp_path / "m.fmu", version)) as archive:
+        archive.extractall(tmp_path)
+    headers, source = Path(fmpy.__file__).parent / "c-code", tmp_path / "sources" / f"fmi{version[0]}.c"
+    flags = ["-std=c99", "-pedantic-errors", "-DFMI_HEADERS", f"-I{headers}", "-fsyntax-only"]
+    subprocess.run(["gcc", *flags, str(source)], check=True)
+    declared = set(re.findall(r"\b(fmi[23]\w+)TYPE\s+fmi", (headers / f"fmi{version[0]}Functions.h").read_text()))
+    library = ctypes.CDLL(str(next(tmp_path.glob("binaries/*/*"))))
+    assert len(declared) > 40
+    assert [name for name in sorted(declared) if not hasattr(library, name)] == []
 
 
 @pytest.mark.thorough

@@ -66,7 +66,7 @@ def emit_fmu(program: Program, start: Sequence[float], version: str) -> FmuFiles
     layer = read_layer()
     sources |= {name: layer[name] for name in _STEPPERS}
     sources |= {name: definitions(text) + text for name in _COMMON if (text := read_template(f"fmu/{name}"))}
-    sources["eomgen_fmu.h"] = read_template("fmu/eomgen_fmu.h")
+    sources |= {name: read_template(f"fmu/{name}") for name in ("eomgen_fmu.h", "fmi_calls.h")}
     face = f"fmi{version[0]}.c"
     sources[face] = read_template(f"fmu/{face}")
     token = _token(version, facts, start, sources)
