@@ -107,8 +107,8 @@ def _with_jax(module: Any, wanted: np.ndarray, x: np.ndarray) -> dict[str, Any]:
 def registers(quick: bool) -> Table | None:
     """What the machine code needs, which NVRTC tells without a GPU; None without NVRTC."""
     from eomgen import pipeline
+    from eomgen.codegen.targets.cuda import emit_device_text
     from eomgen.device.nvrtc import compile_with_log
-    from eomgen.emit.cuda.device_text import emit_device_text
     from eomgen.errors import MissingDependencyError
 
     rows = []

@@ -6,6 +6,7 @@ import gc
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from threading import Lock
+from time import perf_counter
 
 from threadpoolctl import ThreadpoolController
 
@@ -38,3 +39,11 @@ def alone() -> Iterator[None]:
             _inside -= 1
             if not _inside:
                 _before.close()
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note how long a stage takes (s)."""
+    start = perf_counter()
+    yield
+    seconds[stage] = perf_counter() - start

@@ -1,25 +1,38 @@
-"""What a derivation gives: the equations, to read and to count; :class:`~.api.equations.Equations` compiles them."""
+"""Mechanism -> Kinematics, Mobility, TreeEquations: together a Derivation, the equations to read and to count.
+
+:class:`~.api.equations.Equations` compiles them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
-from .base.texts import fold
-from .equations import TreeEquations
+import numpy as np
+
+from .alone import alone, timed
+from .base.texts import fold, shown
+from .describe.dotted_names import Undotted
+from .describe.sympy_face import names_of
+from .equations import GIVEN, METHODS, TreeEquations, take_given
+from .errors import AssemblyError, cannot, ill_typed, off_range
 from .graph.copies import copied
 from .graph.core import Expr
 from .graph.count import Operations, count
-from .kinematics import Kinematics
-from .kinematics.mobility import Mobility
+from .kinematics import Kinematics, analyse
+from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.report import MechanismReport, report
 from .reading import Displayed
 from .records import dataclass
+from .runtime.near_names import unknown
 
 if TYPE_CHECKING:
+    from .describe.mechanism import Mechanism
     from .program.choice import Choice
+
+OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
 @dataclass(frozen=True)
@@ -96,3 +109,94 @@ class Derivation(Displayed):
         if self.choice is not None:
             lines += fold(str(self.choice), 80, "", "  ")
         return "\n".join(lines)
+
+
+Derived = TypeVar("Derived", bound=Derivation)
+
+
+@np.errstate(all="ignore")  # results are looked at, and what is not finite is refused by name
+def derive_mechanism(
+    kind: type[Derived],
+    mechanism: Mechanism,
+    method: str,
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+    described: float = 0.0,
+) -> Derived:
+    """The equations of motion of what a model says; ``described`` is the time (s) that reading it took."""
+    from .program.choice import choose
+    from .program.reaction_laws import with_reactions
+
+    seconds = {"describe": described}
+    chosen = choose_method(mechanism, method)
+    with alone(), timed(seconds, "kinematics"):
+        plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip
+        wanted = tuple(map(plain, names_of("independent", independent, "a coordinate")))
+        kinematics = analyse(mechanism, wanted)
+        mobility = _mobility(kinematics, wanted)
+    if baumgarte is not None:
+        kinematics = _stabilised(kinematics, chosen, baumgarte)
+    with alone(), timed(seconds, "equations"):
+        if mechanism.reaction_quantities or mechanism.switched or any(force.by_reaction for force in mechanism.forces):
+            kinematics = with_reactions(kinematics, mobility)
+        choice: Choice | None = None
+        if chosen == GIVEN:
+            tree = take_given(kinematics)
+        elif chosen != "auto":
+            tree = METHODS[chosen](kinematics)
+        else:
+            tree, choice = choose(kinematics, mobility)
+    with alone():
+        return kind(kinematics, mobility, tree, seconds, choice)
+
+
+def choose_method(mechanism: Mechanism, method: str) -> str:
+    """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
+    bare = mechanism.lagrangian is not None
+    if not isinstance(method, str):
+        raise ill_typed(f"method must be the name of a method, not {shown(method)}")
+    if mechanism.given is not None:
+        if method not in ("auto", GIVEN):
+            raise cannot(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")
+        return GIVEN
+    if method == "auto" and bare:
+        return "lagrange"
+    if method not in ("auto", *METHODS):
+        raise unknown("method", method, ("auto", *METHODS))
+    if bare and method not in OF_LAGRANGIANS:
+        raise cannot(
+            f"method {method!r} needs bodies; for a bare Lagrangian there are: auto, {', '.join(OF_LAGRANGIANS)}"
+        )
+    return method
+
+
+def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:
+    """Kinematics with Baumgarte's terms, of the method that takes them."""
+    from .equations.augmented import stabilise
+
+    if method != "augmented":
+        raise cannot(f"baumgarte works with method 'augmented' only, not {method!r}; other methods project states")
+    try:
+        alpha, beta = (float(x) for x in baumgarte)
+    except (TypeError, ValueError):
+        raise ill_typed(f"baumgarte must be two numbers (alpha, beta) in 1/s, not {baumgarte!r}") from None
+    if not (0.0 <= alpha < float("inf") and 0.0 <= beta < float("inf")):
+        raise off_range(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
+    if not kinematics.constraints.labels:
+        raise cannot("baumgarte stabilises constraints, and this model has no constraints; leave it out")
+    return stabilise(kinematics, alpha, beta)
+
+
+def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
+    """The mobility; a loop that does not close is reported at its joint's place in the description."""
+    try:
+        return find_mobility(kinematics, independent)
+    except AssemblyError as error:
+        mechanism = kinematics.mechanism
+        names = [row.partition(".")[0] for row in error.rows]
+        places = [f"joints.{j.name}" for j in mechanism.joints if j.name in names]
+        places += [f"constraints.{c.name}" for c in mechanism.constraints if c.name in names]
+        place = min(places, key=lambda place: names.index(place.partition(".")[2]), default=None)
+        if place is None:
+            raise
+        raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows, error.code) from None

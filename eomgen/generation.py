@@ -14,7 +14,7 @@ from .emit.write import write_package
 from .errors import EomgenError, cannot
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
-from .targets import find_target
+from .targets import find_function, find_target
 from .verification.record import record
 from .verification.record_calls import RECORDED, record_calls
 from .verification.recorded import FILE
@@ -63,7 +63,10 @@ def generate(
     if row.whole:
         if precision != "double":
             raise cannot(f"precision is for packages; target {target} makes one file")
-        return row.write(equations, folder, fmi)
+        unit = find_function(row.whole)(
+            build(equations, target), BoundModel(compile_core(equations, "numpy")), folder, fmi
+        )
+        return Path(unit)
     program = build(equations, target)
     if row.kernels and not row.module:
         program = with_start(equations, program)

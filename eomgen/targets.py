@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from importlib import import_module
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import no_such
@@ -37,7 +36,13 @@ DEVICE_KERNELS = (
     "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs", "events", "resets",
 )  # fmt: skip
 
-#: Those of them that are called with the time first, as functions of a module; others take it by name.
+#: Kernels that a functional mock-up unit calls; it has those of them that the model has.
+FMU_KERNELS = (
+    *("rhs", "jacobian", "input_jacobian", "parameter_jacobian", "project", "kinematics"),
+    *("outputs", "output_derivatives", "events", "resets"),
+)
+
+#: Kernels of a device that are called with the time first, as functions of a module; others take it by name.
 TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
 
 #: What they need besides NumPy.
@@ -54,8 +59,10 @@ class Target(NamedTuple):
     package : callable or str
         (Program, context) -> the files of a package that stands alone, by name; or "file.function" within eomgen.  The
         context is what templates are rendered with: name, doc, metadata, layouts, calls.
-    module : bool
-        Whether a module can be compiled and loaded in this process.
+    load : str
+        "file.function" of (program, options, seconds, functions) that makes a core in this process.
+    functions : str
+        "file.function" of (program, options) that makes functions of another library, or of a device, in this process.
     arrays : bool
         Whether loops over arrays do better than straight-line code.
     precisions : bool
@@ -63,29 +70,30 @@ class Target(NamedTuple):
     kernels : tuple of str
         The functions it has, of :data:`~.base.kernel_table.KERNELS`; all if empty.
     whole : str
-        "file.function" of (equations, directory, version) that writes one file instead of a package.
+        "file.function" of (program, module, directory, version) that writes one file instead of a package.
     """
 
     about: str
     package: Callable[[Any, dict[str, Any]], Files] | str = ""
-    module: bool = False
+    load: str = ""
+    functions: str = ""
     arrays: bool = False
     precisions: bool = False
     kernels: tuple[str, ...] = ()
     whole: str = ""
 
+    @property
+    def module(self) -> bool:
+        """Whether a module can be compiled and loaded in this process."""
+        return bool(self.load)
+
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
-        found: Files = (self.package if callable(self.package) else _find(self.package))(program, context)
+        found: Files = (self.package if callable(self.package) else find_function(self.package))(program, context)
         return found
 
-    def write(self, equations: Any, directory: Path, version: str) -> Path:
-        """The one file of a model."""
-        written: Path = _find(self.whole)(equations, directory, version)
-        return written
 
-
-def _find(name: str) -> Callable[..., Any]:
+def find_function(name: str) -> Callable[..., Any]:
     """The function "file.function" within eomgen."""
     home, function = name.rsplit(".", 1)
     found: Callable[..., Any] = getattr(import_module(f".{home}", __package__), function)
@@ -93,21 +101,39 @@ def _find(name: str) -> Callable[..., Any]:
 
 
 TARGETS: dict[str, Target] = {
-    "cython": Target("extension module", "emit.package.cython_package", module=True),
+    "cython": Target("extension module", "emit.package.cython_package", load="codegen.targets.cython.load"),
     "numpy": Target(
-        "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
+        "Python that imports NumPy alone, no compiler",
+        "emit.package.numpy_package",
+        load="codegen.targets.numpy.load",
+        arrays=True,
     ),
-    "c": Target("C library", "emit.c_library.c_library", precisions=True),
+    "c": Target("C library", "codegen.targets.c.c_library", precisions=True),
     "casadi": Target(
-        "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
+        "set of functions of CasADi's SX",
+        "codegen.targets.traced.casadi_package",
+        functions="codegen.targets.traced.functions",
+        arrays=True,
+        kernels=TRACED_KERNELS,
     ),
-    "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
+    "jax": Target(
+        "set of pure functions of JAX",
+        "codegen.targets.traced.jax_package",
+        functions="codegen.targets.traced.functions",
+        arrays=True,
+        kernels=TRACED_KERNELS,
+    ),
     "cuda": Target(
         "set of functions of many states on NVIDIA GPUs",
-        "emit.cuda.cuda_package.cuda_package",
+        "codegen.targets.cuda.cuda_package",
+        functions="codegen.targets.cuda.functions",
         kernels=DEVICE_KERNELS,
     ),
-    "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
+    "fmu": Target(
+        "functional mock-up unit for other simulators, one file",
+        whole="codegen.targets.fmu.generate_fmu",
+        kernels=FMU_KERNELS,
+    ),
 }
 
 

@@ -21,7 +21,7 @@ ROOMS = {
     "forces": "elements forces",
     "runs": "analysis ensembles identification runtime simulation",
     "model": "base describe loading robots",
-    "code": "base compilation cuda_functions device emit fmu generation layer program targets traced_functions",
+    "code": "base codegen compilation device emit generation layer program targets",
     "shown": "base cli explain printing reading show",
     "core": "alone base graph numeric pipeline records simplify syntax_trees verification",
     "attack": "base describe robots",

@@ -130,7 +130,7 @@ class Equations(Derivation):
         Returns
         -------
         module
-            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.traced_functions.traced_functions`.
+            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.codegen.targets.traced.functions`.
 
         Examples
         --------
@@ -142,9 +142,8 @@ class Equations(Derivation):
         >>> model.rhs(0, [0.1, 0.0], model.u_values, model.p_values)
         DM([0, -1.95873])
         """
-        from ..traced_functions import traced_functions
-
-        return traced_functions(self, "casadi")
+        functions: ModuleType = pipeline.make_functions(self, "casadi")
+        return functions
 
     def to_cuda(self, device: Device | None = None) -> DeviceModule:
         """The functions of the model on a GPU of NVIDIA: batches of states, and ensembles of runs.
@@ -167,9 +166,8 @@ class Equations(Derivation):
         MissingDependencyError
             cuda-core or NVRTC is not installed.
         """
-        from ..cuda_functions import cuda_functions
-
-        return cuda_functions(self, device)
+        functions: DeviceModule = pipeline.make_functions(self, "cuda", device=device)
+        return functions
 
     def to_jax(self) -> ModuleType:
         """Pure functions of the model in JAX, in 64 bits: for ``jit``, ``vmap`` and ``grad``.
@@ -179,14 +177,13 @@ class Equations(Derivation):
         Returns
         -------
         module
-            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.traced_functions.traced_functions`.
+            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.codegen.targets.traced.functions`.
         """
-        from ..traced_functions import traced_functions
-
-        return traced_functions(self, "jax")
+        functions: ModuleType = pipeline.make_functions(self, "jax")
+        return functions
 
     def write_fmu(self, path: str | Path | None = None, version: str = "2.0") -> Path:
-        """Write a functional mock-up unit for other simulators: see :func:`eomgen.fmu.write_fmu`.
+        """Write a functional mock-up unit for other simulators: see :func:`eomgen.codegen.targets.fmu.write_fmu`.
 
         Parameters
         ----------
@@ -208,9 +205,11 @@ class Equations(Derivation):
         >>> m.derive().write_fmu("pendulum.fmu", version="3.0").name  # doctest: +SKIP
         'pendulum.fmu'
         """
-        from ..fmu import write_fmu
+        from ..codegen.targets.fmu import write_fmu
+        from ..runtime.bound_model import BoundModel
 
-        return write_fmu(self, path, version)
+        program = pipeline.build(self, "fmu")
+        return write_fmu(program, BoundModel(pipeline.compile_core(self, "numpy")), path, version)
 
     def _picture_and_facts(self, facts: str) -> str:
         return side_by_side(self._picture, facts)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
-from .. import pipeline
 from ..base.inline_pictures import picture_html, side_by_side
 from ..describe.builder import Builder
 from ..errors import too_large
@@ -62,8 +61,10 @@ class Model(Builder):
             return cls.from_description(describe_method(method, name, **options))
 
     def check(self) -> MechanismReport:
-        """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
-        return pipeline.check(self)
+        """Check all that can be checked before a simulation, assembly included; see ``eomgen.api.check``."""
+        from .check import check
+
+        return check(self)
 
     def draw(
         self,

@@ -12,10 +12,15 @@ from typing import Any
 
 from ..base.kernel_table import KERNELS, Kernel, Sizes
 from ..base.names import hint, joined
+from ..equations.positive import require_inertia
+from ..equations.tree_equations import TreeEquations
 from ..errors import UsageError, ill_placed, no_such
 from ..graph.substitute import symbols_of
+from ..kinematics import Kinematics
+from ..kinematics.mobility import Mobility
 from .block_groups import SHIFTS
 from .blocks import BlockMaker
+from .collect import collect_metadata, collect_terms
 from .held_columns import HELD
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
@@ -26,6 +31,28 @@ from .terms import SystemTerms
 ABI = 1
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
+
+
+def program_of(
+    kinematics: Kinematics, mobility: Mobility, tree: TreeEquations, made: dict[str, Any], arrays: bool,
+    kernels: Sequence[str] | None,
+) -> Program:  # fmt: skip
+    """The functions to generate; ``made`` joins the metadata, ``arrays``: loops do better than long text."""
+    kinematics.mechanism.require_values()
+    idle = require_inertia(kinematics, mobility, tree)
+    strange = bool(idle or kinematics.mechanism.negative)
+    if strange and tree.accelerations is not None:
+        tree = tree.without_accelerations()  # which divide by pivots before they are looked at
+    metadata = collect_metadata(kinematics, mobility, tree) | made
+    limits = Limits(unrolled_loops=0) if arrays else None
+    if idle:
+        metadata["no_inertia"] = idle
+    if kinematics.mechanism.negative:
+        metadata["indefinite"] = True
+    if strange:
+        limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
+    terms = collect_terms(kinematics, mobility, tree, in_c=not arrays and not strange)
+    return build_program(terms, metadata, kernels=kernels, limits=limits)
 
 
 def build_program(

@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import pipeline
 from ..base.algebra import from_quaternion
-from ..derivation import Derivation
+from ..derivation import Derivation, derive_mechanism
 from ..describe.mechanism import Body, Mechanism
 from ..equations import METHODS
 from ..errors import EomgenError, ToolchainError
@@ -110,7 +110,7 @@ def _state_of(bench: Bench, case: Case, other: BoundModel) -> Array:
 
 
 def _made(mechanism: Mechanism, method: str) -> BoundModel:
-    derived = pipeline.derive_mechanism(Derivation, mechanism, method)
+    derived = derive_mechanism(Derivation, mechanism, method)
     return BoundModel(pipeline.compile_core(derived, "numpy", ["rhs"]))
 
 

@@ -41,7 +41,7 @@ static void logger(void *environment, fmi2String name, fmi2Status status, fmi2St
 }
 static const fmi2CallbackFunctions functions = {logger, calloc, free, NULL, NULL};
 #else
-static void logger(fmi3Environment environment, fmi3Status status, fmi3String category, fmi3String message)
+static void logger(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
 {
     (void)environment, (void)status, (void)category, (void)message;
 }

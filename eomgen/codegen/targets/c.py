@@ -1,14 +1,14 @@
-"""Stage emit: Program -> a C library that stands alone, what builds it, and a program that steps it in real time."""
+"""Target c: Program -> a C library that stands alone, what builds it, and a program that steps it in real time."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from ..program import Program
-from .c import emit_c
-from .example_state import example_state
-from .single_precision import in_single_precision
-from .sources import number_texts, render
+from ...emit.c import emit_c
+from ...emit.example_state import example_state
+from ...emit.single_precision import in_single_precision
+from ...emit.sources import number_texts, render
+from ...program import Program
 
 
 def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:

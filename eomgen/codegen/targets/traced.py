@@ -1,4 +1,4 @@
-"""Stage emit: Program -> functions that another library traces, differentiates and compiles: CasADi, JAX.
+"""Targets casadi, jax: Program -> functions that another library traces, differentiates and compiles.
 
 One Python file of straight-line functions of lists, the linear algebra that closed loops need, and a few functions in
 which the libraries differ (``templates/casadi``, ``templates/jax``).  Projections take a fixed number of steps.
@@ -6,21 +6,24 @@ which the libraries differ (``templates/casadi``, ``templates/jax``).  Projectio
 
 from __future__ import annotations
 
+from hashlib import sha256
+from types import ModuleType
 from typing import Any, NamedTuple
 
-from ..base.kernel_table import NAMED
-from ..base.limits.constraints import ACCEPTED, DIFFERENTIATED
-from ..errors import cannot
-from ..graph.functions import Function
-from ..numeric.scales import Space
-from ..numeric.user_functions import Curve, Surface
-from ..program import Program
-from ..targets import TRACED_KERNELS
-from .c_functions import used_calls
-from .example_state import example_state
-from .numpy_text import print_block_of_lists, print_constants_of_lists
-from .pair_sums_used import refuse_sums
-from .sources import render
+from ...base.files import find_module, load_source
+from ...base.kernel_table import NAMED
+from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
+from ...emit.c_functions import used_calls
+from ...emit.example_state import example_state
+from ...emit.numpy_text import print_block_of_lists, print_constants_of_lists
+from ...emit.pair_sums_used import refuse_sums
+from ...emit.sources import render
+from ...errors import MissingDependencyError, cannot
+from ...graph.functions import Function
+from ...numeric.scales import Space
+from ...numeric.user_functions import Curve, Surface
+from ...program import Program
+from ...targets import TRACED_KERNELS
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
 LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}
@@ -53,7 +56,7 @@ def emit_traced(program: Program, library: str, steps: int = STEPS) -> str:
     Parameters
     ----------
     program : Program
-        With the kernels :data:`~..targets.TRACED_KERNELS`.
+        With the kernels :data:`~eomgen.targets.TRACED_KERNELS`.
     library : {'casadi', 'jax'}
     steps : int, optional
         Newton steps onto the constraints of closed loops, at least 3.
@@ -190,3 +193,30 @@ def _table(function: Function) -> str:
     assert isinstance(table, Surface)
     nodes = table.nodes.reshape(-1, 4).tolist()
     return f"{head} = surface({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"
+
+
+def functions(program: Program) -> ModuleType:
+    """The functions of a model for a library, as a module made in this process: the same as the package.
+
+    It has functions such as ``rhs(t, x, u, p)``, the names ``x_names``, ``u_names``, ``p_names``, and the values
+    ``x0``, ``u_values``, ``p_values``.
+
+    Raises
+    ------
+    UsageError
+        Something in the model has no form that the library can trace: functions in C, or a method that solves by
+        pivoting.
+    MissingDependencyError
+        The library is not installed.
+    """
+    library = program.metadata["target"]
+    text = emit_traced(program, library)
+    name = f"{program.name}_{library}_{sha256(text.encode()).hexdigest()[:16]}"
+    found = find_module(name)
+    if found is not None:
+        return found
+    title, requirement = LIBRARIES[library]
+    try:
+        return load_source(name, f"<{name}>", text.encode())
+    except ImportError as error:
+        raise MissingDependencyError(f"{title} is not installed; pip install '{requirement}'") from error

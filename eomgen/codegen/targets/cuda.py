@@ -1,7 +1,7 @@
-"""Stage emit, CUDA: Program -> one text of device code: the C functions as they are, batches and ensembles around them.
+"""Target cuda: Program -> one text of device code: the C functions as they are, batches and ensembles around them.
 
 Nothing is included from outside, so that NVRTC needs no headers.  Each kernel is compiled only where a macro
-``EOMGEN_WANT_...`` asks for it.
+``EOMGEN_WANT_...`` asks for it.  The package around the text compiles it and runs it through cuda-core.
 """
 
 from __future__ import annotations
@@ -10,20 +10,25 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ...device.device_module import DeviceModule
+from ...emit.c import count_constants, emit_c
+from ...emit.c_functions import used_calls
+from ...emit.c_text import print_precompute
+from ...emit.carried import carry
+from ...emit.example_state import example_state
+from ...emit.pair_sums_used import refuse_sums
+from ...emit.sources import render
+from ...emit.straight import cut
 from ...errors import cannot
 from ...layer import read_layer, read_sources
 from ...program import Block, KernelDriver, Program
 from ...simulation.events import GO_ON, RESET, crowd_of
-from ...targets import DEVICE_KERNELS
-from ..c import count_constants, emit_c
-from ..c_functions import used_calls
-from ..c_text import print_precompute
-from ..example_state import example_state
-from ..pair_sums_used import refuse_sums
-from ..sources import render
-from ..straight import cut
+from ...targets import CUDA_REQUIREMENTS, DEVICE_KERNELS, TIMED_ON_DEVICE
+
+if TYPE_CHECKING:
+    from ...device.arrays_on_device import Device
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
@@ -43,7 +48,7 @@ def emit_device_text(program: Program) -> str:
     Parameters
     ----------
     program : Program
-        With the kernels :data:`~...targets.DEVICE_KERNELS`.
+        With the kernels :data:`~eomgen.targets.DEVICE_KERNELS`.
 
     Raises
     ------
@@ -173,3 +178,33 @@ def _flattened(files: Iterable[str], texts: Mapping[str, str], there: set[str]) 
         return _INCLUDE.sub(inserted, texts[name])
 
     return "\n".join(flat(name) for name in files)
+
+
+def cuda_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """``__init__.py``, ``<name>.cu``, and what of eomgen they need."""
+    facts = describe_device(program)
+    context = context | {"facts": facts, "requirements": CUDA_REQUIREMENTS, "timed": TIMED_ON_DEVICE}
+    init = render("cuda/__init__.py.j2", context)
+    found = carry({"__init__.py": init})
+    context |= {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
+    return {
+        "py.typed": "",
+        "__init__.py": init,
+        f"{program.name}.cu": emit_device_text(program),
+        "pyproject.toml": render("cuda/pyproject.toml.j2", context),
+        "README.md": render("cuda/README.md.j2", context),
+        **found,
+    }
+
+
+def functions(program: Program, device: Device | None = None) -> DeviceModule:
+    """The functions of a model on a device, by default the first GPU: the same as the package.
+
+    Raises
+    ------
+    UsageError
+        The model calls functions in C; there is no such GPU.
+    MissingDependencyError
+        cuda-core or NVRTC is not installed.
+    """
+    return DeviceModule(emit_device_text(program), describe_device(program), program.metadata, device)

@@ -1,0 +1,44 @@
+"""Target cython: Program -> an extension module, written, compiled and loaded here, or taken from the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...alone import alone, timed
+from ...compilation import Options, compile_sources, load_core
+from ...compilation.native_faults import blame_source
+from ...compilation.shortcut import Shortcut
+from ...errors import ToolchainError, no_such
+from ...graph.functions import Function
+from ...program import Program
+from ...program.fingerprint import fingerprint
+
+
+def load(
+    program: Program, options: Mapping[str, Any], seconds: dict[str, float], functions: Mapping[str, Function]
+) -> Any:
+    """Emit, compile and load; a fault in the C source of one of the functions is reported at its place."""
+    allowed = Options.__dataclass_fields__
+    unknown = [name for name in options if name not in allowed]
+    if unknown:
+        raise no_such(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
+    chosen = Options(**options)
+    with alone(), timed(seconds, "emit"):
+        shortcut = Shortcut(fingerprint(program), chosen)
+        artifact = shortcut.find()
+        if artifact is None:
+            from ...emit import emit_c
+            from ...emit.sources import keep_bytecode
+
+            keep_bytecode(shortcut.cache.templates)
+            sources = emit_c(program)
+    with timed(seconds, "compile"):
+        if artifact is None:
+            try:
+                artifact = compile_sources(sources, program.name, chosen)
+            except ToolchainError as error:
+                raise blame_source(error, functions.values()) or error from None
+            shortcut.keep(artifact)
+    with alone(), timed(seconds, "load"):
+        return load_core(artifact)
