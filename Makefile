@@ -65,7 +65,7 @@ fuzz: $(VENV)/.installed-test
 	  $(if $(SEED),--seed $(SEED))
 
 clean:
-	@rm -rf $(VENV) build dist eomgen/built demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) build dist eomgen/_native*.so demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-plot: EXTRAS := plot

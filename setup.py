@@ -1,15 +1,11 @@
-"""The build of the package: what pyproject.toml says, and the compiled Cython layer where this computer can make it.
+"""The build of the package: what pyproject.toml says, and the extension module of all models, ``eomgen._native``.
 
-The layer is the same for all models.  Compiled here, it need not be compiled for a user's first model.  Without a
-compiler, or with EOMGEN_BUILD_LAYER=0, the wheel is one for all computers.
+It is compiled by eomgen's own code.  Where there is no compiler the build asks for the package ziglang, which has one.
 """
 
 from __future__ import annotations
 
-import functools
-import os
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,30 +13,17 @@ from setuptools import Command, Distribution, setup
 from setuptools.command.build import build
 
 ROOT = Path(__file__).parent
-PLACE = Path("eomgen", "built")
 sys.path.insert(0, str(ROOT))
 
-
-@functools.cache
-def compiling() -> bool:
-    """Whether the layer can be compiled here."""
-    if os.environ.get("EOMGEN_BUILD_LAYER", "1") == "0":
-        return False
-    try:
-        from eomgen.compilation import compiler, cython_layer
-
-        compiler.find_compiler()
-        cython_layer.find_python_headers()
-    except Exception as error:
-        print(f"eomgen: no code for this computer is put into the package: {error}", file=sys.stderr)
-        return False
-    return find_spec("Cython") is not None
+from eomgen.compilation import find_compiler  # noqa: E402
+from eomgen.compilation.native import build_native, product_in  # noqa: E402
+from eomgen.errors import ToolchainError  # noqa: E402
 
 
-class BuildLayer(Command):
-    """Compile the layer into the package."""
+class BuildNative(Command):
+    """Compile the extension module into the package."""
 
-    description = "compile the Cython layer that all models share"
+    description = "compile eomgen._native"
     user_options: ClassVar[list[tuple[str, str | None, str]]] = []
     editable_mode = False
 
@@ -50,21 +33,19 @@ class BuildLayer(Command):
     def finalize_options(self) -> None:
         self.set_undefined_options("build", ("build_lib", "build_lib"))
 
-    def run(self) -> None:
-        folder = (ROOT if self.editable_mode else Path(str(self.build_lib)).absolute()) / PLACE
-        compiled = compiling()
-        try:
-            from eomgen.compilation.install import install_layer
+    @property
+    def folder(self) -> Path:
+        """The package that is built."""
+        return (ROOT if self.editable_mode else Path(str(self.build_lib)).absolute()) / "eomgen"
 
-            install_layer(folder, compiled=compiled)
-        except Exception as error:  # the package is of use without
-            print(f"eomgen: the Cython layer is left to the first model: {error}", file=sys.stderr)
+    def run(self) -> None:
+        build_native(self.folder)
 
     def get_source_files(self) -> list[str]:
         return []
 
     def get_outputs(self) -> list[str]:
-        return [str(path) for path in (Path(str(self.build_lib)) / PLACE).rglob("*") if path.is_file()]
+        return [str(product_in(Path(str(self.build_lib), "eomgen")))]
 
     def get_output_mapping(self) -> dict[str, str]:
         return {}
@@ -73,14 +54,23 @@ class BuildLayer(Command):
 class Build(build):
     """The build with one step more."""
 
-    sub_commands: ClassVar[list[Any]] = [*build.sub_commands, ("build_layer", None)]
+    sub_commands: ClassVar[list[Any]] = [*build.sub_commands, ("build_native", None)]
 
 
-class ForThisComputer(Distribution):
-    """Its wheel bears the tag of this computer if it holds code for it."""
+class Compiled(Distribution):
+    """Its wheel bears the tag of this computer."""
 
     def has_ext_modules(self) -> bool:
-        return compiling()
+        return True
 
 
-setup(cmdclass={"build": Build, "build_layer": BuildLayer}, distclass=ForThisComputer)
+def compilers() -> list[str]:
+    """What must be installed for a compiler."""
+    try:
+        find_compiler()
+    except ToolchainError:
+        return ["ziglang>=0.13"]
+    return []
+
+
+setup(cmdclass={"build": Build, "build_native": BuildNative}, distclass=Compiled, setup_requires=compilers())

@@ -13,7 +13,7 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.compilation import Options, compile_sources, load_core
+from eomgen.compilation import Options, compile_model, load_core
 from eomgen.emit import emit_c
 from eomgen.module import Module
 from eomgen.program import Limits
@@ -93,7 +93,7 @@ def measure(make: Callable[[int], eg.Model], n: int, branches: int) -> dict[str,
     found["text"], sources = sum(map(len, emit_c(program).values())), emit_c(straight)
     found["straight text"] = sum(map(len, sources.values()))
     if n <= STRAIGHT:
-        modules["straight"] = Module(load_core(compile_sources(sources, equations.name, Options())))
+        modules["straight"] = Module(load_core(compile_model(sources, equations.name, Options())))
     x = np.random.default_rng(1).uniform(-1.0, 1.0, 2 * n)
     calls = {name: caller(module, x) for name, module in modules.items()}
     ours = modules["loops"].rhs(0.0, x)[n:]
@@ -139,7 +139,7 @@ def run(quick: bool) -> Report:
     notes = (
         f"rhs alone, by `recursive`; parameters are numbers. Functions of more than {Limits().rolled:,} operations are",
         "loops over alike bodies; 'straight' is the same without loops. 'compile' is from derived equations to a",
-        "loaded module, gcc included, with the Cython layer there. 'difference' is that of the accelerations from",
+        "loaded module, gcc included. 'difference' is that of the accelerations from",
         "Pinocchio's, relative to the largest. Pinocchio holds cubic tables, so that there is none of 800 bodies.",
     )
     return Report((Table("right-hand side", columns, rows),), tuple(limits), notes, details)

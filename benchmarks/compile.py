@@ -12,24 +12,18 @@ TITLE = "compilation of rhs alone"
 
 
 def run(quick: bool) -> Report:
-    """Compile in fresh processes from an empty cache, and with only the model-independent layer in it."""
+    """Compile in fresh processes from an empty cache."""
     links = 10 if quick else 100
     repeats = 1 if quick else 3
-    found: dict[str, list[dict[str, float]]] = {"empty cache": [], "layer ready": []}
+    results: list[dict[str, float]] = []
     for _ in range(repeats):
-        for label, results in found.items():
-            with cold_cache() as environment:
-                results.append(
-                    in_fresh_process("compile_chain", links, label == "layer ready", environment=environment)
-                )
-    rows: list[list[Any]] = []
-    for stage in found["empty cache"][0]:
-        samples = [Sample(tuple(r[stage] for r in results)).median for results in found.values()]
-        rows.append([stage, *samples])
-    total = Sample(tuple(r["total"] for r in found["empty cache"]))
+        with cold_cache() as environment:
+            results.append(in_fresh_process("compile_chain", links, environment=environment))
+    rows: list[list[Any]] = [[stage, Sample(tuple(r[stage] for r in results)).median] for stage in results[0]]
+    total = Sample(tuple(r["total"] for r in results))
     limits = [Limit(f"rhs of {links} links compiles from an empty cache in, best,", total.best, 10, "s")]
     notes = (
-        "Default flags; every parameter a symbol; 'layer ready': the Cython layer was compiled for another model.",
+        "Default flags; every parameter a symbol.",
         "No peer: SymPy's equations of a chain this long are out of reach. 'derive' is not part of the total.",
     )
-    return Report((Table(f"{links} links", ("stage", *found), rows),), tuple(limits), notes, dict(found))
+    return Report((Table(f"{links} links", ("stage", "s"), rows),), tuple(limits), notes, {"empty cache": results})

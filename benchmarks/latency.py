@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 import tempfile
 from collections import Counter
@@ -20,11 +19,10 @@ from .report import Limit, Report, Table
 TITLE = "latency of a whole process"
 FEW = 5  #: runs of each further peer
 MODELS = ("slider_crank", "double_pendulum")
-OTHER = "pendulum"  #: brings the layer into a cache that knows none of the models
 EXPORTED = "import slider_crank; run = slider_crank.simulate(10.0); assert run.t[-1] == 10.0 and len(run) > 100"
 OF_EXPORTED = "exported slider_crank, imported and run for 10 s"
-#: What was promised: seconds of a model that is new (the layer is there) and of one that is known, and how many times
-#: a bare ``import numpy`` an exported module takes for 10 s of motion.
+#: What was promised: seconds of a model that is new and of one that is known, and how many times a bare
+#: ``import numpy`` an exported module takes for 10 s of motion.
 NEW, KNOWN, TIMES = 1.2, 0.6, 2.5
 PEER = "SymPy, lambdify, solve_ivp: double_pendulum"
 #: Further peers: label -> package, task and its arguments; those that are installed run.
@@ -42,24 +40,6 @@ def cold_cache() -> Iterator[dict[str, str]]:
         yield {"EOMGEN_CACHE_DIR": folder}
 
 
-@contextmanager
-def cache_with_layer(layer: Path) -> Iterator[dict[str, str]]:
-    """Environment of a process whose cache holds the layer and no model."""
-    with cold_cache() as environment:
-        shutil.copytree(layer, environment["EOMGEN_CACHE_DIR"], dirs_exist_ok=True)
-        yield environment
-
-
-def build_layer(folder: Path) -> None:
-    """Have the layer built into a cache, which keeps nothing else."""
-    folder.mkdir(mode=0o700)
-    _run(OTHER, {"EOMGEN_CACHE_DIR": str(folder)})
-    shutil.rmtree(folder / "shortcuts", ignore_errors=True)
-    for manifest in (folder / "entries").glob("*/manifest.json"):
-        if json.loads(manifest.read_text(encoding="utf-8"))["kind"] != "layer":
-            shutil.rmtree(manifest.parent)
-
-
 def export(folder: Path) -> None:
     """Generate the slider-crank's package into a folder and install it there."""
     eomgen = str(Path(sys.executable).with_name("eomgen"))
@@ -72,19 +52,18 @@ def run(quick: bool) -> Report:
     """Time processes in turns, then break one of each kind down into stages and imports."""
     with tempfile.TemporaryDirectory(prefix="eomgen-bench-") as folder:
         place = Path(folder)
-        build_layer(place / "layer")
         export(place)
-        return _measure(1 if quick else 15, place / "layer", {"PYTHONPATH": str(place / "installed")})
+        return _measure(1 if quick else 15, {"PYTHONPATH": str(place / "installed")})
 
 
-def _measure(repeats: int, layer: Path, exported: dict[str, str]) -> Report:
+def _measure(repeats: int, exported: dict[str, str]) -> Report:
     found: dict[str, list[Finished]] = {}
     stages: dict[str, dict[str, float]] = {}
     imports: dict[str, float] = {}
     for repeat in range(repeats + 1):  # the first round makes bytecode, and is not counted
         took: dict[str, Finished] = {}
         for model in MODELS:
-            with cache_with_layer(layer) as environment:
+            with cold_cache() as environment:
                 took[f"eomgen run {model}, new"] = _run(model, environment)
                 took[f"eomgen run {model}, known"] = _run(model, environment)
                 if repeat == repeats:
@@ -101,7 +80,7 @@ def _measure(repeats: int, layer: Path, exported: dict[str, str]) -> Report:
                 if repeat:
                     found.setdefault(label, []).append(peer)
     for model in MODELS:
-        with cache_with_layer(layer) as environment:
+        with cold_cache() as environment:
             stages[f"{model}, new"] = _stages(model, environment)
     stages["double_pendulum, SymPy"] = json.loads(found[PEER][-1].stdout) | {"process": found[PEER][-1].wall}
 
@@ -121,14 +100,14 @@ def _measure(repeats: int, layer: Path, exported: dict[str, str]) -> Report:
     )
     ratio = wall[OF_EXPORTED].median / wall["import numpy"].median
     limits = (
-        Limit("slider-crank, new (layer present), median,", wall["eomgen run slider_crank, new"].median, NEW, "s"),
+        Limit("slider-crank, new, median,", wall["eomgen run slider_crank, new"].median, NEW, "s"),
         Limit("slider-crank, known, median,", wall["eomgen run slider_crank, known"].median, KNOWN, "s"),
         Limit("exported slider-crank, 10 s of motion, over a bare import of NumPy,", ratio, TIMES),
     )
     notes = (
         "5 s of the slider-crank (a closed loop), 10 s of the double pendulum; SymPy takes KanesMethod for the latter,",
         "solves and lambdifies it with cse to plain math, and integrates at the same tolerances, as the others do.",
-        "new: the cache holds the layer, which is built once for all models; known: it holds the model too.",
+        "new: the cache is empty; known: it holds the model.",
         "cpu: computed by the process and its children, on all cores; hardly depends on what else the machine does.",
         "'process' is the wall time of the run whose stages are shown; what is not in a stage is imports and output.",
     )

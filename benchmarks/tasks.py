@@ -64,14 +64,10 @@ def derive_panda_sympy() -> dict[str, Any]:
     return {"seconds": perf_counter() - start}
 
 
-def compile_chain(n: int, layer_ready: bool) -> dict[str, float]:
-    """Seconds by stage from a derived chain to its loaded ``rhs``; ``layer_ready`` compiles another model before."""
-    import eomgen as eg
+def compile_chain(n: int) -> dict[str, float]:
+    """Seconds by stage from a derived chain to its loaded ``rhs``."""
+    from .models import chain
 
-    from .models import EXAMPLES, chain
-
-    if layer_ready:
-        eg.load(EXAMPLES / "pendulum.yaml").derive().compile(kernels=["rhs"])
     equations = chain(n).derive()
     derivation = dict(equations.seconds)
     start, busy = perf_counter(), os.times()

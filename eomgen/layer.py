@@ -1,4 +1,4 @@
-"""The Cython layer: what every compiled module has besides its model's own sources, the same text for all."""
+"""The texts of ``eomgen._native``: kernels, steppers, ensembles and contacts, the same for all models."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ STEPPERS = (
 
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
-    "_core.pyx": ("cython/_core.pyx",),
+    "_native.pyx": ("cython/_native.pyx",),
+    "_model.pxi": ("cython/_model.pxi",),
     "_numbers.pxi": ("cython/_numbers.pxi",),
     "_batches.pxi": ("cython/_batches.pxi",),
     "_kernel.pxi": ("cython/_kernel.pxi",),
@@ -63,6 +64,9 @@ LAYER = {
     **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 
+#: Headers that models and the layer share.
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
+
 
 @cache
 def read_layer() -> dict[str, str]:
@@ -78,9 +82,10 @@ def read_sources(parts: Sequence[str]) -> str:
     return definitions(text) + text
 
 
-def read_header(name: str) -> str:
-    """The text of a header that models and the layer share, as it comes with eomgen."""
-    return _read(f"c/{name}")
+@cache
+def read_native() -> dict[str, str]:
+    """All texts that ``eomgen._native`` is compiled from by file name."""
+    return {**read_layer(), **{header: _read(f"c/{header}") for header in HEADERS}}
 
 
 def _read(part: str) -> str:

@@ -13,6 +13,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from outside_programs import PROGRAMS, missing
 
+from eomgen.compilation.native import find_native
+
 CACHE = pytest.StashKey[str]()
 QUICK = pytest.StashKey[set[str]]()
 #: What ``--quick`` runs a folder of tests for: the packages of eomgen that it guards.
@@ -50,6 +52,8 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("eomgen")
     if not is_worker(config):
         os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
+        if not config.getoption("--quick"):
+            find_native()  # built anew if its sources were changed, once for all tests
     config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"]
     lacking = [name for name in (*PROGRAMS, "NVRTC") if not is_there(name)]
     if config.getoption("--programs") and lacking:
@@ -154,18 +158,3 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     if left_out and exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         reporter.write_line(f"{len(left_out)} skipped or expected to fail, and --no-skips was given", red=True)
-
-
-@pytest.fixture
-def warm_cache(tmp_path: Path, pytestconfig: pytest.Config) -> Path:
-    """A cache of the test's own that holds the Cython layer, which takes half a minute to build, and nothing else."""
-    from eomgen.compilation import Cache
-
-    root = tmp_path / "cache"
-    entries = root / "entries"
-    entries.mkdir(parents=True, mode=0o700)
-    root.chmod(0o700)
-    for entry in Cache(Path(pytestconfig.stash[CACHE])).entries():
-        if entry.kind == "layer":
-            shutil.copytree(entry.directory, entries / entry.directory.name)
-    return root

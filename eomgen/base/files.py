@@ -491,12 +491,12 @@ def hold(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def locked(file: Path) -> Iterator[None]:
+def locked(file: Path, patience: float = PATIENCE) -> Iterator[None]:
     """Wait for a lock and hold it; after a while, or where none can be made, go on without."""
     descriptor = -1
     with suppress(OSError):
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + patience
     while descriptor >= 0 and time.monotonic() < end:
         try:
             _lock(descriptor)
@@ -651,7 +651,7 @@ def _seal(manifest: Mapping[str, Any]) -> str:
 # -- the text of a Python module -> the module -------------------------------------------------------------------------
 
 
-_loaded: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()
+_loaded: WeakValueDictionary[str, Any] = WeakValueDictionary()
 
 
 class _Text(importlib.abc.SourceLoader):
@@ -690,9 +690,15 @@ def load_source(name: str, path: str, data: bytes, given: Mapping[str, Any] | No
     return module
 
 
-def find_module(name: str) -> ModuleType | None:
-    """A module that is loaded, here or by Python's import; None if there is none."""
-    return _loaded.get(name) or sys.modules.get(name)
+def keep_module(name: str, module: Any) -> Any:
+    """Let a module, or the core of a model, be found by name as long as somebody uses it; the one that is kept."""
+    return _loaded.setdefault(name, module)
+
+
+def find_module(name: str) -> Any:
+    """What is loaded under a name, here or by Python's import; None if there is none."""
+    found = _loaded.get(name)
+    return sys.modules.get(name) if found is None else found
 
 
 # -- templates and examples: inside the package where installed, beside it in a clone ----------------------------------

@@ -1,14 +1,14 @@
-"""Compilation: source texts -> a cached extension module or C library, and the loaded core.
+"""Compilation: source texts -> a cached library of one model, opened by the extension module that all models share.
 
 ::
 
-    sources -> options.compile_flags -> cache key -> found? -> load
+    sources -> options.compile_flags -> cache key -> found? -> load: native.Model
                                              |  no
                                              v
-               private attempt directory: compiler -> cython_layer (once) -> link -> manifest -> published by one rename
+                         private attempt directory: compiler -> link -> manifest -> published by one rename
 """
 
-from .build import Artifact, compile_c_library, compile_sources
+from .build import Artifact, compile_c_library, compile_model
 from .cache import Cache, CacheEntry, cache_directory
 from .compiler import CompilerInfo, find_compiler
 from .load import load_core
@@ -22,7 +22,7 @@ __all__ = [
     "Options",
     "cache_directory",
     "compile_c_library",
-    "compile_sources",
+    "compile_model",
     "find_compiler",
     "load_core",
 ]

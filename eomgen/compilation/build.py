@@ -1,26 +1,25 @@
-"""Building: the source texts of a model -> Artifact, its compiled extension module or C library in the cache."""
+"""Building: the source texts of a model -> Artifact, its compiled library in the cache."""
 
 from __future__ import annotations
 
 import os
+import platform
 import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ..errors import UsageError, incomplete
-from ..layer import LAYER, read_header, read_layer
+from ..layer import HEADERS, LAYER
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .commands import Running, allowed, raise_failure
 from .compiler import CompilerInfo, describe_native, find_compiler
-from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags, needed_features
 from .processor import choose_lanes, late_files
 from .products import require_library, require_object, stamp, write_stamp
-from .shared_objects import is_shared, shared_objects
 
 Progress = Callable[[str], None]
 
@@ -32,7 +31,7 @@ class Artifact:
     Attributes
     ----------
     path : Path
-        The extension module or shared library.
+        The library.
     key : str
         SHA-256 of everything it depends on.
     directory : Path
@@ -53,95 +52,67 @@ class Artifact:
     name: str
 
 
-def compile_sources(
-    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
-) -> Artifact:
-    """Compile a model into an extension module, or find it in the cache.
+def compile_model(sources: Mapping[str, str], name: str, options: Options | None = None) -> Artifact:
+    """Compile a model for this session into a library that shows its table alone, or find it in the cache.
 
     Parameters
     ----------
     sources : mapping of str to str
-        Texts by file name: the C files and headers, ``eomgen.h`` among them, and perhaps files of
-        the layer; those left out are the ones that come with eomgen.
+        Texts by file name: C files and headers, ``eomgen.h`` among them.
     name : str
         Name of the model.
     options : Options, optional
-        How to compile.
-    progress : callable, optional
-        Told what is being done, a line at a time; not called when the module is in the cache.
+        How to compile. Without ``lanes``, lanes and series are left to :mod:`.lanes`.
 
     Raises
     ------
     ToolchainError
-        If there is no compiler, no Python.h, the compiler fails, or the cache cannot be used.
-    MissingDependencyError
-        If the layer must be built and Cython is not installed.
+        If there is no compiler, the compiler fails, or the cache cannot be used.
     """
-    start = time.perf_counter()
     options = options or Options()
-    sources = dict(sources)
-    own = read_layer()
-    layer = {name: sources.pop(name, own[name]) for name in LAYER}
-    _check(sources, name)
-    if HEADERS[0] not in sources:
-        raise incomplete(f"the sources of {name!r} lack {HEADERS[0]}; there are {', '.join(sources)}")
-    headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
-    sources, width = choose_lanes(sources, options.lanes)
-    compiler = find_compiler(options.compiler)
+    if "eomgen.h" not in sources:
+        raise incomplete(f"the sources of {name!r} lack eomgen.h; there are {', '.join(sources)}")
     late = late_files(sources, name) if options.lanes is None and not options.native else ()
-    now = {file: text for file, text in sources.items() if file not in late}
-    flags = _plan(now, options, compiler, 0 if late else width, extension=True)
-    if late:
-        flags = {file: [*words, *(["-DEOMGEN_WITHOUT_SERIES"] if file else [])] for file, words in flags.items()}
-    parts = {
-        "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
-        "layer": describe_layer(layer, headers, compiler),
-    }  # fmt: skip
-    cache, key = Cache(cache_directory()), compute_key(parts)
-    entry = cache.find(key)
-    if entry is not None:
-        return _artifact(entry, start, from_cache=True)
-    product = f"_core{describe_interpreter()['suffix']}"
-
-    def objects() -> list[str]:
-        return list(map(str, build_layer(cache, layer, headers, compiler, progress)))
-
-    entry = _build(cache, key, "extension", name, sources, flags, product, objects, options, compiler, progress)
-    return _artifact(entry, start, from_cache=False)
+    more = ["-DEOMGEN_OPENED", *(["-DEOMGEN_WITHOUT_SERIES"] if late else [])]
+    return _find_or_build("model", sources, name, options, None, late, more)
 
 
 def compile_c_library(
-    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None,
-    *, steppers: bool = False,
-) -> Artifact:  # fmt: skip
-    """Compile a model into a plain shared library for C programs or ctypes; needs neither Python.h nor Cython.
+    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
+) -> Artifact:
+    """Compile a model into a shared library for C programs or ctypes: every function that is not static can be called.
 
-    Parameters and errors are those of :func:`compile_sources`. Every function that is not static can be called.
-    With ``steppers`` the files of the layer that are among the sources are compiled too, once for all models.
+    Parameters and errors are those of :func:`compile_model`; `progress` is told what is being done, a line at a time. C
+    files that all models share are compiled once.
     """
+    return _find_or_build("library", sources, name, options or Options(), progress)
+
+
+def _find_or_build(
+    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None,
+    late: Sequence[str] = (), more: Sequence[str] = (),
+) -> Artifact:  # fmt: skip
     start = time.perf_counter()
-    options = options or Options()
-    sources = {file: text for file, text in sources.items() if steppers or file not in LAYER}
     _check(sources, name)
     sources, width = choose_lanes(sources, options.lanes)
-    compiler = find_compiler(options.compiler)
-    flags = _plan(sources, options, compiler, width, extension=False)
+    compiler, shown = find_compiler(options.compiler), kind == "library"
+    files = [file for file in sources if file.endswith(".c") and file not in late]
+    size = sum(len(sources[file]) for file in files)
+    words = compile_flags(options, compiler, size, hidden=not shown, portable=shown)
+    words += [f"-DEOMGEN_LANES={0 if late else width}", *more]
+    flags = {**dict.fromkeys(files, words), "": link_flags(options, compiler, extension=False)}
     parts = {
-        "kind": "library", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
-        "compiler": [*compiler.command, compiler.version], "platform": describe_interpreter()["platform"],
+        "kind": kind, "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
+        "compiler": [*compiler.command, compiler.version], "platform": describe_platform(),
     }  # fmt: skip
     cache, key = Cache(cache_directory()), compute_key(parts)
     entry = cache.find(key)
-    if entry is not None:
-        return _artifact(entry, start, from_cache=True)
-    product = f"lib{name}.dylib" if sys.platform == "darwin" else f"lib{name}.so"
-    own = {file: words for file, words in flags.items() if not is_shared(file)}
-
-    def objects() -> list[str]:
-        return list(map(str, shared_objects(cache, sources, flags, compiler, progress)))
-
-    entry = _build(cache, key, "library", name, sources, own, product, objects, options, compiler, progress)
-    return _artifact(entry, start, from_cache=False)
+    found = entry is not None
+    if entry is None:
+        shared = partial(_shared_objects, cache, sources, words, compiler, progress)
+        entry = _build(cache, key, kind, name, sources, flags, shared, options, compiler, progress)
+    seconds = time.perf_counter() - start
+    return Artifact(entry.product, entry.key, entry.directory, seconds, found, entry.name)
 
 
 def _check(sources: Mapping[str, str], name: str) -> None:
@@ -155,38 +126,28 @@ def _check(sources: Mapping[str, str], name: str) -> None:
         raise incomplete(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
 
 
-def _plan(
-    sources: Mapping[str, str], options: Options, compiler: CompilerInfo, lanes: int, *, extension: bool
-) -> dict[str, list[str]]:
-    """Flags of every C file, and under "" those of the linker."""
-    files = [file for file in sources if file.endswith(".c")]
-    size = sum(len(sources[file]) for file in files)
-    flags = {file: compile_flags(options, compiler, size, hidden=extension, portable=not extension) for file in files}
-    flags = {file: [*words, f"-DEOMGEN_LANES={lanes}"] for file, words in flags.items()}
-    return {**flags, "": link_flags(options, compiler, extension=extension)}
-
-
 def _native(options: Options, compiler: CompilerInfo) -> str:
     return describe_native(compiler, tuple(machine_flags(options, compiler))) if options.native else ""
 
 
-def _artifact(entry: CacheEntry, start: float, *, from_cache: bool) -> Artifact:
-    seconds = time.perf_counter() - start
-    return Artifact(entry.product, entry.key, entry.directory, seconds, from_cache, entry.name)
+def describe_platform() -> str:
+    """System and processor that a library is for."""
+    return f"{sys.platform}-{platform.machine()}"
 
 
 def _build(
     cache: Cache, key: str, kind: str, name: str, sources: Mapping[str, str], flags: Mapping[str, Sequence[str]],
-    product: str, objects: Callable[[], list[str]], options: Options, compiler: CompilerInfo, progress: Progress | None,
+    shared: Callable[[], list[Path]], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
-    """Compile every file, meanwhile make the further objects, link, publish."""
+    """Compile every file, meanwhile make the shared objects, link, publish."""
+    product = f"lib{name}.dylib" if sys.platform == "darwin" else f"lib{name}.so"
     with cache.attempt(key) as directory:
         folder = directory / "sources"
         folder.mkdir(mode=0o700)
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
-        files = {file: Path("sources", file) for file in flags if file}
-        compile_and_link(directory, key, name, files, flags, product, compiler, options.jobs, objects, progress)
+        files = {file: Path("sources", file) for file in flags if file and file not in LAYER}
+        compile_and_link(directory, key, name, files, flags, product, compiler, options.jobs, shared, progress)
         recipe = {
             "compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options),
             "needs": needed_features(flags),
@@ -194,9 +155,32 @@ def _build(
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
+def _shared_objects(
+    cache: Cache, sources: Mapping[str, str], words: Sequence[str], compiler: CompilerInfo, tell: Progress | None
+) -> list[Path]:
+    """Find the object files of C files that read the layer's texts alone, never a model's, or compile them."""
+    headers = {name: text for name, text in sources.items() if name.endswith(".h") and name in (*LAYER, *HEADERS)}
+    made = []
+    for file in (file for file in sources if file in LAYER and file.endswith(".c")):
+        product, texts = f"{file}.o", {file: sources[file], **headers}
+        parts = {
+            "kind": "object", "sources": texts, "flags": list(words), "platform": describe_platform(),
+            "compiler": [*compiler.command, compiler.version],
+        }  # fmt: skip
+        entry = cache.find(key := compute_key(parts))
+        if entry is None:
+            with cache.attempt(key) as directory:
+                for name, text in texts.items():
+                    (directory / name).write_text(text, encoding="utf-8", newline="\n")
+                _compile(Running(), directory, key, Path(file), product, words, compiler, tell, len(texts[file]))
+                entry = cache.publish(directory, key, "object", Path(file).stem, product, {"flags": list(words)})
+        made.append(entry.product)
+    return made
+
+
 def compile_and_link(
     directory: Path, key: str, name: str, files: Mapping[str, Path], flags: Mapping[str, Sequence[str]], product: str,
-    compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[str]] = list,
+    compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[Path]] = list,
     tell: Progress | None = None,
 ) -> None:  # fmt: skip
     """Compile C files into a library.
@@ -230,29 +214,38 @@ def compile_and_link(
     """
     compiled = {file: f"{file}.o" for file in files}
     running, size = Running(), sum(os.path.getsize(directory / path) for path in files.values())
-    say: Callable[[str], Any] = tell or (lambda line: None)
 
     def compile_one(file: str) -> None:
-        say(f"compiling {file}")
-        stamped = write_stamp(directory, key, compiled[file])
-        command = [*compiler.command, *flags[file], *stamped, "-c", str(files[file]), "-o", compiled[file]]
-        _command(running, command, directory, directory / files[file], size)
-        require_object(directory / compiled[file], stamp(key, compiled[file]), command)
-        (directory / stamped[-1]).unlink()
+        _compile(running, directory, key, files[file], compiled[file], flags[file], compiler, tell, size)
 
     further = _run_all(compile_one, list(files), jobs or os.cpu_count() or 1, objects, running)
-    say(f"linking {name}")
-    words = [*compiler.command, *compiled.values(), *further, "-o", product, *flags[""]]
+    if tell is not None:
+        tell(f"linking {name}")
+    words = [*compiler.command, *compiled.values(), *map(str, further), "-o", product, *flags[""]]
     _command(running, words, directory, directory / product, size)
     marks = [stamp(key, file) for file in compiled.values()]
-    require_library(directory / product, [*marks, *(stamp(p.parent.name, p.name) for p in map(Path, further))], words)
+    require_library(directory / product, [*marks, *(stamp(p.parent.name, p.name) for p in further)], words)
     for file in compiled.values():
         (directory / file).unlink()
 
 
+def _compile(
+    running: Running, directory: Path, key: str, file: Path, product: str, words: Sequence[str],
+    compiler: CompilerInfo, tell: Progress | None, size: int,
+) -> None:  # fmt: skip
+    """Compile a file into an object that bears the mark of its build."""
+    if tell is not None:
+        tell(f"compiling {file.name}")
+    stamped = write_stamp(directory, key, product)
+    command = [*compiler.command, *words, *stamped, "-c", str(file), "-o", product]
+    _command(running, command, directory, directory / file, size)
+    require_object(directory / product, stamp(key, product), command)
+    (directory / stamped[-1]).unlink()
+
+
 def _run_all(
-    task: Callable[[str], None], files: Sequence[str], jobs: int, meanwhile: Callable[[], list[str]], running: Running
-) -> list[str]:
+    task: Callable[[str], None], files: Sequence[str], jobs: int, meanwhile: Callable[[], list[Path]], running: Running
+) -> list[Path]:
     """Do a task for every file, some at a time, and something else in this thread, whose result is returned.
 
     The first failure, or Ctrl-C, ends the commands of the other tasks.

@@ -83,7 +83,7 @@ class CacheEntry:
     key : str
         SHA-256 of everything it depends on.
     kind : str
-        ``extension``, ``library``, ``layer``, ``lanes`` or ``classes``.
+        ``model``, ``library``, ``lanes``, ``object`` or ``numpy``.
     name : str
         Name of the model.
     directory : Path

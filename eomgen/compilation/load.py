@@ -1,81 +1,65 @@
-"""Loading: a compiled extension -> its core module."""
+"""Loading: a compiled model -> its core."""
 
 from __future__ import annotations
 
-import importlib.machinery
-import importlib.util
-import sys
-import threading
+import ctypes
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from ..base.files import require_trusted
+from ..base.files import find_module, keep_module, require_trusted
 from ..errors import ToolchainError, bad_cache
 from .build import Artifact
 from .cache import Cache
+from .native import find_native
 
-_lock = threading.Lock()
 
+def load_core(artifact: Artifact) -> Any:
+    """Open a built model.
 
-def load_core(artifact: Artifact) -> ModuleType:
-    """Import a built extension from its file.
-
-    The module is named after the model and the key of the build, so different models, and different builds of one
-    model, live side by side; loading one build again returns the same module.
+    It is named after the model and the key of the build, so different models, and different builds of one model, live
+    side by side; loading one build again returns the same core.
 
     Parameters
     ----------
     artifact : Artifact
-        From :func:`eomgen.compilation.compile_sources`.
+        From :func:`eomgen.compilation.compile_model`.
 
     Returns
     -------
-    module
-        The core, with ``metadata``, ``names``, ``context``, ``timed``, ``state``, ``motion``, ``address``, ``capsule``.
+    Model
+        Of ``eomgen._native``.
 
     Raises
     ------
     ToolchainError
         If the file cannot be loaded.
     """
-    # The last part of the name decides which initialiser Python looks for in the file.
-    name = f"eomgen_models.{artifact.name}_{artifact.key[:16]}._core"
-    with _lock:
-        if name in sys.modules:
-            return sys.modules[name]
-        loader = importlib.machinery.ExtensionFileLoader(name, str(artifact.path))
-        spec = importlib.util.spec_from_file_location(name, artifact.path, loader=loader)
-        assert spec is not None
-        try:
-            require_trusted(artifact.path)
-            module = importlib.util.module_from_spec(spec)
-            loader.exec_module(module)
-        except ToolchainError:
-            raise
-        except Exception as error:  # of the loader, or of the first lines of the module
-            Cache(artifact.directory.parents[1]).discard(artifact.key)
-            raise bad_cache(
-                f"the compiled model {artifact.path} cannot be loaded: {error}. It was removed from the cache; compile "
-                "the model again, and use another compiler (CC) if this happens again"
-            ) from error
-        offer_late(module, artifact.path)
-        sys.modules[name] = module
-        return module
+    return open_core(f"eomgen_models.{artifact.name}_{artifact.key[:16]}", artifact.path)
 
 
-def offer_late(core: Any, file: Path) -> None:
-    """Let a core from the cache have its lanes, ensembles and rigid contacts when they are first needed."""
+def open_core(name: str, file: Path) -> Any:
+    """Open the library of a model in the cache, under a name of its own."""
+    if (found := find_module(name)) is not None:
+        return found
+    native: Any = find_native()
+    try:
+        require_trusted(file)
+        table = ctypes.CDLL(str(file)).eomgen_model_table
+        table.restype = ctypes.c_void_p
+        core = native.Model(table(), name, str(file), partial(_find_lanes, file))
+    except ToolchainError:
+        raise
+    except Exception as error:  # of the loader, or a table of another layout
+        Cache(file.parents[2]).discard(file.parent.name)
+        raise bad_cache(
+            f"the compiled model {file} cannot be loaded: {error}. It was removed from the cache; compile the model "
+            "again, and use another compiler (CC) if this happens again"
+        ) from error
+    return keep_module(name, core)
 
-    def find() -> int:
-        from .late_lanes import find_lanes  # rarely needed
 
-        return find_lanes(file)
+def _find_lanes(file: Path) -> int:
+    from .lanes import find_lanes  # rarely needed
 
-    def find_late(name: str) -> Any:
-        from .late_classes import find_class  # rarely needed
-
-        return find_class(core, file, name)
-
-    core.offer_lanes(find)
-    core.__getattr__ = find_late
+    return find_lanes(file)

@@ -35,7 +35,8 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if not twins and (loaded := find_module(module_name)) is not None:
+    loaded: ModuleType | None = None if twins else find_module(module_name)
+    if loaded is not None:
         return loaded
     try:
         path = str(_cached(key, name, text))

@@ -123,29 +123,6 @@ def needed_features(flags: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     return NEEDS[WITH_AVX] if any("-mavx" in words for words in flags.values()) else ()
 
 
-def layer_flags(compiler: CompilerInfo) -> list[str]:
-    """Flags that compile the Cython layer, whatever the options: it is compiled once for all models."""
-    # gcc 12: -Og takes 0.57 of the time that -O1 takes, and a call 5 ns longer; -O0 0.35 of it, and 150 ns longer.
-    level = "-Og" if compiler.kind == "gcc" else "-O1"
-    flags = [level, "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG"]
-    return [*flags, "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION", *machine_flags(Options(), compiler)]
-
-
-def stepper_flags(compiler: CompilerInfo, *, wide: bool = False) -> list[str]:
-    """Flags that compile C files of the layer.
-
-    Parameters
-    ----------
-    compiler : CompilerInfo
-    wide : bool
-        Loops over states are to be vectorised. Those of the steppers for any processor are not, where wide ones take
-        their place from six states on: gcc 12 takes 0.4 of the time so, and runs of fewer states take as long.
-    """
-    flags = compile_flags(Options(optimize=2 if wide else None), compiler, 0, hidden=True)
-    # gcc 12 leaves loops of unknown length as they are at -O2.
-    return [*flags, "-ftree-vectorize"] if wide and compiler.kind == "gcc" else flags
-
-
 def link_flags(options: Options, compiler: CompilerInfo, *, extension: bool) -> list[str]:
     """Flags that link object files into an extension module, or into a library for C programs."""
     if sys.platform == "darwin":

@@ -15,10 +15,9 @@ from functools import cache
 
 from .. import _STARTED
 from ..base.files import shipped
-from .build import Artifact
+from .build import Artifact, describe_platform
 from .cache import Cache, cache_directory, compute_key
 from .compiler import find_compiler
-from .cython_layer import describe_interpreter
 from .options import Options
 from .processor import lane_width
 
@@ -46,7 +45,7 @@ class Shortcut:
         compiler = find_compiler(options.compiler)
         parts = {
             "kind": "shortcut", "program": fingerprint, "writers": digest_writers(), "options": asdict(options),
-            "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
+            "compiler": [*compiler.command, compiler.version], "platform": describe_platform(),
             "lanes": lane_width(),
         }  # fmt: skip
         self.note = compute_key(parts)
@@ -58,7 +57,7 @@ class Shortcut:
             return None
         key = (self.cache.shortcuts.read(self.note) or b"").decode("ascii", "replace")
         entry = self.cache.find(key) if key else None
-        if entry is None or entry.kind != "extension":
+        if entry is None or entry.kind != "model":
             return None
         return Artifact(entry.product, entry.key, entry.directory, time.perf_counter() - start, True, entry.name)
 

@@ -17,7 +17,7 @@ from ..errors import MissingDependencyError, UsageError, at_odds, bad_data, cann
 from ..targets import TARGETS
 from .commands import COMPILE, allowed, raise_failure, run
 from .compiler import find_compiler
-from .cython_layer import find_python_headers
+from .native import find_python_headers
 from .options import Options, machine_flags
 
 SETUPTOOLS = 77  #: first version that knows ``license-files`` of the project table

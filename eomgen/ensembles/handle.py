@@ -75,7 +75,6 @@ def describe(module: BoundModel) -> Handle:
         raise cannot(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     if hasattr(core, "take_lanes"):
         core.take_lanes()  # here, once, so that workers find them beside the module
-    getattr(core, "ensemble", None)  # likewise
     recipe = _recipe(Path(file))
     facts = json.loads(recipe) if recipe else {"options": {}, "needs": ()}
     needs = tuple(sorted(processor_features())) if facts["options"].get("native", False) else tuple(facts["needs"])
@@ -123,7 +122,7 @@ def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...]
         ) from error
     facts = json.loads(recipe)
     options = compilation.Options(**facts["options"])
-    return compilation.load_core(compilation.compile_sources(facts["sources"], facts["name"], options))
+    return compilation.load_core(compilation.compile_model(facts["sources"], facts["name"], options))
 
 
 def _core(core: Any, p: None, u: None) -> Any:

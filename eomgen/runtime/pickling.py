@@ -7,13 +7,11 @@ and the kind of processor), not for keeping: generate a package for that.
 from __future__ import annotations
 
 import platform
-import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache, partial
-from importlib import import_module, machinery, util
+from functools import cache
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from ..base.algebra import Array
@@ -36,7 +34,7 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
     """
     core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
-    if not file or find_module(name) is not core:
+    if not file or _find_loaded(name) is not core:
         raise TypeError(
             f"the module of {module.name!r} cannot be pickled, because its code is not in a file of its own (a core "
             "made by hand, or target numpy with native functions); use target cython"
@@ -70,11 +68,18 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
     return kind(LateCore(core, names, load), p, u)
 
 
-def _find_core(name: str, file: str) -> ModuleType:
-    if (loaded := find_module(name)) is not None:
+def _find_loaded(name: str) -> Any:
+    """The core of a name, if it is loaded: the module itself, or the model that is linked with a package's module."""
+    found = find_module(name)
+    return getattr(found, "model", found)
+
+
+def _find_core(name: str, file: str) -> Any:
+    if (loaded := _find_loaded(name)) is not None:
         return loaded
     try:
-        return import_module(name)  # of a generated package
+        import_module(name)  # of a generated package
+        return _find_loaded(name)
     except ModuleNotFoundError:
         pass
     path = Path(file)
@@ -82,7 +87,7 @@ def _find_core(name: str, file: str) -> ModuleType:
         if (path.parent / MANIFEST).exists():
             _require_features(read_entry(path.parent)[0], file)
         require_trusted(path)
-        if not path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES)):
+        if path.suffix == ".py":
             return load_source(name, file, read_trusted(path))
     except (OSError, ValueError) as error:
         what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
@@ -90,15 +95,7 @@ def _find_core(name: str, file: str) -> ModuleType:
             f"the compiled code of the pickled module is {what}: {file}; compile the model again",
             code="EG-FILE-DAMAGED",
         ) from error
-    loader = machinery.ExtensionFileLoader(name, file)
-    spec = util.spec_from_file_location(name, file, loader=loader)
-    assert spec is not None
-    core = util.module_from_spec(spec)
-    loader.exec_module(core)
-    core.offer_lanes(partial(_find_lanes, path))
-    vars(core)["__getattr__"] = partial(_find_class, core, path)
-    sys.modules[name] = core
-    return core
+    return import_module("eomgen.compilation.load").open_core(name, path)
 
 
 def _require_features(manifest: Mapping[str, Any], file: str) -> None:
@@ -124,21 +121,3 @@ def processor_features() -> frozenset[str]:
                 found |= set(line.partition(":")[2].split())
                 break
     return frozenset(found)
-
-
-def _find_lanes(file: Path) -> int:
-    """The lanes of a module in the cache; 0 where there is no eomgen, as for a module that came with its own."""
-    try:
-        late = import_module("eomgen.compilation.late_lanes")
-    except ImportError:
-        return 0
-    return int(late.find_lanes(file))
-
-
-def _find_class(core: Any, file: Path, name: str) -> Any:
-    """The same for ensembles and rigid contacts."""
-    try:
-        late = import_module("eomgen.compilation.late_classes")
-    except ImportError:
-        raise AttributeError(f"module {core.__name__!r} has no attribute {name!r}") from None
-    return late.find_class(core, file, name)

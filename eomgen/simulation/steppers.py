@@ -64,7 +64,8 @@ def solver_class(core: Any, name: str) -> Any:
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
             jac = options.get("jac")
             known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
-            if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
+            mine = isinstance(fun, rhs) and fun.name == "rhs" and fun.context.model is core
+            if mine and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
             if callable(jac):
                 options["jac"] = lambda t, x: jac(t, x.copy())

@@ -6,7 +6,15 @@
 extern "C" {
 #endif
 
-#define EOMGEN_ABI 4
+#define EOMGEN_ABI 5
+
+#if defined(__clang__)
+#define EOMGEN_COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define EOMGEN_COMPILER "gcc " __VERSION__
+#else
+#define EOMGEN_COMPILER "unknown"
+#endif
 
 /* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed), negative ones are
    not. */
@@ -72,9 +80,14 @@ typedef struct {
     const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
     int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
     const eomgen_series *series; /* NULL: not here */
+    const char *compiler; /* that made this */
 } eomgen_model;
 
-/* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */
+/* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models); by EOMGEN_OPENED
+   the one symbol that a library for dlopen shows. */
+#if defined(EOMGEN_OPENED) && defined(__GNUC__)
+__attribute__((visibility("default")))
+#endif
 const eomgen_model *eomgen_model_table(void);
 
 #ifdef __cplusplus

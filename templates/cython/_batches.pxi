@@ -6,6 +6,7 @@ cdef struct Piece:  # one input of a kernel: n numbers `row` bytes apart, states
 
 
 cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u belong to this call
+    const eomgen_model *table
     eomgen_function call
     eomgen_lane_function lanes  # NULL: column by column
     int width  # of lanes

@@ -93,7 +93,7 @@ cdef class Motion(Kernel):
         if q is None or v is None or a is None:
             raise TypeError(f"{self.name}(q, v, a) takes at least 3 positional arguments")
         p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
-        cdef int n_v = _FACTS.get("n_v", self.n_in // 3)
+        cdef int n_v = self.model.n_v
         return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
 
 
@@ -157,7 +157,7 @@ cdef object call_plainly(object kernel, PyObject *const *given, Py_ssize_t n, Py
         _, own, fault = str(error).partition("__call__()")
         if not own:
             raise
-        words = ("t", "x") if isinstance(kernel, Timed) else (called("x", None, (<Kernel>kernel).n_in),)
+        words = ("t", "x") if isinstance(kernel, Timed) else ((<Kernel>kernel).label,)
         raise TypeError(f"{kernel.name}({', '.join(words)}){fault}") from None
 
 
@@ -173,13 +173,3 @@ cdef int set_quick_call(Kernel kernel) except -1:
 cdef Py_ssize_t offset_of_quick(object any):
     """Where in a kernel its quick call is kept; of the object nothing is read."""
     return <char *>&(<Kernel>any).quick - <char *><PyObject *>any
-
-
-def address(str name not None):
-    """Address of a kernel's C function (its type is in eomgen.h), for ctypes, Numba or another extension."""
-    return <uintptr_t>MODEL.kernels[find(name, KeyError)].call
-
-
-def capsule(str name not None):
-    """The same address as a capsule named ``eomgen_function``."""
-    return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)

@@ -105,6 +105,7 @@ cdef class RigidStepper:
 
     Parameters
     ----------
+    model : Model
     bound : Context
         Parameters and inputs; of any build of the model.
     sources : dict of str to (int, ndarray)
@@ -136,15 +137,15 @@ cdef class RigidStepper:
     cdef object forcing, raised
     cdef cnp.ndarray memory, many, numbers, acting, known
 
-    def __cinit__(self, bound, dict sources, int n_work, dict facts, dict tables, double tolerance,
+    def __cinit__(self, Model model not None, bound, dict sources, int n_work, dict facts, dict tables, double tolerance,
                   int most, signals, forcing, within):
         cdef eomgen_rigid *s = &self.s
-        cdef Context context = bound if isinstance(bound, Context) else Context(bound.p, bound.u)
+        cdef Context context = bound if isinstance(bound, Context) else Context(model, bound.p, bound.u)
         cdef dict kept = {name: np.ascontiguousarray(table, np.int8 if name == "moved" else np.intc)
                           for name, table in tables.items()}
         cdef cnp.npy_intp length
         self.held, self.forcing, self.raised = [context, kept, sources], forcing, None
-        s.n_q, s.n_v, s.n_u = _FACTS["n_q"], _FACTS["n_v"], MODEL.n_u
+        s.n_q, s.n_v, s.n_u = model.n_q, model.n_v, model.table.n_u
         s.n_rows, s.n_c, s.n_h, s.n_spots = facts["n_rows"], facts["n_c"], facts["n_h"], facts["n_spots"]
         s.n_plain, s.n_balls = kept["plain"].size // 2, kept["balls"].size // 2
         s.n_lists, s.n_shapes = kept["lists"].size // 2, len(kept["moved"])
@@ -173,7 +174,7 @@ cdef class RigidStepper:
             self.played.run.n_u, self.played.run.u = s.n_u, s.u
             self.played.first, self.played.last = within
             self.played.run.c = <const double *>cnp.PyArray_DATA(context.c)
-            self.played.run.signals = make_signals(signals, self.held)
+            self.played.run.signals = make_signals(signals, s.n_u, self.held)
             s.inputs, s.forcing = play_inputs, &self.played
         self.make_room(16)
 
@@ -255,5 +256,3 @@ cdef eomgen_source source_of(dict sources, str name):
         found.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
     return found
 
-
-rigid_stepper = RigidStepper

@@ -57,6 +57,7 @@ cdef class Ensemble:
 
     Parameters
     ----------
+    model : Model
     method : str
         One of ``methods``.
     nodes : (m,) array
@@ -100,34 +101,35 @@ cdef class Ensemble:
     cdef readonly cnp.ndarray x, t, status, steps, rejected, evaluations, failure, failure_time, noted
     cdef readonly object samples, notes
 
-    def __cinit__(self, str method, nodes, x0, p, u, double rtol, atol, double max_step, double first_step,
+    def __cinit__(self, Model model not None, str method, nodes, x0, p, u, double rtol, atol, double max_step, double first_step,
                   int64_t max_steps, t_eval=None, signals=(), events=None, ptrdiff_t keep=0):
-        cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
+        cdef const eomgen_kernel *rhs = model.kernel("rhs")
+        cdef int n = rhs.n_in
         cdef eomgen_ensemble *all = &self.all
         cdef const eomgen_lanes *lanes
-        take_lanes()
-        lanes = seen_lanes(LANES)
-        self.signals, self.watched, self.context = tuple(signals), events, Context()
+        model.take_lanes()
+        lanes = seen_lanes(model.lanes)
+        self.signals, self.watched, self.context = tuple(signals), events, Context(model)
         x0, p, u = (np.ascontiguousarray(value, dtype=float) for value in (x0, p, u))
         count = len(x0)
-        for label, value, size in (("x0", x0, n), ("p", p, MODEL.n_p), ("u", u, MODEL.n_u)):
+        for label, value, size in (("x0", x0, n), ("p", p, model.table.n_p), ("u", u, model.table.n_u)):
             if value.shape != (count, size) and (label == "x0" or value.shape != (size,)):
                 raise ValueError(f"{label} must have shape ({count}, {size}), not {value.shape}")
         nodes, atol = np.array(nodes, dtype=float), np.array(vector(atol, n, "atol", ValueError))
         asked = np.ascontiguousarray(() if t_eval is None else t_eval, dtype=float)
         self.held = [x0, p, u, nodes, atol, asked]
-        all.method, all.model = find_method(method), MODEL
-        all.series = seen_series(SERIES)
-        all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
+        all.method, all.model = model.method(method), model.table
+        all.series = seen_series(model.series)
+        all.rhs, all.n, all.count = rhs.call, n, count
         if all.method.squares > 0:
-            all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        if "meeting_time" in names:
-            all.meeting = MODEL.kernels[find("meeting_time", ValueError)].call
-        all.n_q = _FACTS.get("n_q", 0)
+            all.jacobian = model.kernel("jacobian").call
+        if "meeting_time" in model.places:
+            all.meeting = model.kernel("meeting_time").call
+        all.n_q = model.n_q
         if lanes != NULL:
             all.lane_rhs, all.lane_series, all.lane_width = lanes.contracted, lanes.expand, lanes.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
-        all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
+        all.p_stride, all.u_stride = model.table.n_p * (p.ndim - 1), model.table.n_u * (u.ndim - 1)
         all.nodes, all.n_nodes = reading(nodes), len(nodes)
         all.rtol, all.atol, all.max_step, all.first_step = rtol, reading(atol), max_step, first_step
         all.max_steps, all.t_eval, all.n_eval = max_steps, reading(asked), len(asked)
@@ -152,7 +154,7 @@ cdef class Ensemble:
         cdef eomgen_thread own
         cdef Journey journey
         held = []
-        own.signals, own.events, own.notes, own.notes_room = make_signals(self.signals, held), NULL, NULL, 0
+        own.signals, own.events, own.notes, own.notes_room = make_signals(self.signals, self.all.model.n_u, held), NULL, NULL, 0
         if self.watched:
             plan = {"nodes": [0.0], "t_eval": [0.0], "dense": False, "watch": None, "events": self.watched}
             atol = np.ones(self.all.n)
@@ -172,5 +174,3 @@ cdef class Ensemble:
         """How many trajectories have ended."""
         return self.all.done
 
-
-ensemble = Ensemble

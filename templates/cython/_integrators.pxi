@@ -24,8 +24,8 @@ cdef class Integrator(Journey):
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         self.end, self.first, self.turn = <double *>self.journey.nodes, first_step, allocate_lock()
-        if _FACTS.get("n_c", 0) or _FACTS.get("quaternion_slots"):
-            self.project = MODEL.kernels[find("project", ValueError)].call
+        if context.model.projects:
+            self.project = context.model.kernel("project").call
 
     def advance(self, double t, x, double h, p=None, u=None, out=None):
         """From x (n_x,) at time t over a time h, both checked: (state, None), or (state reached, what happened): the
@@ -34,18 +34,19 @@ cdef class Integrator(Journey):
         cdef eomgen_journey *j = &self.journey
         cdef int n = run.n, status = 1
         cdef cnp.npy_intp length = n
+        cdef Model model = self.context.model
         cdef cnp.ndarray state = vector(x, n, "x", ValueError)
-        cdef cnp.ndarray inputs = self.context.u if u is None else vector(u, MODEL.n_u, "u", ValueError)
+        cdef cnp.ndarray inputs = self.context.u if u is None else vector(u, model.table.n_u, "u", ValueError)
         cdef cnp.ndarray constants = self.context.c
         cdef cnp.ndarray result
         if p is not None:
-            constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
+            constants = model.constants(vector(p, model.table.n_p, "p", ValueError), ValueError)
         result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, ValueError)
         if not self.turn.acquire(False):
             raise ValueError("it is already working in another thread; make one integrator for each thread")
         try:
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
-            memcpy(run.u, cnp.PyArray_DATA(inputs), MODEL.n_u * sizeof(double))
+            memcpy(run.u, cnp.PyArray_DATA(inputs), model.table.n_u * sizeof(double))
             run.c = <const double *>cnp.PyArray_DATA(constants)
             run.t = run.t_old = t
             run.step, run.h_abs = 0.0, self.first
@@ -87,5 +88,3 @@ cdef class Integrator(Journey):
                 return 0
         return Journey.callback(self, t)
 
-
-integrator = Integrator

@@ -171,11 +171,11 @@ cdef class Journey(Stepper):
         cdef int n = len(direction), n_resets = len(resets)
         ev.n, ev.n_model, ev.n_resets, ev.crowd = n, model, n_resets, crowd
         if model:
-            ev.values = MODEL.kernels[find("events", ValueError)].call
+            ev.values = self.context.model.kernel("events").call
         if n_resets:
-            ev.resets = MODEL.kernels[find("resets", ValueError)].call
-            if _FACTS.get("n_c", 0) or _FACTS.get("quaternion_slots"):
-                ev.project = MODEL.kernels[find("project", ValueError)].call
+            ev.resets = self.context.model.kernel("resets").call
+            if self.context.model.projects:
+                ev.project = self.context.model.kernel("project").call
         if tape is not None:
             held = Tape(*tape)
             self.held.append(held)
@@ -371,5 +371,3 @@ cdef class Journey(Stepper):
 
 
 include "_frozen.pxi"
-
-journey = Journey

@@ -11,7 +11,7 @@ cdef class Kernel:
     name : str
         Name of the kernel, one of ``names``.
     context : Context
-        Parameters and inputs used when a call gives none.
+        Parameters and inputs of the model, used when a call gives none.
     shape : tuple of int
         Shape of the result for one state.
     fail : callable
@@ -31,6 +31,7 @@ cdef class Kernel:
     """
 
     cdef vectorcall quick
+    cdef const eomgen_model *table
     cdef eomgen_function call
     cdef const double *c
     cdef const double *u
@@ -38,16 +39,20 @@ cdef class Kernel:
     cdef bint long, tolerant
     cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
     cdef object fail, error
-    cdef readonly object name, shape, nan, context
+    cdef readonly object name, shape, nan
+    cdef readonly Context context
+    cdef Model model
+    cdef str label  # what users call its state
     cdef object last_failure
     cdef public object others
 
     def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
         set_quick_call(self)
-        self.index = find(name, error)
         self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
-        self.call = MODEL.kernels[self.index].call
-        self.n_in, self.n_out = MODEL.kernels[self.index].n_in, MODEL.kernels[self.index].n_out
+        self.model, self.table = context.model, context.model.table
+        cdef const eomgen_kernel *kernel = self.model.kernel(name, error)
+        self.index, self.call, self.n_in, self.n_out = kernel - self.table.kernels, kernel.call, kernel.n_in, kernel.n_out
+        self.label = "q" if self.n_in == self.model.n_q else "x"
         self.c = <const double *>cnp.PyArray_DATA(context.c)
         self.u = <const double *>cnp.PyArray_DATA(context.u)
         self.tolerant = nan
@@ -57,8 +62,8 @@ cdef class Kernel:
             raise error(f"shape {self.shape} does not hold the {self.n_out} numbers of kernel {name!r}")
         for i in range(self.ndim):
             self.dims[i] = self.shape[i]
-        counts = _FACTS.get("operations", {}).get(name, {}).values()
-        self.long = sum([count for count in counts if isinstance(count, (int, float))]) > _LONG
+        counts = self.model.facts.get("operations", {}).get(name, {}).values()
+        self.long = sum([count for count in counts if isinstance(count, (int, float))]) > LONG
 
     @property
     def failure(self):
@@ -71,7 +76,7 @@ cdef class Kernel:
             self.last_failure = value
 
     def __repr__(self):
-        return f"<{type(self).__name__} kernel {self.name} of {MODEL.name.decode()}: ({self.n_in},) -> {self.shape}>"
+        return f"<{type(self).__name__} kernel {self.name} of {self.table.name.decode()}: ({self.n_in},) -> {self.shape}>"
 
     cdef inline bint is_target(self, object out, const double *x) noexcept:
         """Whether the kernel can write into out: float64, right shape, contiguous, apart from x."""
@@ -91,31 +96,31 @@ cdef class Kernel:
         cdef const double *inputs = self.u
         cdef const double *constants = self.c
         cdef double now
-        cdef cnp.npy_intp n_work = MODEL.n_work
+        cdef cnp.npy_intp n_work = self.table.n_work
         cdef int status, i
-        if not (is_vector(x, self.n_in) and (u is None or is_vector(u, MODEL.n_u))
-                and (p is None or is_vector(p, MODEL.n_p))):
-            return self.general(t, [("x", self.n_in, x)], p, u, out)
+        if not (is_vector(x, self.n_in) and (u is None or is_vector(u, self.table.n_u))
+                and (p is None or is_vector(p, self.table.n_p))):
+            return self.general(t, [(self.label, self.n_in, x)], p, u, out)
         now = moment(t, "t", self.error, self.name)
         state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
         if out is None:
             out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
         elif not self.is_target(out, state):
-            return self.general(t, [("x", self.n_in, x)], p, u, out)
+            return self.general(t, [(self.label, self.n_in, x)], p, u, out)
         data = <double *>cnp.PyArray_DATA(<cnp.ndarray>out)
         if u is not None:
             inputs = <const double *>cnp.PyArray_DATA(<cnp.ndarray>u)
-            if data < inputs + MODEL.n_u and inputs < data + self.n_out:
-                return self.general(t, [("x", self.n_in, x)], p, u, out)
+            if data < inputs + self.table.n_u and inputs < data + self.n_out:
+                return self.general(t, [(self.label, self.n_in, x)], p, u, out)
         if p is not None:
-            n_work += MODEL.n_const
+            n_work += self.table.n_const
         if n_work > STACK:
-            heap = (<Context>self.context).take_work()
+            heap = self.context.take_work()
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
         if p is not None:
-            fill_constants(<cnp.ndarray>p, w, self.error)
+            fill_constants(self.table, <cnp.ndarray>p, w, self.error)
             constants = w
-            w += MODEL.n_const
+            w += self.table.n_const
         if self.tolerant:
             for i in range(self.n_out):
                 data[i] = NAN
@@ -127,10 +132,10 @@ cdef class Kernel:
         if status != 0:
             for i in range(self.n_out):
                 data[i] = entry(data[i], status)
-            given = () if p is None and u is None else (p, copy(inputs, MODEL.n_u))
+            given = () if p is None and u is None else (p, copy(inputs, self.table.n_u))
             self.report(status, now, copy(state, self.n_in), given)
         elif n_work > STACK:
-            (<Context>self.context).leave_work(heap)
+            self.context.leave_work(heap)
         return out
 
     cdef int report(self, int status, double t, cnp.ndarray x, tuple given) except -1:
@@ -149,7 +154,7 @@ cdef class Kernel:
         cdef double now = 0
         cdef list held = []
         p, u = self.by_name("p", p, self.context.p), self.by_name("u", u, self.context.u)
-        batch.call, batch.c, batch.nan = self.call, self.c, self.tolerant
+        batch.table, batch.call, batch.c, batch.nan = self.table, self.call, self.c, self.tolerant
         batch.n_pieces, batch.n_in, batch.n_out = len(values), self.n_in, self.n_out
         batch.lanes = NULL
         for i in range(batch.n_pieces):
@@ -165,26 +170,26 @@ cdef class Kernel:
             batch.time = Piece(cnp.PyArray_BYTES(<cnp.ndarray>t), 1, 0, cnp.PyArray_STRIDE(<cnp.ndarray>t, 0))
         else:
             now = moment(t, "t", self.error, self.name)
-        batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)
+        batch.inputs = Piece(<char *>self.u, self.table.n_u, sizeof(double), 0)
         if u is not None:
-            held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))
+            held.append(self.read(u, self.table.n_u, "u", &batch.inputs, &columns))
         if p is not None:
-            constants = compute_constants(vector(p, MODEL.n_p, "p", self.error), self.error)
+            constants = self.model.constants(vector(p, self.table.n_p, "p", self.error), self.error)
             batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
         cdef cnp.ndarray result = self.target(out, held, columns)
-        cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
+        cdef cnp.npy_intp length_of_all = self.table.n_work + self.n_in + self.n_out + self.table.n_u
         cdef cnp.npy_intp plain = length_of_all
         cdef const eomgen_lanes *lanes
-        if columns >= 0 and has_offer(OFFERED):
+        if columns >= 0 and has_offer(self.model.offers):
             self.wait_for_lanes(columns)
-        lanes = seen_lanes(LANES)
+        lanes = seen_lanes(self.model.lanes)
         if columns >= 0 and lanes != NULL and lanes.kernels[self.index] != NULL:
             batch.lanes, batch.width = lanes.kernels[self.index], lanes.width
-            length_of_all += WIDEST + lanes.width * (plain + 1 + MODEL.n_const)
+            length_of_all += WIDEST + lanes.width * (plain + 1 + self.table.n_const)
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
         batch.columns = 1 if columns < 0 else columns
-        batch.x, batch.y = batch.w + MODEL.n_work, batch.w + MODEL.n_work + self.n_in
+        batch.x, batch.y = batch.w + self.table.n_work, batch.w + self.table.n_work + self.n_in
         batch.u = batch.y + self.n_out
         batch.side = batch.w + plain
         batch.side += (64 - <uintptr_t>batch.side % 64) % 64 // sizeof(double)
@@ -195,7 +200,7 @@ cdef class Kernel:
             failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
         if failed >= 0:
             now = load(&batch, failed)
-            given = () if p is None and u is None else (p, copy(batch.u, MODEL.n_u))
+            given = () if p is None and u is None else (p, copy(batch.u, self.table.n_u))
             self.report(status, now, copy(batch.x, self.n_in), given)
         if out is not None and out is not result:
             out[...] = result
@@ -209,8 +214,8 @@ cdef class Kernel:
 
     cdef int wait_for_lanes(self, cnp.npy_intp columns) except -1:
         """Count columns that lanes could take, and have the lanes made when there were many."""
-        if self.name in IN_LANES and count_columns(BATCHED, columns) >= MANY:
-            take_lanes(self.name)
+        if self.name in self.model.in_lanes and count_columns(self.model.batched, columns) >= MANY:
+            self.model.take_lanes(self.name)
         return 0
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):
@@ -221,7 +226,7 @@ cdef class Kernel:
             columns[0] = k
         if array.ndim not in (1, 2) or cnp.PyArray_DIM(array, 0) != n or k not in (-1, columns[0]):
             batch = "k" if columns[0] < 0 else columns[0]
-            raise self.error(f"{called(label, self.name, n)} must have shape ({n},) or ({n}, {batch}), "
+            raise self.error(f"{called(label, self.name)} must have shape ({n},) or ({n}, {batch}), "
                              f"not {(<object>array).shape}")
         piece.data, piece.n, piece.row = cnp.PyArray_BYTES(array), n, cnp.PyArray_STRIDE(array, 0)
         piece.column = cnp.PyArray_STRIDE(array, 1) if k >= 0 else 0
@@ -250,6 +255,5 @@ cdef class Kernel:
 
 include "_calls.pxi"
 
-context, motion = Context, Motion
-timed = quick_type(Timed, b"_core.Timed", offset_of_quick(Timed))
-state = quick_type(State, b"_core.State", offset_of_quick(State))
+timed = quick_type(Timed, b"_native.Timed", offset_of_quick(Timed))
+state = quick_type(State, b"_native.State", offset_of_quick(State))

@@ -45,7 +45,7 @@ cdef cnp.ndarray converted(object value, str label, object error, str name, int 
     else:
         shape = "" if n < 0 else f", ({n},)" if name is None else f", ({n},) or ({n}, k)"
         wanted = f"hold real numbers{shape}"
-    raise error(f"{called(label, name, n)} must {wanted}, not {shown(value)}")
+    raise error(f"{called(label, name)} must {wanted}, not {shown(value)}")
 
 
 cdef cnp.ndarray aligned(object array):
@@ -77,9 +77,8 @@ cdef bint has_masked(object given, int depth) except -1:
     return False
 
 
-cdef str called(str label, str name, int n):
-    """What users call an argument: the x of some kernels is q."""
-    label = "q" if label == "x" and n == len(_FACTS.get("q_names", ())) else label
+cdef str called(str label, str name):
+    """What users call an argument."""
     return label if name is None else f"{label} of {name}"
 
 
@@ -122,23 +121,6 @@ cdef cnp.ndarray vector(object value, int n, str label, object error):
     if array.ndim != 1 or cnp.PyArray_DIM(array, 0) != n:
         raise error(f"{label} must have shape ({n},), not {(<object>array).shape}")
     return array
-
-
-cdef cnp.ndarray compute_constants(cnp.ndarray p, object error):
-    """The constants (n_const,) that follow from the parameters (n_p,)."""
-    cdef cnp.npy_intp n = MODEL.n_const
-    cdef cnp.ndarray constants = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
-    fill_constants(p, <double *>cnp.PyArray_DATA(constants), error)
-    return constants
-
-
-cdef int fill_constants(cnp.ndarray p, double *constants, object error) except -1:
-    """The same into a place for them."""
-    memset(constants, 0, MODEL.n_const * sizeof(double))
-    cdef int status = MODEL.precompute(<double *>cnp.PyArray_DATA(p), constants)
-    if status != 0:
-        raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
-    return 0
 
 
 cdef inline bint is_vector(object given, cnp.npy_intp n) noexcept:

@@ -1,99 +1,5 @@
 # Steppers: the explicit Runge-Kutta methods of eomgen_steppers.h over the model's right-hand side.
 
-cdef extern from "eomgen_steppers.h" nogil:
-    ctypedef struct eomgen_tape:
-        int n, n_out
-        const int *code
-        const double *numbers
-        const int *out
-        double *results
-    ctypedef struct eomgen_signal:
-        int n, order
-        const double *times
-        const double *values
-        const eomgen_tape *tape
-    ctypedef struct eomgen_run:
-        eomgen_function rhs
-        const double *c
-        double *u
-        const eomgen_signal *signals
-        int n_u
-        double *w
-        int n
-        double rtol, max_step, t_bound, direction
-        const double *atol
-        double t, t_old, step, h_abs
-        double *y
-        double *y_old
-        double *f
-        const double *closed
-        double *next
-        double *K
-        double *F
-        int interpolates
-        long evaluations, rejected
-        int failure
-        double failure_time
-        double *failure_state
-        double hold
-        long steps, most_steps
-        long until_callback
-        long (*callback)(void *, const double *) noexcept nogil
-        void *callback_data
-        eomgen_function jacobian, meeting
-        int n_q
-        long differentiations, factorizations
-        const eomgen_series *series
-        int order, side, expanded, stopped
-    ctypedef struct eomgen_method:
-        const char *name
-        int rows_K, rows_F, error_order, squares, expands
-        void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor
-    long eomgen_further(const eomgen_method *, long, const eomgen_series *)
-    const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
-    int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
-                     double *, double *) noexcept
-    void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
-    int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
-    int eomgen_is_sound(const eomgen_method *, const eomgen_run *) noexcept
-    void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
-    void eomgen_play(const eomgen_tape *, double, const double *, const double *, const double *, double *) noexcept
-    const char **eomgen_operations
-
-ctypedef const eomgen_method *method_pointer
-cdef method_pointer[5] METHODS
-METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk4
-METHODS[3], METHODS[4] = &eomgen_radau, &eomgen_taylor
-for _index in range(2 if "rhs" in names else 0):  # once: to ask the processor may take longer than a short run
-    METHODS[_index] = eomgen_suited(METHODS[_index], MODEL.kernels[find("rhs", ValueError)].n_in)
-
-
-_TITLES = [METHODS[_index].name.decode() for _index in range(5)]
-
-
-cdef method_pointer find_method(str name) except NULL:
-    """The method of a name, with what it needs of the model."""
-    cdef int i
-    for i in range(5):
-        if name == _TITLES[i] and name in methods:
-            if METHODS[i].expands and seen_series(SERIES) == NULL:
-                take_lanes()
-                if seen_series(SERIES) == NULL:
-                    raise RuntimeError(
-                        f"method Taylor: the series of {MODEL.name.decode()} could not be compiled; "
-                        "the warning before says why; correct that and start Python again, or use DOP853"
-                    )
-            return METHODS[i]
-    raise ValueError(f"no method {name}")
-
-
-methods = tuple([
-    METHODS[i].name.decode() for i in range(5)
-    if (METHODS[i].squares == 0 or "jacobian" in names) and (not METHODS[i].expands or HAS_SERIES)
-])
-
-
 cdef class Tape:
     """An expression of t, x, u and p given at run time.
 
@@ -125,11 +31,6 @@ cdef int _code = 0
 while eomgen_operations[_code] != NULL:
     TAPES[eomgen_operations[_code].decode()] = _code
     _code += 1
-
-
-cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
-    cdef cnp.npy_intp[2] dims = [n, k]
-    return cnp.PyArray_EMPTY(2, dims, cnp.NPY_DOUBLE, 0)
 
 
 cdef cnp.ndarray numbers_of(list given):
@@ -178,10 +79,10 @@ cdef class Interpolant:
         return max(self.t_old, self.t)
 
 
-cdef const eomgen_signal *make_signals(signals, list held) except? NULL:
+cdef const eomgen_signal *make_signals(signals, int n_u, list held) except? NULL:
     """The inputs over time as C reads them, in arrays that `held` keeps alive."""
     cdef eomgen_signal *table
-    cdef cnp.npy_intp bytes = MODEL.n_u * sizeof(eomgen_signal)
+    cdef cnp.npy_intp bytes = n_u * sizeof(eomgen_signal)
     if not signals:
         return NULL
     memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
@@ -238,45 +139,48 @@ cdef class Stepper:
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
-        cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
-        self.method = find_method(method)
+        cdef Model model = context.model
+        cdef const eomgen_model *table = model.table
+        cdef const eomgen_kernel *rhs = model.kernel("rhs")
+        cdef int n = rhs.n_in
+        self.method = model.method(method)
         self.context, self.held = context, []
         if isinstance(atol, float):
             self.atol = numbers_of([atol] * n)
         else:
             self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
-        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
+        cdef cnp.npy_intp length = table.n_work + table.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
-            self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        if "meeting_time" in _PLACES:
-            self.run.meeting = MODEL.kernels[find("meeting_time", ValueError)].call
-        self.run.n_q = _FACTS.get("n_q", 0)
-        cdef const eomgen_series *series = seen_series(SERIES)
+            self.run.jacobian = model.kernel("jacobian").call
+        if "meeting_time" in model.places:
+            self.run.meeting = model.kernel("meeting_time").call
+        self.run.n_q = model.n_q
+        cdef const eomgen_series *series = seen_series(model.series)
         self.run.series = series
         length += eomgen_further(self.method, n, series)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
-        run.rhs, run.n, run.n_u = MODEL.kernels[index].call, n, MODEL.n_u
+        run.rhs, run.n, run.n_u = rhs.call, n, table.n_u
         run.c = <const double *>cnp.PyArray_DATA(context.c)
         run.w = free
-        run.u = run.w + MODEL.n_work
-        run.y = run.u + MODEL.n_u
+        run.u = run.w + table.n_work
+        run.y = run.u + table.n_u
         run.y_old = run.y + n
         run.f = run.y_old + n
         run.failure_state = run.f + n
         run.next = run.failure_state + n
-        run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
+        run.closed = run.w + table.closed_at if plan is not None and table.closed_at else NULL
         run.K = run.next + n
         run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, series)
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
-        memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
+        memcpy(run.u, cnp.PyArray_DATA(context.u), table.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
         run.rtol, run.max_step, run.h_abs = rtol, max_step, first_step
         run.t = run.t_old = t0
         run.t_bound, run.direction, run.hold = t_bound, -1.0 if t_bound < t0 else 1.0, NAN
-        run.signals = make_signals(signals, self.held)
+        run.signals = make_signals(signals, table.n_u, self.held)
         if plan is None:
             eomgen_start(self.method, run)
 
@@ -345,26 +249,26 @@ cdef cnp.ndarray target(out, cnp.npy_intp n, error):
 
 def march(Context context not None, t, h, x, u=None, out=None, error=ValueError):
     """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
-    cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
+    cdef const eomgen_model *table = context.model.table
+    cdef const eomgen_kernel *rhs = context.model.kernel("rhs")
+    cdef int n = rhs.n_in, status
     cdef double begin = finite(t, "t", error), size = finite(h, "h", error)
     cdef cnp.ndarray start = vector(x, n, "x", error), inputs = context.u
-    cdef cnp.npy_intp length = n, n_work = MODEL.n_work + 5 * n
+    cdef cnp.npy_intp length = n, n_work = table.n_work + 5 * n
     cdef double[STACK] stack
     cdef double *w = stack
     cdef cnp.ndarray result
     if u is not None:
-        inputs = vector(u, MODEL.n_u, "u", error)
+        inputs = vector(u, table.n_u, "u", error)
     result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, error)
     if n_work > STACK:
         heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
         w = <double *>cnp.PyArray_DATA(heap)
-    status = eomgen_march(MODEL.kernels[index].call, n, begin, size, <double *>cnp.PyArray_DATA(start),
+    status = eomgen_march(rhs.call, n, begin, size, <double *>cnp.PyArray_DATA(start),
                           <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
-                          <double *>cnp.PyArray_DATA(result), w, w + MODEL.n_work)
+                          <double *>cnp.PyArray_DATA(result), w, w + table.n_work)
     return status, result
 
-
-stepper = Stepper
 
 include "_journeys.pxi"
 include "_integrators.pxi"

@@ -1,7 +1,6 @@
 """The cache of compiled models: what is found again, damaged, killed, built twice at once, owned by others.
 
-Units of target fmu are built through it with the compiler alone, modules with the Cython layer too, which takes a while
-to compile: tests with caches or compilers of their own build units.
+Tests with caches or compilers of their own build units of target fmu.
 """
 
 from __future__ import annotations
@@ -119,7 +118,7 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.delenv("CC", raising=False)
 
     def keys() -> set[str]:
-        return {entry["key"] for entry in entries("extension") if entry["name"] == "keyed"}
+        return {entry["key"] for entry in entries("model") if entry["name"] == "keyed"}
 
     def model(length: float = 1.0) -> eg.Model:
         m = eg.Model("keyed", gravity=(0, -9.81, 0))
@@ -180,7 +179,7 @@ def test_a_second_process_writes_no_sources_again(tmp_path: Path) -> None:
     assert started("9.81") == [first[0], "False", "False"]
     other = started("9.82")
     assert (other[0] != first[0], other[1]) == (True, "True")
-    for one in entries("extension"):
+    for one in entries("model"):
         if one["name"] == "noted":
             next(Path(one["directory"]).glob("*.so")).write_bytes(b"damaged")
     assert started("9.81") == [first[0], "True", first[2]]
@@ -338,7 +337,7 @@ def test_a_pickle_names_code_that_is_looked_at(tmp_path: Path) -> None:
     (tmp_path / "module").write_bytes(pickle.dumps(module))
     command = [sys.executable, "-c", code, str(tmp_path / "module")]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "(2,)\n"
-    (entry,) = (entry for entry in entries("extension") if entry["name"] == "pickled")
+    (entry,) = (entry for entry in entries("model") if entry["name"] == "pickled")
     file = next(Path(entry["directory"]).glob("*.so"))
     aside = file.with_name("aside")
     file.rename(aside)  # it is mapped into this process

@@ -56,9 +56,9 @@ def test_a_batch_brings_the_lanes_and_the_bits_stay(named: Callable[..., eg.Mode
     module, x = model.compile(optimize=0), states(5000)
     few = module.rhs(0.0, x[:, :100])
     module.simulate(0.1)
-    assert kinds(model) == ["extension"]
+    assert kinds(model) == ["model"]
     mass = module.mass_matrix(x[:2])
-    assert kinds(model) == ["extension", "lanes"]
+    assert kinds(model) == ["lanes", "model"]
     np.testing.assert_array_equal(module.rhs(0.0, x)[:, :100], few)
     heavy = module.bind({"m2": 3.0})
     np.testing.assert_array_equal(heavy.mass_matrix(x[:2])[..., 7], heavy.mass_matrix(x[:2, 7]))
@@ -101,7 +101,7 @@ def test_an_ensemble_is_compiled_when_it_is_requested(named: Callable[..., eg.Mo
         np.testing.assert_array_equal(np.load(tmp_path / f"{k}.npy"), found[0])
     assert len(found) == 3
     assert all((one == found[0]).all() for one in found)
-    assert kinds(model) == ["classes", "extension", "lanes"]
+    assert kinds(model) == ["lanes", "model"]
     alone = module.simulate(0.3, x[:, 3], rtol=1e-10).x[:, -1]
     np.testing.assert_allclose(found[0][:, 3], alone, atol=1e-6)
 

@@ -126,43 +126,41 @@ def test_wheel_and_sdist_hold_everything(built: Path) -> None:
         )
         assert {f"{folder}/{name}" for name in shipped(folder, copy)} <= sources
     assert {f"eomgen/{name}" for name in shipped("eomgen", copy)} <= names
-    assert sum(name.startswith("eomgen/built/") and name.endswith("/_core.o") for name in names) == 1
+    assert sum(name.startswith("eomgen/_native.") and name.endswith(".so") for name in names) == 1
     assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
     assert any(name.endswith("LICENSE") for name in names)
 
 
+def compiled(folder: Path) -> list[str]:
+    return [path.name for path in folder.glob("eomgen/_native*")]
+
+
 @pytest.mark.slow
 @pytest.mark.thorough
-def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path, warm_cache: Path) -> None:
+def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path) -> None:
     home = tmp_path / "site"
     run("-m", "pip", "install", "--no-deps", "--quiet", "--target", home, next(built.glob("*.whl")), cwd=tmp_path)
-    where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(warm_cache)}
+    where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(tmp_path / "cache")}
     origin = run("-c", "import eomgen; print(eomgen.__file__)", cwd=tmp_path, **where).strip()
     assert Path(origin).is_relative_to(home)
     run("-m", "eomgen", "examples", "pendulum", cwd=tmp_path, **where)
-    where["EOMGEN_CACHE_DIR"] = str(tmp_path / "empty")  # the layer comes with the package
     out = run("-m", "eomgen", "run", "pendulum.yaml", "--end", "0.1", cwd=tmp_path, **where)
     assert "energy" in out
     listed = run("-m", "eomgen", "cache", "list", cwd=tmp_path, **where)
     assert "pendulum" in listed
-    assert "layer" not in listed
+    assert compiled(home) == compiled(ROOT)
 
 
 @pytest.mark.slow
 @pytest.mark.thorough
-def test_a_wheel_without_code_of_this_computer_is_for_all(built: Path, tmp_path: Path) -> None:
-    """With the layer translated: by request, or without a compiler; an editable install puts it in the clone."""
+def test_a_build_without_a_compiler_asks_for_one(built: Path, tmp_path: Path) -> None:
+    """And an editable install puts the extension module in the clone."""
     copy = built.parent
-    build = "import sys; from setuptools import build_meta; getattr(build_meta, sys.argv[1])(sys.argv[2])"
-    for hook, variables in {
-        "build_wheel": {"EOMGEN_BUILD_LAYER": "0"},
-        "build_editable": {"CC": str(tmp_path / "no_compiler")},
-    }.items():
-        run("-c", build, hook, tmp_path / hook, cwd=copy, **variables)
-    with zipfile.ZipFile(next((tmp_path / "build_wheel").glob("eomgen-*-py3-none-any.whl"))) as wheel:
-        names = [Path(name).name for name in wheel.namelist() if name.startswith("eomgen/built/")]
-    assert sorted(names) == ["_core.c"] * 3 + ["manifest.json"] * 3
-    assert sorted(Path(name).name for name in shipped("eomgen/built", copy)) == sorted(names)
+    hooks = "import sys; from setuptools import build_meta; print(getattr(build_meta, sys.argv[1])(*sys.argv[2:]))"
+    assert "ziglang" in run("-c", hooks, "get_requires_for_build_wheel", cwd=copy, CC=str(tmp_path / "none"))
+    assert "ziglang" not in run("-c", hooks, "get_requires_for_build_editable", cwd=copy)
+    run("-c", hooks, "build_editable", tmp_path, cwd=copy)
+    assert compiled(copy) == compiled(ROOT)
 
 
 def test_the_editable_install_sees_templates_and_examples() -> None:
@@ -173,7 +171,7 @@ def test_the_editable_install_sees_templates_and_examples() -> None:
 
 
 @pytest.mark.thorough
-def test_a_clone_works_with_its_own_templates_and_examples(tmp_path: Path, warm_cache: Path) -> None:
+def test_a_clone_works_with_its_own_templates_and_examples(tmp_path: Path) -> None:
     """Where eomgen is installed and Python is started in a clone, the clone's package is the one that is imported."""
     for folder in ("eomgen", "templates", "examples"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
@@ -181,7 +179,7 @@ def test_a_clone_works_with_its_own_templates_and_examples(tmp_path: Path, warm_
     (tmp_path / "templates" / "numpy" / "_core.py.j2").write_text("THE CLONE'S OWN = ")
     result = subprocess.run(
         [sys.executable, "-m", "eomgen", "run", "examples/pendulum.yaml", "--target", "numpy"],
-        cwd=tmp_path, env=os.environ | {"EOMGEN_CACHE_DIR": str(warm_cache)}, capture_output=True, text=True,
+        cwd=tmp_path, env=os.environ | {"EOMGEN_CACHE_DIR": str(tmp_path / "cache")}, capture_output=True, text=True,
     )  # fmt: skip
     assert "THE CLONE'S OWN" in result.stderr or "_core" in result.stderr
     assert result.returncode != 0

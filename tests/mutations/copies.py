@@ -38,10 +38,9 @@ class Outcome(NamedTuple):
 class Copy:
     """The repository's sources in a folder of their own."""
 
-    def __init__(self, folder: Path, layers: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         self.root = folder.resolve()
-        self.layers = layers
-        bytecode = shutil.ignore_patterns("__pycache__", "*.so", ".*_cache")
+        bytecode = shutil.ignore_patterns("__pycache__", ".*_cache")
         for name in FOLDERS:
             shutil.copytree(ROOT / name, self.root / name, ignore=bytecode)
         for name in INSIDE:
@@ -57,7 +56,6 @@ class Copy:
         temporary.mkdir(exist_ok=True)
         return kept | {
             "PYTHONPATH": os.pathsep.join([str(self.root), str(self.root / "tests")]),
-            "EOMGEN_MUTATION_LAYERS": str(self.layers),
             "TMPDIR": str(temporary),
         }
 
@@ -71,7 +69,7 @@ class Copy:
 
     def run(self, tests: Sequence[str], *, first: bool = True) -> Outcome:
         """Run tests in the copy, up to the first failure or all of them."""
-        words = ["-p", "mutations.layers", "-q", "--tb=short", "-p", "no:cacheprovider", *(["-x"] if first else [])]
+        words = ["-p", "mutations.plugin", "-q", "--tb=short", "-p", "no:cacheprovider", *(["-x"] if first else [])]
         start = time.monotonic()
         with subprocess.Popen(
             [sys.executable, "-m", "pytest", *words, *tests],
@@ -91,6 +89,7 @@ class Copy:
         """The same with a fault, which is taken back afterwards."""
         texts = read_sources(self.root)
         path, text = fault.apply(texts)
+        native = {file: file.read_bytes() for file in (self.root / "eomgen").glob("_native*.so")}
         try:
             path.write_text(text, encoding="utf-8")
             self._forget(path)
@@ -98,6 +97,8 @@ class Copy:
         finally:
             path.write_text(texts[path], encoding="utf-8")
             self._forget(path)
+            for file, content in native.items():  # a fault in its sources has built another
+                file.write_bytes(content)
 
     @staticmethod
     def _forget(path: Path) -> None:

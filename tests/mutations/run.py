@@ -9,7 +9,6 @@ whole list writes ``RESULTS.md`` beside this file.  Exit status 1 if a fault sur
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import tempfile
 import threading
@@ -46,9 +45,7 @@ def select(ids: Sequence[str]) -> list[Fault]:
 def check_unharmed(copy: Copy, faults: Sequence[Fault]) -> None:
     """Run all tests that are to catch something on the sources as they are; leave if one fails."""
     tests = sorted({test for fault in faults for test in fault.caught_by})
-    os.environ["EOMGEN_MUTATION_KEEP"] = "1"  # compile the Cython layer once, for all
     outcome = copy.run(tests, first=False)
-    del os.environ["EOMGEN_MUTATION_KEEP"]
     if outcome.code:
         sys.exit(f"the tests do not pass without a fault:\n{outcome.text[-6000:]}")
     print(f"{len(tests)} tests or files pass without a fault ({outcome.seconds:.0f} s)", flush=True)
@@ -57,10 +54,9 @@ def check_unharmed(copy: Copy, faults: Sequence[Fault]) -> None:
 def run(faults: Sequence[Fault], jobs: int) -> list[tuple[Fault, Outcome]]:
     """The outcome of each fault, in the order of the list."""
     with tempfile.TemporaryDirectory(prefix="eomgen-mutations-") as folder:
-        layers, own = Path(folder) / "layers", threading.local()
-        first = Copy(Path(folder) / "copy", layers)
+        own, first = threading.local(), Copy(Path(folder) / "copy")
         check_unharmed(first, faults)
-        spare = [first, *(Copy(Path(folder) / f"copy{k}", layers) for k in range(1, jobs))]
+        spare = [first, *(Copy(Path(folder) / f"copy{k}") for k in range(1, jobs))]
 
         def one(fault: Fault) -> tuple[Fault, Outcome]:
             if not hasattr(own, "copy"):

@@ -46,7 +46,7 @@ def test_tests_that_are_to_notice_exist(test: str) -> None:
 
 
 def test_three_faults_are_noticed(tmp_path: Path) -> None:
-    copy = Copy(tmp_path, tmp_path / "layers")
+    copy = Copy(tmp_path)
     before = read_sources(copy.root)
     for fault in FAULTS:
         if fault.id in TRIED:

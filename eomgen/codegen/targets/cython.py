@@ -1,4 +1,4 @@
-"""Target cython: Program -> an extension module, written, compiled and loaded here, or taken from the cache."""
+"""Target cython: Program -> a library of one model, written, compiled and loaded here, or taken from the cache."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...alone import alone, timed
-from ...compilation import Options, compile_sources, load_core
+from ...compilation import Options, compile_model, load_core
 from ...compilation.native_faults import blame_source
 from ...compilation.shortcut import Shortcut
 from ...errors import ToolchainError, no_such
@@ -36,7 +36,7 @@ def load(
     with timed(seconds, "compile"):
         if artifact is None:
             try:
-                artifact = compile_sources(sources, program.name, chosen)
+                artifact = compile_model(sources, program.name, chosen)
             except ToolchainError as error:
                 raise blame_source(error, functions.values()) or error from None
             shortcut.keep(artifact)

@@ -630,7 +630,7 @@ def fmu_bytes(
     if folder is not None:
         code = {Path(name).name: text for name, text in unit.files.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
-        library = compile_c_library(code, program.name, options, progress, steppers=True).path
+        library = compile_c_library(code, program.name, options, progress).path
         files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:

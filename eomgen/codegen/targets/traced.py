@@ -212,7 +212,7 @@ def functions(program: Program) -> ModuleType:
     library = program.metadata["target"]
     text = emit_traced(program, library)
     name = f"{program.name}_{library}_{sha256(text.encode()).hexdigest()[:16]}"
-    found = find_module(name)
+    found: ModuleType | None = find_module(name)
     if found is not None:
         return found
     title, requirement = LIBRARIES[library]

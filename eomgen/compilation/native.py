@@ -1,0 +1,156 @@
+"""The extension module ``eomgen._native``: kernels, runs, ensembles and rigid contacts of all models, compiled once.
+
+It comes with the package (``setup.py``). In a clone, whose sources change, it is compared with them when it is first
+needed, and built anew in its place where they differ.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.machinery
+import io
+import os
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..base.files import digest, locked
+from ..errors import MissingDependencyError, ToolchainError
+from ..layer import read_native
+from .build import compile_and_link
+from .compiler import CompilerInfo, find_compiler
+from .options import Options, compile_flags, link_flags, machine_flags
+
+NAME = "_native"
+PACKAGE = Path(__file__).parents[1]
+PATIENCE = 300.0  #: seconds to wait for another process that builds it
+_lock = threading.Lock()
+
+
+def find_native() -> ModuleType:
+    """The module, built now if need be.
+
+    Raises
+    ------
+    MissingDependencyError
+        It must be built, and Cython is not installed.
+    ToolchainError
+        It must be built, and there is no compiler, there are no headers of Python, or the build fails.
+    """
+    name = f"{__package__.partition('.')[0]}.{NAME}"
+    with _lock:
+        if name not in sys.modules and (PACKAGE.parent / "pyproject.toml").is_file():
+            _renew()
+        return import_module(name)
+
+
+def _renew() -> None:
+    """Build the module of a clone where it is not what its sources say."""
+    if _is_current():
+        return
+    with locked(PACKAGE.parent / "pyproject.toml", PATIENCE):
+        if not _is_current():  # nor has another process built it
+            tell("building eomgen._native from its changed sources")
+            build_native(PACKAGE)
+
+
+def _is_current() -> bool:
+    try:
+        return digest_sources().encode() in product_in(PACKAGE).read_bytes()
+    except FileNotFoundError:
+        return False
+
+
+@cache
+def digest_sources() -> str:
+    """SHA-256 of the texts that the module is compiled from."""
+    return digest("\n".join(f"{name}\n{text}" for name, text in read_native().items()).encode())
+
+
+def product_in(folder: Path) -> Path:
+    """The module's file in a folder."""
+    return folder / f"{NAME}{importlib.machinery.EXTENSION_SUFFIXES[0]}"
+
+
+def build_native(folder: Path) -> None:
+    """Build the module into a folder, in the place of an earlier one.
+
+    Raises
+    ------
+    MissingDependencyError
+        Cython is not installed.
+    ToolchainError
+        No compiler, no headers of Python, or the build fails.
+    """
+    headers, compiler, product = find_python_headers(), find_compiler(), product_in(folder)
+    with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
+        for name, text in read_native().items():
+            Path(private, name).write_text(text, encoding="utf-8")
+        with contextlib.chdir(private):  # no folder's name in the C text
+            _run_cython(Path(f"{NAME}.pyx"))
+        files = {path.name: Path(path.name) for path in sorted(Path(private).glob("*.c"))}
+        flags = {name: _flags(name, compiler, headers) for name in files}
+        flags[""] = link_flags(Options(), compiler, extension=True)
+        compile_and_link(Path(private), digest_sources(), NAME, files, flags, product.name, compiler, os.cpu_count())
+        folder.mkdir(parents=True, exist_ok=True)
+        aside = folder / f".{os.getpid()}-{product.name}"
+        aside.write_bytes(Path(private, product.name).read_bytes())
+        aside.chmod(0o755)
+        os.replace(aside, product)
+
+
+def _flags(file: str, compiler: CompilerInfo, headers: Path) -> list[str]:
+    """Flags of a C file, for all processors of this kind: wider vectors are chosen when it runs."""
+    if file != f"{NAME}.c":
+        flags = compile_flags(Options(optimize=2), compiler, 0, hidden=True, portable=True)
+        return [*flags, "-ftree-vectorize"] if compiler.kind == "gcc" else flags
+    numpy: Any = import_module("numpy")
+    flags = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
+    flags += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
+    return [*flags, f"-I{headers}", f"-I{numpy.get_include()}"]
+
+
+def _run_cython(source: Path) -> None:
+    """Translate the module's text to C in this process; cythonize would want setuptools."""
+    try:
+        from Cython.Compiler import Main
+    except ImportError:
+        raise MissingDependencyError("eomgen._native is built with Cython: pip install cython") from None
+    compile_file: Callable[..., Any] = Main.compile
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said):
+        result = compile_file(str(source), output_file=str(source.with_suffix(".c")), language_level=3)
+    if result.num_errors:
+        raise ToolchainError(f"Cython cannot translate {source}:\n{said.getvalue()}", "cython", said.getvalue())
+
+
+def find_python_headers() -> Path:
+    """Directory of Python.h.
+
+    Raises
+    ------
+    ToolchainError
+        If it is not installed.
+    """
+    import sysconfig
+
+    directory = Path(sysconfig.get_path("include"))
+    if not (directory / "Python.h").is_file():
+        raise ToolchainError(
+            f"Python's C headers are missing: there is no {directory / 'Python.h'}. Install them (Debian, Ubuntu: "
+            f"apt install python{sys.version_info[0]}.{sys.version_info[1]}-dev or python3-dev; Fedora: dnf install "
+            "python3-devel)",
+            code="EG-COMPILER-MISSING",
+        )
+    return directory
+
+
+def tell(line: str) -> None:
+    """Tell what is being done on stderr."""
+    print(f"eomgen: {line}", file=sys.stderr)
