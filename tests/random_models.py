@@ -134,7 +134,6 @@ def random_model(
     loop: bool = False,
     types: Sequence[str] = SPATIAL,
     rotation: str = "euler_angles",
-    armature: Mapping[str, float] | None = None,
     closing: tuple[str, np.ndarray, np.ndarray] | None = None,
 ) -> Random:
     """A tree of mixed joints.
@@ -144,12 +143,9 @@ def random_model(
     reverse : bool
         Some joints lead from the outer body to the inner one.
     forces : str
-        ``judged``: a spring and a damper to the last body, a force and a torque in body axes, which ``Judge`` knows;
-        ``more``: also a spring, a damper and a drive over time on the first coordinate.
+        ``judged``: a spring and a damper to the last body, a force and a torque in body axes, which ``Judge`` knows.
     loop : bool
         A joint (hinge in the plane, ball in space) holds the last body to ground where the tree puts it.
-    armature : mapping
-        Inertia of a drive by name of a joint.
     closing : tuple
         In place of that joint a type and the pose of the last body's marker in the joint's axes.
     """
@@ -184,13 +180,9 @@ def random_model(
             if loop and SUFFIXES[kind]:  # named: they are not what is cut
                 names = coordinates_of(kind, name, rotation)
                 keys |= {"coordinates": names} if len(names) > 1 else {"coordinate": names[0]}
-            if armature and name in armature:
-                keys["armature"] = armature[name]
             m.joint(kind, name, *(ends[::-1] if turned[k] else ends), **keys)
-        first = next(name + suffix for name, kind in ((f"q{k}", kind) for k, kind in enumerate(kinds))
-                     for suffix in SUFFIXES[kind])  # fmt: skip
         if forces:
-            _forces(m, made, first if forces == "more" else "")
+            _forces(m, made)
         return m, made
 
     m, made = tree()
@@ -214,17 +206,13 @@ def random_model(
     return Random(m, parents, kinds, outer, inner, masses, centers, inertias, gravity)
 
 
-def _forces(m: eg.Model, bodies: list[Any], coordinate: str) -> None:
+def _forces(m: eg.Model, bodies: list[Any]) -> None:
     last = bodies[-1]
     anchor, tip = m.ground.at(*ANCHOR.tolist()), last.at(*TIP.tolist())
     m.spring("s", anchor, tip, stiffness=STIFFNESS, length=FREE_LENGTH)
     m.damper("d", anchor, tip, damping=DAMPING)
     m.force("p", bodies[0].at(*CORNER.tolist()), tuple(PUSH.tolist()), axes="body")
     m.torque("t", bodies[(len(bodies) - 1) // 2], tuple(TWIST.tolist()), axes="body")
-    if coordinate:
-        m.joint_spring("js", coordinate, stiffness=3.0, rest=0.2)
-        m.joint_damper("jd", coordinate, damping=0.4)
-        m.torque("ja", coordinate, "2*t + 0.3")
 
 
 def seed_with(group: tuple[str, ...], bodies: int, chain: bool = False) -> int:
@@ -330,9 +318,23 @@ ALLOWED = {
 }  # fmt: skip
 LENGTHS = ("prismatic", "curve_slider")
 SINGLE = ("revolute", "continuous", "prismatic", "screw", "curve_slider")
-FORCES = ("spring", "damper", "push", "twist", "motors", "joint_spring", "joint_damper", "armature", "state", "event")
-CONSTRAINTS = ("driver", "coupling", "velocities", "knife_edge", "switched")
+FORCES = (
+    *("spring", "damper", "push", "twist", "motors", "joint_spring", "joint_damper", "armature", "state", "event"),
+    *("stop", "contact"),
+)
+CONSTRAINTS = ("driver", "coupling", "velocities", "knife_edge", "switched", "open", "rolling")
+#: A sphere about TIP of the last body on a plane of the first one; a ball about TIP that rolls on ground; a stop.
+FLOOR = Rotation.from_rotvec([0.5, -0.3, 0.2]).as_matrix()
+SPHERE, DEPTH, CONTACT = 5.0, np.array([0.0, 0.0, -2.0]), {"stiffness": 4.0, "dissipation": 0.3, "friction": 0.4}
+SLIDING, BALL, STOP = 0.5, 0.4, {"stiffness": 6.0, "dissipation": 0.2}
 TIME, INPUT, STATE = 0.1, 0.7, 0.3
+#: Joint -> ending of a coordinate -> its axis in the first marker, and whether it is a length.
+AXES = {
+    **{kind: {"": (2, kind == "prismatic")} for kind in ("revolute", "continuous", "prismatic", "screw")},
+    "cylindrical": {"_z": (2, True), "_3": (2, False)},
+    "planar": {"_x": (0, True), "_y": (1, True), "_3": (2, False)},
+    "translational": {"_x": (0, True), "_y": (1, True), "_z": (2, True)},
+}
 
 
 @dataclass(frozen=True)
@@ -367,7 +369,8 @@ class Recipe:
     @property
     def single(self) -> list[str]:
         """Names of joints of one coordinate, each of which has that name."""
-        return [f"q{k}" for k, kind in enumerate(self.kinds) if kind in SINGLE and not (self.closing and k == self.cut)]
+        cut = self.cut if self.closing and self.cut <= self.last else -1
+        return [f"q{k}" for k, kind in enumerate(self.kinds) if kind in SINGLE and k != cut]
 
 
 @dataclass(frozen=True)
@@ -432,7 +435,7 @@ class Made:
         whole = numbers is None
         for k in self.order(range(len(recipe.kinds))):
             ends = [(recipe.parents[k], self.numbers.outer[k]), (k, self.numbers.inner[k])]
-            named = not (recipe.closing and whole) or k != self.cut
+            named = not (recipe.closing and whole) or k != self.cut or k > recipe.last
             self.join(f"q{k}", recipe.kinds[k], *ends[:: -1 if recipe.turned[k] else 1], named)
         if recipe.closing and whole:
             for name in ("close", "close2")[: 1 + recipe.doubled]:
@@ -443,7 +446,9 @@ class Made:
                 outer = Placement(R @ inner.rotation, r + R @ inner.position)
                 self.join(name, recipe.closing, (-1, outer), (recipe.last, inner),
                           name == "close" and self.cut <= recipe.last)  # fmt: skip
-            lost = set(coordinates_of(self.kind(self.cut), f"q{self.cut}", recipe.rotation))
+        if whole and self.numbers.start:
+            cut = self.cut if recipe.closing and self.cut <= recipe.last else -1
+            lost = set(coordinates_of(self.kind(cut), f"q{cut}", recipe.rotation) if cut >= 0 else ())
             m.guess(**self.coordinates({name: q for name, q in self.numbers.start.items() if name not in lost}))
         if whole:
             self.loads()
@@ -558,6 +563,14 @@ class Made:
                     m.joint_damper(f"jd{own}", own, damping=0.4 * T / l**2)
             elif kind == "event" and single:
                 m.event(self.name("passes"), single[0][1])
+            elif kind == "stop":
+                for _, own, l in single:
+                    stiffness, dissipation = STOP["stiffness"] * T / l**2.5, STOP["dissipation"] / l
+                    m.stop(f"st{own}", own, stiffness=stiffness, lower=-20.0 * l, upper=0.0, dissipation=dissipation)
+            elif kind == "contact":
+                law = {"stiffness": CONTACT["stiffness"] * F / L**1.5, "dissipation": CONTACT["dissipation"] / L}
+                law |= {"radius": SPHERE * L, "friction": CONTACT["friction"], "smoothing": SLIDING * L}
+                m.sphere_plane(self.name("contact"), self.at(self.floor, DEPTH, FLOOR), tip, **law)
             elif kind == "motors":
                 for name in self.order(self.driven()):
                     kind_of = self.joints[name.partition("_")[0]][0]
@@ -566,14 +579,21 @@ class Made:
                     m.actuator(f"m{self.name(name)}", self.name(name), (T / L if length else T) * value * (u + 1.0))
                     self.motors[name] = value * (INPUT + 1.0)
 
+    @property
+    def floor(self) -> int:
+        """The body of the plane that a sphere touches: ground where there is but one."""
+        return 0 if self.recipe.last else -1
+
     def driven(self) -> list[str]:
-        """Each joint of one coordinate, cut or not, and each coordinate of others where no cut takes it."""
+        """Each coordinate, of cut joints too where their motions are along fixed axes of the first marker."""
         found = []
         for name, (kind, *_) in self.joints.items():
             k = self.recipe.last + 1 if name == "close" else int(name[1:]) if name != "close2" else -2
-            if kind in SINGLE and name != "close2":
+            if name == "close2" or kind in ("spherical", "free"):
+                continue
+            if kind in SINGLE:
                 found.append(name)
-            elif k >= 0 and not (self.recipe.closing and k <= self.recipe.last) and kind not in ("spherical", "free"):
+            elif not (self.recipe.closing and k <= self.recipe.last + (name == "close")) or kind in AXES:
                 found += coordinates_of(kind, name, "euler_angles")
         return found
 
@@ -599,9 +619,13 @@ class Made:
                 m.coupling(self.name("velocities"), equation=text)
             elif kind == "knife_edge":
                 m.knife_edge(self.name("knife_edge"), self.at(recipe.last, TIP, np.eye(3)))
-            elif kind == "switched":
+            elif kind == "rolling":
+                r = self.numbers.pose[:3, 3] + self.numbers.pose[:3, :3] @ TIP - BALL * FLOOR[:, 2]
+                wheel, plane = self.at(recipe.last, TIP), self.at(-1, r, FLOOR)
+                m.rolling(self.name("rolling"), wheel, plane, radius=BALL * self.L, shape="sphere")
+            elif kind in ("switched", "open"):
                 A = self.name(names[-1])
-                m.coupling(self.name("switched"), equation=f"{A}_dot/{size[names[-1]]!r}", closed=True,
+                m.coupling(self.name("switched"), equation=f"{A}_dot/{size[names[-1]]!r}", closed=kind == "switched",
                            closes=f"{A} - 90", opens=f"{A} + 90")  # fmt: skip
                 m.output(self.name("held"), f"multiplier({self.name('switched')})")
 
@@ -613,12 +637,21 @@ class Made:
         return kernel(*where, **keys, **({"p": self.p} if self.p else {}))
 
     def state(self, module: Any, which: int = 0) -> np.ndarray:
-        """On the constraints at ``TIME``: of a tree anywhere, of a loop near the place where it was made."""
+        """On the constraints at ``TIME``: of a tree anywhere, else near the place where the mechanism was made."""
         random, n, v = np.random.default_rng([self.recipe.seed, 5, which]), module.n_q, module.n_v
         x = module.x0()
-        x[:n] += (0.05 if self.recipe.closing else 0.6) * random.uniform(-1, 1, n)
+        x[:n] += (0.05 if self.numbers.start else 0.6) * random.uniform(-1, 1, n)
         x[n : n + v] = random.uniform(-1, 1, v)
         return np.asarray(module.project(x, t=TIME))
+
+    def places(self, module: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Turns and places of the bodies where a run starts, as the bodies were made, in SI units."""
+        names = module.metadata["body_names"]
+        poses = module.poses(module.x0()[: module.n_q])[[names.index(self.name(f"b{k}")) for k in range(len(names))]]
+        frames = [self.frame(k) for k in range(len(names))]
+        R = np.array([pose[:3, :3] @ A.rotation.T for pose, A in zip(poses, frames, strict=True)])
+        r = poses[:, :3, 3] / self.L
+        return R, r - np.array([turn @ A.position for turn, A in zip(R, frames, strict=True)])
 
     def motion(self, module: Any, x: np.ndarray) -> SimpleNamespace:
         """Of all bodies, by differences of poses along the module's rhs, as the bodies were made, in SI units."""
@@ -657,7 +690,8 @@ class Made:
 
 @cache
 def numbers_of(recipe: Recipe) -> Numbers:
-    """The numbers; the place of the joint that closes follows from a tree without it."""
+    """The numbers; the place of the joint that closes, or of a plane to roll on, follows from a tree without it."""
+    held = recipe.closing or "rolling" in recipe.constraints
     recipe = replace(recipe, forces=(), constraints=())
     random, bodies, planar = np.random.default_rng(recipe.seed), len(recipe.kinds), recipe.planar
     flat = np.array([1, 1, 0 if planar else 1])
@@ -675,7 +709,7 @@ def numbers_of(recipe: Recipe) -> Numbers:
         hold=_placement(random, planar, recipe.closing),
         pose=np.eye(4),
     )
-    if not recipe.closing:
+    if not held:
         return numbers
     bare = Made(recipe, numbers=numbers).compile(kernels=["poses"])
     q = random.uniform(0.2, 0.7, bare.n_q)
@@ -724,10 +758,15 @@ def mechanisms(draw: Callable[..., Any]) -> Recipe:
     )
     if freedom < 1:
         return recipe
+    way, k = 0, last  # what the last body can do
+    while k >= 0:
+        way, k = way + len(SUFFIXES[kinds[k]]), parents[k]
+    if not closing and way > 4 and draw(st.booleans()):
+        return replace(recipe, constraints=("rolling",))
     singles, able = len(recipe.single), [""]  # none of which may contradict another
-    able += ["switched"] * (singles > 0) + ["coupling", "velocities"] * (singles > 1)
+    able += ["switched", "open"] * (singles > 0) + ["coupling", "velocities"] * (singles > 1)
     found = [draw(st.sampled_from(able))]
-    if singles > (found[0] == "switched") and freedom > 1:
+    if singles > (found[0] in ("switched", "open")) and freedom > 1:
         found.append(draw(st.sampled_from(("", "driver"))))
     if not planar and closing != "weld" and freedom > 2:
         found.append(draw(st.sampled_from(("", "knife_edge"))))

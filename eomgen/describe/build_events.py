@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.operations import CONDITION, operations_with
 from ..graph.core import Expr
 from ..graph.shown import shown
 from ..graph.substitute import symbols_of
@@ -30,6 +31,9 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
     expression = reader.stand_in
     if "expression" in values:
         expression = instant(reader, f"{path}.expression", values["expression"])
+        if expression.node[0] in operations_with(lambda row: row.kind == CONDITION):
+            message, remedy = "is a comparison, which has no zero", "give the difference of its sides: a - b for a > b"
+            reader.faults.add(f"{path}.expression", message, remedy, "EG-EVENT")
     direction = values.get("direction", 0)
     if not is_number(direction) or direction not in (-1, 0, 1):
         remedy = "give 1 for a rising, -1 for a falling value, 0 for both"

@@ -56,7 +56,7 @@ def standard_parameters(module: BoundModel, /, p: Any = None) -> dict[str, float
         ``Ixz``, ``Iyz`` (kg m^2, about the body's origin, products with the tensor's own sign), in body axes.
     """
     names = standard_names(module)
-    state, still = module.layout.q_reference, np.zeros(module.n_v)
+    state, still = module.layout.q_reference, np.zeros(module.layout.n_v)  # of states too
     terms = module.kernels.motion("inertial_terms")(state, still, still, p=_values(module, p))
     return dict(zip(names, map(float, terms[:, MOTION:].ravel()), strict=True))
 

@@ -1,12 +1,10 @@
-"""Random chains closed by every joint that can be cut, against multipliers; Jacobians of loops and trees.
+"""Random chains closed by every joint that can be cut, against multipliers.
 
 M, h, power and twists are those of differences of body poses, loops are closed by the augmented form (Shabana,
 Computational Dynamics, sec. 5.6) in NumPy, redundant rows and Euler parameters included.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import judges
 import numpy as np
@@ -133,19 +131,3 @@ def test_any_loop_moves_as_multipliers_make_it(seed: int, planar: bool, method: 
         a = judges.augmented(judge.M, judge.h, C_q, gamma(mod, x, judge.q_dot))
         cond = max(np.linalg.cond(judge.M), np.linalg.cond(mod.embedded_mass_matrix(x[:n])))
         judges.agree(mod.rhs(0.0, x)[n:], a, 1e-9, cond)
-
-
-def derivative(mod: Any, x: np.ndarray, t: float, h: float = 1e-5) -> np.ndarray:
-    """Of rhs, by central differences of tenth order, in every direction of x."""
-    return np.stack([judges.first(lambda y: mod.rhs(t, y), x, d, h=h) for d in np.eye(len(x))], 1)
-
-
-@pytest.mark.parametrize(("planar", "loop"), [(False, False), (True, True), (False, True)])
-@pytest.mark.parametrize("seed", part_of([1, 2, 3], lambda seed: seed == 2))
-def test_jacobians_are_the_derivatives_of_the_complete_right_hand_side(seed: int, planar: bool, loop: bool) -> None:
-    """Projection included, transverse directions too."""
-    model = random_model(seed, 3, planar=planar, reverse=True, loop=loop, forces="more").model
-    mod = model.compile("embedding", target="numpy", kernels=["rhs", "jacobian", "project"])
-    for x in states_of(mod, seed, 2):
-        expected = derivative(mod, x, 0.2)
-        assert np.abs(mod.jacobian(0.2, x) - expected).max() <= 1e-6 * np.abs(expected).max()

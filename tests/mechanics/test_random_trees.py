@@ -274,46 +274,6 @@ def test_methods_equal_newton_and_euler_and_balance_power(group: tuple[str, ...]
         np.testing.assert_allclose(twists[:, 3:], judge.bodies.v, rtol=0, atol=1e-10)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("case", range(len(TREES)))
-def test_every_method_and_target_gives_the_same_accelerations(case: int) -> None:
-    group, bodies, rotation = TREES[case]
-    model = random_model(
-        seed_with(group, bodies), bodies, reverse=True, forces="more", types=group, rotation=rotation
-    ).model
-    one = model.compile(target="numpy", kernels=KERNELS)
-    states = states_of(one, 5, 3)
-    for method in METHODS:
-        for target in ("numpy", "cython"):
-            options = {"optimize": 0} if target == "cython" else {}
-            mod = model.compile(method, target=target, kernels=KERNELS, **options)
-            for x in states:
-                M = one.mass_matrix(x[: one.n_q])
-                judges.agree(mod.rhs(0.4, x), one.rhs(0.4, x), 1e-11, float(np.linalg.cond(M)))
-                np.testing.assert_allclose(mod.mass_matrix(x[: one.n_q]), M, rtol=0, atol=1e-11 * np.abs(M).max())
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_drives_add_their_inertia(method: str) -> None:
-    """A rotor that turns with a coordinate (gear included in J) adds J v^2 / 2, J on the diagonal of M and no more."""
-    group = ("revolute", "prismatic", "screw", "free")
-    seed = seed_with(group, 5)
-    kinds = random_model(seed, 5, types=group).kinds
-    drives = {f"q{k}": 0.2 + 0.3 * k for k, kind in enumerate(kinds) if len(SUFFIXES[kind]) == 1}
-    made = random_model(
-        seed, 5, reverse=True, forces="judged", types=group, rotation="euler_parameters", armature=drives
-    )
-    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
-    (x,) = states_of(mod, 8, 1)
-    judge, q, v = Judge(mod, made, x), x[: mod.n_q], x[mod.n_q :]
-    J = np.array([drives.get(name.removesuffix("_dot"), 0.0) for name in mod.v_names])
-    assert (J > 0.0).sum() == len(drives) >= 3
-    M = judge.M + np.diag(J)
-    np.testing.assert_allclose(mod.mass_matrix(q), M, rtol=0, atol=1e-10 * np.abs(M).max())
-    judges.agree(mod.rhs(0.0, x)[mod.n_q :], np.linalg.solve(M, -judge.h), 1e-9, float(np.linalg.cond(M)))
-    assert mod.energy(x)[0] == pytest.approx(0.5 * v @ M @ v, rel=1e-9)
-
-
 # -- large trees -------------------------------------------------------------------------------------------------------
 def branched(n: int) -> eg.Model:
     """A tree too large to be unrolled: a free trunk, chains of hinges, slides and spherical joints on it."""

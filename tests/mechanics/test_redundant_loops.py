@@ -32,25 +32,6 @@ def test_redundant_rows_are_reported_by_name(equations: Callable[..., Any], modu
 
 
 @pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("name", TILTED)
-def test_a_tilted_linkage_moves_as_the_planar_one(module: Callable[..., Any], name: str, method: str) -> None:
-    times = np.linspace(0, 5, 51)
-    options = {"t_eval": times, "rtol": 1e-12, "atol": 1e-14}
-    planar, tilted = (
-        module("four_bar", method, "cython").simulate((0, 5), **options),
-        module(name, method, "cython").simulate((0, 5), **options),
-    )
-    assert np.ptp(planar["theta"]) > 2 * np.pi
-    for name_ in ("theta", "bend", "psi", "theta_dot", "bend_dot", "psi_dot"):
-        size = max(1.0, np.abs(planar[name_]).max())
-        assert np.abs(planar[name_] - tilted[name_]).max() <= 1e-9 * size
-    mod = module(name, method)
-    assert np.abs(mod.constraints(tilted.x[: mod.n_q], rows="all")).max() < 1e-11
-    assert np.abs(mod.velocity_constraints(tilted.x)).max() < 1e-11 * np.abs(tilted.x).max()
-    assert tilted.residuals.position < 1e-11
-
-
-@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
 def test_a_third_crank_of_a_parallelogram_changes_nothing(
     equations: Callable[..., Any], module: Callable[..., Any], method: str
 ) -> None:

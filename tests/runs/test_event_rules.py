@@ -253,3 +253,11 @@ def test_a_solver_that_ends_early_in_silence_is_named(modules: dict[str, Any]) -
             return message
 
     refuses("EG-STALLED 2", lambda: modules["numpy"].simulate((0, END), method=Lazy))
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("text", ["h > 0.2", "h < 0.2 and h > 0.1"])
+def test_a_comparison_has_no_zero(text: str) -> None:
+    model = ball()
+    model.event("passes", text)
+    refuses("EG-EVENT comparison", model.check)
