@@ -15,9 +15,7 @@ from .errors import EomgenError, cannot
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
 from .targets import find_function, find_target
-from .verification.record import record
 from .verification.record_calls import RECORDED, record_calls
-from .verification.recorded import FILE
 
 if TYPE_CHECKING:
     from .derivation import Derivation
@@ -34,6 +32,7 @@ def generate(
     baumgarte: tuple[float, float] | None = None,
     precision: str = "double",
     fmi: str = "2.0",
+    analyses: bool = False,
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/``, or ``directory/<name>.fmu``, and return that path.
 
@@ -51,6 +50,9 @@ def generate(
         leaves five to six digits.
     fmi : {'2.0', '3.0'}, optional
         Version of FMI of a functional mock-up unit.
+    analyses : bool, optional
+        Whether a Python package has equilibria, linearization, reactions and all other analyses of a Module too;
+        else those are eomgen's, by ``Module.of(package)``.
 
     Raises
     ------
@@ -70,12 +72,16 @@ def generate(
     program = build(equations, target)
     if row.kernels and not row.module:
         program = with_start(equations, program)
-    asked = {"independent": list(independent or ()) or None, "baumgarte": baumgarte, "precision": precision}
+    asked = {
+        "independent": list(independent or ()) or None,
+        "baumgarte": baumgarte,
+        "precision": precision,
+        "analyses": analyses or None,
+    }
     told = {name: value for name, value in asked.items() if value not in (None, "double")}
-    sources = dict(emit_package(program, target, precision, told))
+    sources = dict(emit_package(program, target, precision, told, analyses))
     if row.module:
-        sources[RECORDED] = record_calls(_evaluated(equations))
-        sources[FILE] = record(program)
+        sources[RECORDED] = record_calls(equations.name, _evaluated(equations))
     return write_package(sources, folder / equations.name)
 
 

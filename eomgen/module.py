@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
+from .base.files import load_source
+from .errors import UnavailableError, ill_typed
 from .runtime.argument_names import both_names, plain_names
 from .runtime.bound_model import BoundModel
 from .runtime.near_names import find_lacking
@@ -96,8 +99,22 @@ FORMS = {
 
 
 def find_function(file: str, name: str) -> Any:
-    """A function or class of another part of the package, which is loaded now."""
-    return getattr(import_module(f".{file}", __package__), name)
+    """A function or class of another part of the package, which is loaded now.
+
+    Raises
+    ------
+    UnavailableError
+        A generated package was written without it.
+    """
+    try:
+        return getattr(import_module(f".{file}", __package__), name)
+    except ModuleNotFoundError as error:
+        if error.name != f"{__package__}.{file.partition('.')[0]}":
+            raise
+        raise UnavailableError(
+            f"{__package__} was generated without {name}: give --analyses to `eomgen generate`; where eomgen is, "
+            f"Module.of({__package__}) has it"
+        ) from None
 
 
 class LateMethod:
@@ -185,6 +202,28 @@ class Module(BoundModel):
     dae : Dae
         F(t, y, y') = 0 with multipliers, for differential-algebraic solvers.
     """
+
+    @classmethod
+    def of(cls, package: Any) -> Module:
+        """The module of a generated package, or of one bound to other values, with every run and analysis of eomgen.
+
+        Parameters
+        ----------
+        package : package
+            As imported: ``Module.of(slider_crank).linearize()``; or its ``module``, or what its ``bind`` gives.
+
+        Raises
+        ------
+        UsageError
+            It is no generated package.
+        """
+        module = getattr(package, "module", package)
+        if not hasattr(module, "x_names"):
+            raise ill_typed(f"{package!r} is no package that eomgen generated")
+        core, file = module.core, str(module.core.__file__)
+        if file.endswith(".py"):  # what it raises would be errors of the package, which nothing here knows
+            core = load_source(f"{__package__}._{module.name}", file, Path(file).read_bytes())
+        return cls(core, module.p, module.u)
 
     if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
         simulate = _simulate

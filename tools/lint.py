@@ -37,6 +37,16 @@ ROOMS = ("mechanics", "forces", "runs", "model", "code", "shown", "core", "attac
 LONGEST = 800  #: lines of a file of tests
 
 
+#: What runs reach beyond the folders that packages carry: texts, pictures, analyses.
+BEYOND = {
+    "module": {"analysis", "identification", "verification"},
+    "runtime.drawing": {"show"},
+    "runtime.formulas": {"describe", "graph"},
+    "runtime.room": {"describe"},
+    "runtime.trajectory": {"show"},
+}
+
+
 def name_of(file: Path) -> str:
     """The dotted name of a file."""
     return ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
@@ -116,6 +126,11 @@ def directions() -> Iterator[str]:
             here, there = ("base" if one == "errors" else one for one in (here, there))  # one floor
             if here != there and here not in ("", "__main__") and there and rows[there] >= rows[here]:
                 yield f"{name} imports {other}, which stands in the same row of ARCHITECTURE.md or above"
+    carried = {part.removesuffix(".py") for part in import_module("eomgen.emit.package").CARRIED}
+    for name, others in graph.items():
+        homes = {other.split(".")[1] for other in others if "." in other} - carried
+        if f"{name}.".split(".")[1] in carried and (homes := homes - BEYOND.get(name.removeprefix("eomgen."), set())):
+            yield f"{name} imports {', '.join(sorted(homes))}, which packages do not carry"
 
 
 def follow(found: Any, names: list[str]) -> bool:

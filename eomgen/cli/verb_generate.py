@@ -54,6 +54,11 @@ from .shared_options import (
     is_flag=True,
     help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython, numpy).",
 )
+@click.option(
+    "--analyses",
+    is_flag=True,
+    help="Also equilibria, linearization, reactions and all other analyses, without eomgen (cython, numpy).",
+)
 @json_option
 @robot_options
 @reports_failures
@@ -68,6 +73,7 @@ def generate(
     precision: str,
     fmi: str,
     wheel: bool,
+    analyses: bool,
     as_json: bool,
     robot: dict[str, Any],
 ) -> None:
@@ -82,7 +88,7 @@ def generate(
         require_wheel(target)
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = write_out(described, out, method, target, independent or None, baumgarte, precision, fmi)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, precision, fmi, analyses)
     built = None
     if wheel:
         with stage("wheel"):

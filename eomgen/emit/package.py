@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -16,7 +17,6 @@ from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
 from .c import emit_c
 from .c_lanes import DERIVATIVES
-from .carried import carry
 from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .provenance import trace_provenance
@@ -37,19 +37,25 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
-FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
-          "simulate_impacts", "consistent")  # fmt: skip
-MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
-ANALYSES = (*MOTIONS, *DERIVATIVES, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
-PICTURES = ("draw", "draw_branches")
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
+#: Calls of every package, and those of one with analyses.
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", *DERIVATIVES, "sensitivities",
+           "kinematic_analysis", "multipliers", "impact", "simulate_impacts")  # fmt: skip
+ANALYSES = ("motion_range", "workspace", "linearize", "modes", "equilibrium", "reactions", "undetermined_reactions",
+            "driving_forces", "actuator_forces", "consistent")  # fmt: skip
+#: What packages in Python carry of eomgen, unchanged: whatever runs need, and the analyses if asked for.
+CARRIED = ("errors.py", "module.py", "base", "numeric", "runtime", "simulation", "ensembles")
+CARRIED_ANALYSES = ("analysis", "identification")
 
 #: Files of every package.
 ABOUT = ("LICENSE.txt", "PROVENANCE.md")
 
 
 def emit_package(
-    program: Program, target: str, precision: str = "double", asked: Mapping[str, Any] | None = None
+    program: Program,
+    target: str,
+    precision: str = "double",
+    asked: Mapping[str, Any] | None = None,
+    analyses: bool = False,
 ) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
@@ -61,6 +67,8 @@ def emit_package(
         Of the numbers of a ``c`` library.
     asked : mapping of str to object, optional
         Further options of the generation, for the provenance.
+    analyses : bool, optional
+        Whether a Python package carries the analyses too.
 
     Returns
     -------
@@ -71,7 +79,7 @@ def emit_package(
     Raises
     ------
     UsageError
-        An unknown target or precision, or ``float`` for another target than ``c``.
+        An unknown target or precision, ``float`` for another target than ``c``, analyses for one that is not Python.
     """
     row = find_target(target)
     if row.whole:
@@ -82,7 +90,9 @@ def emit_package(
         raise cannot(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
     program = replace(program, metadata={**program.metadata, **made})
-    context = _context(program) | {"precision": precision}
+    if analyses and not row.module:
+        raise cannot(f"analyses are for Python packages; target {target} is none")
+    context = _context(program, analyses) | {"precision": precision}
     about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
     return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})
 
@@ -99,27 +109,35 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
         **sources,
         **read_layer(),
         "setup.py": render("python/setup.py.j2", context),
-        **_python_files(context, {}),
+        **_python_files(context),
     }
 
 
 def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     """Functions of NumPy arrays, and what of eomgen they need."""
-    own = emit_numpy(program, bundled=True)
-    return {**own, **_python_files(context, own)}
+    return {**emit_numpy(program, bundled=True), **_python_files(context)}
 
 
-def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str, str]:
-    """What is generated in Python besides the core, and all of eomgen that it needs."""
-    names = ("__init__.py", "__init__.pyi", "selftest.py")
-    own = {name: render(f"python/{name}.j2", context) for name in names}
-    found = carry({**core, **own})
-    context = context | {
-        "folders": sorted({name.rpartition("/")[0].replace("/", ".") for name in found if "/" in name})
-    }
-    names = ("pyproject.toml", "README.md", "tests/test_recorded.py")
-    about = {name: render(f"python/{name}.j2", context) for name in names}
-    return {"py.typed": "", **own, **about, **found}
+def _python_files(context: dict[str, Any]) -> dict[str, str]:
+    """What is generated in Python besides the core, and what is carried of eomgen."""
+    carried = carry((*CARRIED, *(CARRIED_ANALYSES if context["analyses"] else ())))
+    names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
+    own = {name: render(f"python/{name}.j2", context | {"folders": folders_of(carried)}) for name in names}
+    return {"py.typed": "", **own, **carried}
+
+
+def carry(names: Iterable[str]) -> dict[str, str]:
+    """Files and whole folders of eomgen, as they are, by their place in a package."""
+    root = Path(__file__).parents[1]
+    files = [
+        file for name in names for file in ([root / name] if name.endswith(".py") else (root / name).rglob("*.py"))
+    ]
+    return {file.relative_to(root).as_posix(): file.read_text(encoding="utf-8") for file in sorted(files)}
+
+
+def folders_of(carried: Iterable[str]) -> list[str]:
+    """The packages within a package that its files lie in."""
+    return sorted({name.rpartition("/")[0].replace("/", ".") for name in carried if "/" in name})
 
 
 def _forms(metadata: Mapping[str, Any]) -> tuple[str, ...]:
@@ -131,10 +149,11 @@ def _forms(metadata: Mapping[str, Any]) -> tuple[str, ...]:
     return (*found, *(["canonical"] if metadata.get("method") == "hamilton" else []))
 
 
-def _context(program: Program) -> dict[str, Any]:
+def _context(program: Program, analyses: bool) -> dict[str, Any]:
     metadata = program.metadata
     doc = str(metadata.get("doc") or "").strip()
-    attributes, forms = [*(name for name, _ in ANNOTATED), *METHODS], _forms(metadata)
+    methods = METHODS + (ANALYSES if analyses else ())
+    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], _forms(metadata)
     return {
         "name": program.name,
         "prefix": program.name.upper(),
@@ -145,12 +164,13 @@ def _context(program: Program) -> dict[str, Any]:
         "metadata": metadata,
         "provenance": metadata["provenance"],
         "layouts": describe_layouts(program),
-        "calls": describe_calls(program),
+        "calls": [call for call in describe_calls(program) if call.name not in ANALYSES or analyses],
         "attributes": attributes,
         "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
         "forms": forms,
-        "methods": METHODS,
+        "methods": methods,
+        "analyses": analyses,
         "p_values": number_texts(metadata.get("p_values")),
         "u_values": number_texts(metadata.get("u_values")),
     }

@@ -14,6 +14,11 @@ class Call(NamedTuple):
     result: str  #: shape of the result for one state
     meaning: str
 
+    @property
+    def name(self) -> str:
+        """Without its arguments."""
+        return self.text.partition("(")[0]
+
 
 def describe_calls(program: Program) -> list[Call]:
     """Every call of a generated package or Module, with its sizes as numbers."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.algebra import Array
+from ..base.picture_data import read_picture
 from ..base.texts import shown
 from ..errors import ill_shaped, ill_typed, incomplete
 from .near_names import unknown
@@ -53,7 +54,7 @@ def poses(trajectory: Any, model: BoundModel | None = None) -> Array:
 def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Array:
     """See :meth:`.trajectory.Trajectory.position`."""
     module = module_of(trajectory, model, "position")
-    data = load_show("data").read_picture(module.metadata, module.p)
+    data = read_picture(module.metadata, module.p)
     every, name = poses(trajectory, module), module.layout.plain(name)
     if name in data.markers:
         frame = data.markers[name]

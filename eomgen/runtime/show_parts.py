@@ -5,10 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-#: What is asked for by name; a generated package carries these files.
+from ..errors import MissingDependencyError
+
+#: What is asked for by name; a generated package is without them.
 PARTS = {
     "animate": "show.animate",
-    "data": "show.data",
     "draw": "show.draw",
     "explore": "show.explore",
     "mode_shapes": "show.mode_shapes",
@@ -16,5 +17,19 @@ PARTS = {
 
 
 def load_show(part: str) -> ModuleType:
-    """A file of ``eomgen.show``."""
-    return import_module(f"{__package__.rpartition('.')[0]}.{PARTS[part]}")
+    """A file of ``eomgen.show``.
+
+    Raises
+    ------
+    MissingDependencyError
+        In a generated package, which has no pictures.
+    """
+    package = __package__.rpartition(".")[0]
+    try:
+        return import_module(f"{package}.{PARTS[part]}")
+    except ModuleNotFoundError as error:
+        if error.name != f"{package}.show":
+            raise
+        raise MissingDependencyError(
+            f"{package} draws nothing by itself; where eomgen is, Module.of({package}) draws and animates"
+        ) from None

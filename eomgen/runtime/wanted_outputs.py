@@ -16,13 +16,13 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.runs import DIFFERENCE, WIDE_DIFFERENCE
 from ..base.names import place_of_marker
+from ..base.picture_data import read_picture
 from ..errors import cannot
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
 from .near_names import UnknownNameError, unknown, without_dots
-from .show_parts import load_show
 
 
 class WantedPosition(NamedTuple):
@@ -159,7 +159,7 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 def _marker(kernels: Kernels, name: str, what: str, marker: str) -> WantedPosition | WantedRate:
     """A coordinate of the place of a marker or of a body's origin, or of its velocity."""
     layout, poses, axis = kernels.layout, kernels.state("poses"), "xyz".index(what[-1])
-    data = load_show("data").read_picture(layout.metadata, kernels.context.p)
+    data = read_picture(layout.metadata, kernels.context.p)
     marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
     if marker not in data.markers and marker not in layout.bodies:
         raise unknown("marker or body", marker, (*data.markers, *layout.bodies))

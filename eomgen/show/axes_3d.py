@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from .branch_views import usual_view
 from .colors import color_of
-from .data import Array
 from .flat import joined_limits
 from .label_places import NAME_STYLE, NAMES, name_offsets
 from .plane import page_axes

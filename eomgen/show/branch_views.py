@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import NOTHING, SEEN
-from .data import Array
 from .plane import page_axes
 from .scene import Scene
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import html_text
 from .colors import color_of, style_of
-from .data import Array
 from .label_places import offsets_within
 from .optional import k3d
 from .plane import page_axes

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import ROUNDED, SAME
 from ..base.names import hint
+from ..base.picture_data import GROUND, PictureData, PlacedFrame, read_picture
 from ..errors import no_such, not_finite
-from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
 from .plane import find_view

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
-from .data import GROUND, Array, JointData, PictureData
+from ..base.picture_data import GROUND, JointData, PictureData
 from .joints import move_frame
 from .scene import Item, attachments, placed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .data import GROUND
+from ..base.picture_data import GROUND
 from .scene import Item, Label
 
 #: Okabe and Ito's colours, which colour-blind readers tell apart, without yellow; then darker ones.

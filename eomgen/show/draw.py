@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import at_odds, ill_shaped, ill_typed, no_number
 from .branch_views import telling_values, telling_view
 from .build_scene import build_scene
-from .data import Array
 from .optional import matplotlib
 from .scene import Scene
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import NOTHING, ROUNDED, SAME
+from ..base.picture_data import GROUND, PictureData, PlacedFrame
 from .cam_curves import contour_items, lift_items
-from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import HELD, SAME
 from ..base.texts import html_text
 from ..errors import EomgenError
 from .browser import move_objects, scene_plot
 from .build_scene import build_scene
-from .data import Array
 from .optional import ipywidgets
 
 COORDINATES = 12  #: sliders for coordinates, at most

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
 from .colors import color_of, style_of
-from .data import Array
 from .label_places import NAME_STYLE, NAMES, name_offsets
 from .scene import Item, Scene, passed
 from .solids import outline

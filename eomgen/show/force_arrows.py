@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import NOTHING, SAME, STEP
+from ..base.picture_data import GROUND, PlacedFrame, read_picture
 from ..errors import no_such
-from .data import GROUND, Array, PlacedFrame, read_picture
 from .scene import Item, Scene, placed
 from .shown_motion import ShownMotion
 

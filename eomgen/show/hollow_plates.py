@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
-from .data import Array, PictureData
+from ..base.picture_data import PictureData
 from .solids import Mesh
 
 CORNERS = 4  #: fewest of an outline that turns both ways

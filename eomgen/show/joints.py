@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
-from .data import GROUND, Array, JointData, PictureData, PlacedFrame
+from ..base.picture_data import GROUND, JointData, PictureData, PlacedFrame
 from .scene import BAR, Item, _is_block, attached, placed, symbol_mesh
 from .solids import Mesh, cone, turned
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .data import Array
+from ..base.algebra import Array
 from .scene import Scene
 from .solids import outline
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import as_name, beside, open_plain
 from ..base.limits.numbers import MESH
 from ..base.limits.pictures import NOTHING
 from ..base.texts import shown, visible
 from ..errors import UsageError, bad_data, bad_file, too_large
-from .data import Array
 from .solids import Mesh, Triangles
 
 TRIANGLES = 4000  #: of one mesh in a picture, at most; matplotlib draws them one by one

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import STEP
+from ..base.picture_data import read_picture
 from ..errors import EvaluationError
 from .animate import write
 from .build_scene import build_scene
-from .data import Array, read_picture
 from .film_frames import DPI, Frames
 from .optional import matplotlib
 from .scene import Scene, attachments

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.pictures import NOTHING, SAME
-from .data import Array
 
 TRIALS = 6  #: positions that are looked at
 ROUNDING = SAME  #: relative size of what is rounding and not motion

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
-from .data import GROUND, Array, JointData, PictureData, PlacedFrame
+from ..base.picture_data import GROUND, JointData, PictureData, PlacedFrame
 from .hollow_plates import hollow_lines, hollow_plate
 from .mesh_files import mesh_of
 from .solids import ROUND, Mesh, Triangles, rounded, solid, sphere, turned

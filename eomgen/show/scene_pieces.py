@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.pictures import NOTHING, SAME
 from .colors import color_of, style_of
-from .data import Array
 from .scene import Item, Scene, passed
 
 LONGEST = 2.0  #: edge of a piece (sizes of a symbol), unless there would be too many

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.limits.pictures import ROUNDED
 from ..base.notation import TIME, Notation, label
 from ..errors import cannot, off_range, too_large
 from .build_scene import build_scene
-from .data import Array
 from .scene import Scene
 
 LONGEST = 12.0  #: seconds that an animation lasts, unless a speed is given

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import algebra
+from ..base.algebra import Array
 from ..base.limits.pictures import SAME
-from .data import Array
 
 Triangles = NDArray[np.int64]
 Mesh = tuple[Array, Triangles]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ..base.algebra import Array
 from ..base.notation import label
-from .data import Array
 from .shown_motion import ShownMotion
 
 

@@ -30,17 +30,21 @@ CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
     "rhs": lambda c: (c.t, c.x),
     "jacobian": lambda c: (c.t, c.x),
     "outputs": lambda c: (c.t, c.x),
+    "bias": lambda c: (c.t, c.x),
     "mass_matrix": lambda c: (c.q,),
     "inverse_dynamics": lambda c: (c.q, c.v[: len(c.a)], c.a),  # v is followed by states of elements
     "energy": lambda c: (c.x,),
     "poses": lambda c: (c.q,),
     "constraints": lambda c: (c.q,),
+    "constraint_jacobian": lambda c: (c.q,),
+    "velocity_constraints": lambda c: (c.x,),
+    "momentum": lambda c: (c.x,),
     "project": lambda c: (c.x,),
 }
-TIMED = ("rhs", "jacobian", "outputs")  #: take t first; the others by name
+TIMED = ("rhs", "jacobian", "outputs", "bias")  #: take t first; the others by name
 
 
-def record_calls(module: BoundModel | None) -> str:
+def record_calls(name: str, module: BoundModel | None) -> str:
     """The text of ``tests/recorded.json``: calls, their arguments, results, and the most by which a result may differ.
 
     The bound is :data:`~..base.limits.analyses.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
@@ -48,6 +52,8 @@ def record_calls(module: BoundModel | None) -> str:
 
     Parameters
     ----------
+    name : str
+        Of the model.
     module : BoundModel or None
         None where nothing can be evaluated without a compiler, because the model calls functions in C.
     """
@@ -63,7 +69,7 @@ def record_calls(module: BoundModel | None) -> str:
         for number, case in enumerate(cases):
             tried = [_record(module, call, case, number) for call in CALLS]
             found += [one for one in tried if one is not None]
-    return json.dumps({"cases": found}, separators=(",", ":"), allow_nan=False) + "\n"
+    return json.dumps({"name": name, "cases": found}, separators=(",", ":"), allow_nan=False) + "\n"
 
 
 def _record(module: BoundModel, call: str, case: Case, number: int) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""An exported package has the analyses and runs of its model, with NumPy alone where nothing is integrated."""
+"""Exported packages have the runs of their models and, where asked for, the analyses, with NumPy alone but for runs."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def servo() -> eg.Model:
 def test_a_package_finds_what_the_module_finds(build: Any, calls: dict[str, str], tmp_path: Path) -> None:
     model = build()
     model.save(tmp_path / "model.yaml")
-    done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--out", tmp_path / "out")
+    done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--analyses", "--out", tmp_path / "out")
     assert done.code == 0, done.err
     words = [sys.executable, "-c", SCRIPT, model.name]
     child = subprocess.run(words, input=json.dumps(calls), cwd=tmp_path / "out", capture_output=True, text=True)
@@ -88,3 +88,56 @@ def test_a_package_finds_what_the_module_finds(build: Any, calls: dict[str, str]
         expected = eval(call, {"m": m})  # noqa: S307 - the calls above
         size = max(1.0, float(np.abs(expected).max()))
         np.testing.assert_allclose(found[name], expected, rtol=0, atol=1e-9 * size, err_msg=name)
+
+
+OF_PACKAGE = """
+import json
+import numpy as np
+import servo, slider_crank
+import eomgen as eg
+
+try:
+    slider_crank.linearize()
+except slider_crank.EomgenError as error:
+    told = str(error)
+assert not hasattr(slider_crank, "linearize") and not hasattr(slider_crank.module, "equilibrium")
+m = eg.Module.of(slider_crank)
+try:
+    m.x0({"theta": 0.3, "s": 9.0})
+except eg.AssemblyError as error:
+    open_loop = str(error)
+numbers = [m.linearize().A, m.equilibrium({"theta": -1.5}).x, eg.Module.of(slider_crank.bind(p={"r": 0.12})).p]
+try:
+    eg.Module.of(np)
+except eg.UsageError as error:
+    refused = str(error)
+print(json.dumps([[np.asarray(one).tolist() for one in numbers], m.verify(states=2).ok, told, open_loop, refused]))
+"""
+
+
+def test_a_package_without_analyses_has_them_where_eomgen_is(tmp_path: Path) -> None:
+    for model in (crank(), servo()):
+        model.save(tmp_path / "model.yaml")
+        done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--out", tmp_path)
+        assert done.code == 0, done.err
+    words = [sys.executable, "-c", OF_PACKAGE]
+    child = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert child.returncode == 0, child.stderr
+    (A, x, p), ok, told, open_loop, refused = json.loads(child.stdout.splitlines()[-1])
+    m = crank().compile(target="numpy")
+    np.testing.assert_allclose(A, m.linearize().A, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(x, m.equilibrium({"theta": -1.5}).x, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(p, m.bind(p={"r": 0.12}).p)
+    assert ok
+    assert "--analyses" in told
+    assert "Module.of(slider_crank)" in told
+    assert "s" in open_loop
+    assert "no package" in refused
+
+
+@pytest.mark.parametrize("target", ["c", "cuda", "jax"])
+def test_analyses_are_for_packages_of_python(target: str, tmp_path: Path) -> None:
+    servo().save(tmp_path / "model.yaml")
+    found = run("generate", tmp_path / "model.yaml", "--target", target, "--analyses", "--out", tmp_path)
+    assert found.code != 0
+    assert "analyses are for" in found.err

@@ -16,8 +16,8 @@ from ...device.device_module import DeviceModule
 from ...emit.c import count_constants, emit_c
 from ...emit.c_functions import used_calls
 from ...emit.c_text import print_precompute
-from ...emit.carried import carry
 from ...emit.example_state import example_state
+from ...emit.package import carry, folders_of
 from ...emit.pair_sums_used import refuse_sums
 from ...emit.sources import render
 from ...emit.straight import cut
@@ -40,6 +40,9 @@ EVENTS = ("steppers/event_values", "steppers/event_zero", "steppers/crossings")
 _FUNCTION = re.compile(r"^static (int|flag|void|double) ", re.MULTILINE)
 _OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTILINE)
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
+
+#: What a package carries of eomgen, unchanged.
+CARRIED = ("errors.py", "targets.py", "base", "numeric", "runtime", "simulation", "device")
 
 
 def emit_device_text(program: Program) -> str:
@@ -185,15 +188,15 @@ def cuda_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     facts = describe_device(program)
     context = context | {"facts": facts, "requirements": CUDA_REQUIREMENTS, "timed": TIMED_ON_DEVICE}
     init = render("cuda/__init__.py.j2", context)
-    found = carry({"__init__.py": init})
-    context |= {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
+    carried = carry(CARRIED)
+    context |= {"folders": folders_of(carried)}
     return {
         "py.typed": "",
         "__init__.py": init,
         f"{program.name}.cu": emit_device_text(program),
         "pyproject.toml": render("cuda/pyproject.toml.j2", context),
         "README.md": render("cuda/README.md.j2", context),
-        **found,
+        **carried,
     }
 
 

@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.operations import OPERATIONS
 from ..errors import cannot
+from .algebra import Array
+from .operations import OPERATIONS
 
-Array = NDArray[np.float64]
 GROUND = -1
 _FRAME = ("rotation", "position")
 
@@ -55,7 +54,7 @@ class PictureData(NamedTuple):
     hidden: frozenset[int]  #: bodies that the model does not name
 
 
-def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData:
+def read_picture(metadata: Mapping[str, Any], p: Any) -> PictureData:
     """The data of a picture at the parameters p.
 
     Raises
