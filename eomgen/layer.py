@@ -19,6 +19,12 @@ STEPPERS = (
     *("event_values", "event_zero", "crossings", "loop"),
 )
 
+#: Headers of the solvers, which models include whose functions are not all straight-line code.
+SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_coordinates.h", "eomgen_straight.h")
+SOLVER = "eomgen_solvers.c"
+#: Parts of that source, in order.
+SOLVERS = ("linear_algebra", "projection", "embedding", "systems", "singular", "trees", "jacobian")
+
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_native.pyx": ("cython/_native.pyx",),
@@ -37,6 +43,7 @@ LAYER = {
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
     "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
+    SOLVER: tuple(f"native/{name}.c" for name in SOLVERS),
     "_contacts.pxi": ("cython/_contacts.pxi",),
     "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),
     "eomgen_contact_steps.h": (
@@ -65,7 +72,7 @@ LAYER = {
 }
 
 #: Headers that models and the layer share.
-HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h", *SOLVER_HEADERS)
 
 
 @cache
@@ -85,8 +92,18 @@ def read_sources(parts: Sequence[str]) -> str:
 @cache
 def read_native() -> dict[str, str]:
     """All texts that ``eomgen._native`` is compiled from by file name."""
-    return {**read_layer(), **{header: _read(f"c/{header}") for header in HEADERS}}
+    return {**read_layer(), **{header: read_header(header) for header in HEADERS}}
+
+
+def read_header(name: str) -> str:
+    """The text of a header that models and the layer share, as it comes with eomgen."""
+    if name not in SOLVER_HEADERS:
+        return _read(f"c/{name}")
+    text = _read(f"native/{name}")
+    return definitions(text) + text
 
 
 def _read(part: str) -> str:
-    return (shipped("templates") / part).read_text(encoding="utf-8")
+    folder, _, name = part.partition("/")
+    path = shipped("native") / name if folder == "native" else shipped("templates") / part
+    return path.read_text(encoding="utf-8")

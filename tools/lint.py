@@ -77,11 +77,11 @@ def limits() -> Iterator[str]:
             yield f"{name}: limits outside eomgen/base/limits, or no longer there: {small}"
     definitions = import_module("eomgen.base.limits.in_c").definitions
     for folder, pattern in (
-        ("drivers", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
-        ("ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
-        ("steppers", r"\d(?:\.\d+)?e-\d+"),
+        ("eomgen/native", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
+        ("templates/c/ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
+        ("templates/c/steppers", r"\d(?:\.\d+)?e-\d+"),
     ):
-        for file in sorted((ROOT / "templates" / "c" / folder).glob("*.c")):
+        for file in sorted((ROOT / folder).glob("*.[ch]")):
             text = re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
             yield from (f"{file.name}: a limit without a name: {found}" for found in re.findall(pattern, text))
             try:

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import UsageError, incomplete
-from ..layer import HEADERS, LAYER
+from ..layer import HEADERS, LAYER, SOLVER
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .commands import Running, allowed, raise_failure
 from .compiler import CompilerInfo, describe_native, find_compiler
@@ -109,7 +109,8 @@ def _find_or_build(
     entry = cache.find(key)
     found = entry is not None
     if entry is None:
-        shared = partial(_shared_objects, cache, sources, words, compiler, progress)
+        flags |= {SOLVER: _solver_flags(words, options)} if SOLVER in flags else {}
+        shared = partial(_shared_objects, cache, sources, flags, compiler, progress)
         entry = _build(cache, key, kind, name, sources, flags, shared, options, compiler, progress)
     seconds = time.perf_counter() - start
     return Artifact(entry.product, entry.key, entry.directory, seconds, found, entry.name)
@@ -155,14 +156,21 @@ def _build(
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
+def _solver_flags(words: Sequence[str], options: Options) -> list[str]:
+    """Flags of the solvers, of no model's own: loops of unknown length gain by -O2 what straight-line code loses."""
+    fast = options.optimize is None
+    return ["-O2" if fast and re.fullmatch(r"-O\d", w) else w for w in words if not w.startswith("-DEOMGEN_")]
+
+
 def _shared_objects(
-    cache: Cache, sources: Mapping[str, str], words: Sequence[str], compiler: CompilerInfo, tell: Progress | None
-) -> list[Path]:
+    cache: Cache, sources: Mapping[str, str], flags: Mapping[str, Sequence[str]], compiler: CompilerInfo,
+    tell: Progress | None,
+) -> list[Path]:  # fmt: skip
     """Find the object files of C files that read the layer's texts alone, never a model's, or compile them."""
     headers = {name: text for name, text in sources.items() if name.endswith(".h") and name in (*LAYER, *HEADERS)}
     made = []
     for file in (file for file in sources if file in LAYER and file.endswith(".c")):
-        product, texts = f"{file}.o", {file: sources[file], **headers}
+        product, texts, words = f"{file}.o", {file: sources[file], **headers}, flags[file]
         parts = {
             "kind": "object", "sources": texts, "flags": list(words), "platform": describe_platform(),
             "compiler": [*compiler.command, compiler.version],

@@ -6,10 +6,9 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import accumulate
 from typing import Any
 
-from ..base.limits.in_c import definitions
+from ..layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
 from ..program import KERNELS, Block, Program
 from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError
@@ -17,7 +16,7 @@ from .c_bounds import operations_of, stack_of, states_beside_change_points
 from .c_branches import print_block_of_branches
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels
-from .c_layout import driver_files, work_areas
+from .c_layout import describe_equations, is_straight, work_areas
 from .c_pairs import pair_declarations, pair_files
 from .c_parts import distribute, part_names
 from .c_rolled import print_rolled, print_rolled_precompute
@@ -26,7 +25,7 @@ from .c_text import Printed, print_block, print_precompute, used_helpers
 from .held_states import held_tables
 from .layouts import describe_layouts
 from .single_precision import in_single_precision, refuse_double
-from .sources import SourceSet, metadata_json, read_template, render
+from .sources import SourceSet, metadata_json, render
 
 #: Headers of the numbers that functions compute with, and those that lanes need besides.
 NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
@@ -55,7 +54,8 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     -------
     SourceSet
         ``<name>.c``, ``<name>.h``, ``eomgen.h`` and other headers that are the same for all models, ``model.json``;
-        C99, no dependency but libm; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has
+        C99, no dependency but libm; ``eomgen_solvers.c``, which is the same for all models, unless all functions are
+        straight-line code; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has
         further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
@@ -102,11 +102,13 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
         **function_files(program, calls),
         **pair_files(program),
     }
+    if program.drivers:
+        sources |= {name: read_header(name) for name in SOLVER_HEADERS} | {SOLVER: read_layer()[SOLVER]}
     if precision:
         context["costs"] = _costs(program, sources)
     sources |= {
         f"{program.name}.h": render("c/model.h.j2", context),
-        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS, *(PROCESSORS if lanes else ()))},
+        **{name: read_header(name) for name in ("eomgen.h", *NUMBERS, *(PROCESSORS if lanes else ()))},
         "model.json": metadata_json(program),
     }
     return SourceSet(in_single_precision(sources) if single else sources)
@@ -152,11 +154,8 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
     results = {k.name: k.result for k in KERNELS}
     numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
     numbers["closed_at"] = closed_at(program, areas)
-    others = [i for i in range(sizes.n_v) if i not in program.preferred]
-    moving = range(sizes.n_v - program.n_states)
-    known = program.metadata.get("row_velocities") or [moving] * sizes.n_c
-    drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
     roots = [y for b in program.blocks for y in b.roots]
+    straight = is_straight(program)
     return {
         "name": program.name,
         "prefix": program.name.upper(),
@@ -169,35 +168,26 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
         "hoisted": len(program.hoisted),
         "closed_at": numbers["closed_at"],
         "work_at": len(program.parameters) + len(program.hoisted),
-        "rank": sizes.n_v - sizes.n_dof,
-        "indefinite": int(bool(program.metadata.get("indefinite"))),
         "helpers": [
             *used_helpers(program, roots),
             *declarations(program, used_calls(program)),
             *pair_declarations(program),
         ],
         "blocks": printed if program.hoisted else printed[1:],
-        "drivers": drivers,
-        "limits": definitions("".join(drivers)),
-        "areas": areas,
-        "order": [*program.preferred, *others],
-        "dependent": [int(i in others) for i in range(sizes.n_v)],
-        "row_groups": program.metadata.get("row_groups") or [0] * sizes.n_c,
-        "row_starts": [0, *accumulate(map(len, known))],
-        "row_velocities": [k for row in known for k in row],
-        "parent": program.parent,
+        "equations": describe_equations(program, areas) if program.drivers else None,
+        "straight": straight,
+        "starts": {name: start for name, start, _ in areas},
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,
-        "coordinate_of": program.coordinate_of,
+        "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
         "has_loops": program.has_loops and program.projects,
         "held": held_tables(program),
-        "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
-        "by_columns": program.by_columns,
         "system": program.system if "system" in program.block_names else None,
         "kernels": [
             {
                 "name": k.name,
                 "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
+                "straight": straight and k.name == "rhs",
                 "lanes": k.name in in_lanes,
                 "driver": not isinstance(k, Block),
                 "n_in": k.n_in,

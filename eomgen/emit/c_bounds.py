@@ -21,6 +21,7 @@ _STRUCT = re.compile(r"typedef struct \{\n(.*?)\} (\w+);", re.DOTALL)
 _FUNCTION = re.compile(r"^[a-zA-Z][\w *]*?\b(\w+)\(([^;{}]*?)\)\s*\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
 _ARRAY = re.compile(r"\w+((?:\[[^\]]+\])+)")
 _CALL = re.compile(r"\b(\w+)\(")
+_EVALUATION = re.compile(r"\bEVALUATE\((\w+)")  #: of a straight-line function of the model, by the solvers
 
 
 def operations_of(program: Program, name: str) -> str:
@@ -79,7 +80,7 @@ def stack_of(sources: Iterable[str]) -> dict[str, int]:
     def places(text: str) -> int:
         found = 0
         for kind, names in declaration.findall(text):
-            each = places(structs[kind]) if kind in structs else 1
+            each = places(structs[kind]) if kind in structs and not names.lstrip().startswith("*") else 1
             arrays = _ARRAY.findall(re.sub(r"=\s*\{[^{}]*\}|=[^,]*", "", names))
             found += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
         return found
@@ -90,7 +91,8 @@ def stack_of(sources: Iterable[str]) -> dict[str, int]:
         for name, parameters, body in _FUNCTION.findall(text):
             needed = _FRAME + _PLACE * (places(body) + parameters.count(",") + 1)
             own[name] = max(own.get(name, 0), needed)
-            calls.setdefault(name, set()).update(_CALL.findall(body))
+            called = (*_CALL.findall(body), *(f"{function}_block" for function in _EVALUATION.findall(body)))
+            calls.setdefault(name, set()).update(called)
 
     @cache
     def total(name: str) -> int:

@@ -1,7 +1,7 @@
 """Stage emit: the straight-line functions of a model once more, for several states side by side (lanes).
 
 The right-hand side of closed loops has lanes where it is made of straight-line blocks: lanes that need more, such as
-pivoting, are left to the function of one state (templates/c/drivers/rhs_in_lanes.c).
+pivoting, are left to the function of one state (templates/c/closed_lanes.c.j2).
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from ..base.limits.in_c import definitions
 from ..program import Block, Program
 from ..program.block_groups import REGULAR, USUAL
 from .c_functions import declarations, used_calls
-from .c_layout import space_file, straight_file
 from .c_pairs import pair_declarations
 from .c_text import used_helpers
 from .sources import read_template, render
@@ -78,8 +77,6 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
         return {}
     name = program.name
     roots = [y for b in blocks.values() for y in b.roots]
-    parts = [space_file(program), f"{straight_file(program)}_in_lanes", "rhs_in_lanes"]
-    drivers = [read_template(f"c/drivers/{file}.c") for file in parts if loops_in_lanes(program)]
     inside = {
         **context,
         "helpers": [
@@ -89,8 +86,9 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
         ],
         "blocks": [context["printed"][b] for b in blocks],
         "first": len(first),
-        "drivers": drivers,
-        "limits": definitions("".join(drivers)),
+        "closed": loops_in_lanes(program),
+        "regular": REGULAR[0] in program.block_names,
+        "limits": definitions(read_template("c/closed_lanes.c.j2")),
     }
     call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}

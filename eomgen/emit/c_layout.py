@@ -1,164 +1,86 @@
-"""Stage emit: Program -> the driver files a C source needs, and where each keeps its numbers in the work array."""
+"""Stage emit: Program -> the table of a model that the solvers (eomgen/native) read, and areas of its work memory."""
 
 from __future__ import annotations
 
+import re
+from itertools import accumulate
+from typing import Any
+
+from ..layer import SOLVER_HEADERS, read_header
 from ..program import Block, Program
-from ..program.block_groups import ALONG, SHIFTS
+from ..program.block_groups import SHIFTS
 from ..program.loop_slopes import BY_BODIES
 from .held_states import held_areas
 from .pair_statements import kept_of
 from .pair_sums_used import sums_again
 
-CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
-PIVOT = ("eliminate", "pivots", "partition")
-ACCELERATE = (*CLOSE, *PIVOT, "embed", "ldl", "accelerate")
-SOLVE = ("system_balance", "system_factor", "system_substitute", "system_solve")
-DERIVE = ("correct_change", "jacobian_projection", "jacobian")
-#: from states on both sides of a change point
-PASSING = ("passing_curve", "passing_points", "passing", "passing_search")
 
-FORMED = {"terms", "gamma"}  #: blocks of M, h, C_q, gamma
-
-LOOPS: dict[str, tuple[str, ...]] = {
-    "project": (*CLOSE, "is_closed", "project_drive"),
-    "embedded_mass_matrix": ("scaled", *PIVOT, "embed", "mass"),
-    "kinematics": ("scaled", *PIVOT, "embed", "kinematics", "kinematics_drive"),
-    "outputs": (*CLOSE, "outputs_closed"),
-}
-
-TREES: dict[str, tuple[str, ...]] = {
-    "rhs": ("tree", "tree_accelerate", "tree_rhs"),
-    "outputs": ("tree", "tree_accelerate", "tree_outputs"),
-}
+def is_straight(program: Program) -> bool:
+    """Whether the right-hand side of loops is straight-line code, which the model compiles with its own sizes."""
+    return "dynamics" in program.block_names and any(d.name == "rhs" for d in program.drivers)
 
 
-COLUMNS: dict[str, tuple[str, ...]] = {
-    "jacobian": ("columns_jacobian",),
-    "mass_matrix": ("mass_by_columns", "columns_mass_drive"),
-    "embedded_mass_matrix": ("mass_by_columns", "columns_mass_embedded"),
-}
-
-
-def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
-    """The files of a derivative by inputs or parameters."""
-    if program.tree_by_columns:
-        return ("shift_columns", name)
-    if not program.has_loops:
-        return ("tree", "tree_accelerate", "shift_tree", name)
-    return (*ACCELERATE, "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
-
-
-def passes(program: Program) -> bool:
-    """Whether the right-hand side is taken from both sides of a change point where it is next to one."""
+def crosses_singular(program: Program) -> bool:
+    """Whether the right-hand side is taken from both sides of a singular position where it is next to one."""
     return program.has_loops and program.projects and not program.given_rates
 
 
-def rhs_files(program: Program) -> tuple[str, ...]:
-    """The files of the right-hand side of a mechanism with loops, but for its driver."""
-    if "system" in program.block_names:
-        here: tuple[str, ...] = (*CLOSE, *PIVOT, "embed", *SOLVE, "weakest", "system_rhs_here")
-    else:
-        direct = (straight_file(program), "rhs_here_direct") if "dynamics" in program.block_names else ("rhs_here",)
-        here = (*ACCELERATE, *(("weakest",) if passes(program) or direct[0] != "rhs_here" else ()), *direct)
-    return (*here, *(PASSING if passes(program) else ()))
+def describe_equations(program: Program, areas: list[tuple[str, int, int]]) -> dict[str, Any]:
+    """The entries of ``eom_model`` in its order: numbers, tables, starts of areas, functions; each with a comment."""
+    header = read_header(SOLVER_HEADERS[0])
+    starts = {name: start for name, start, _ in areas}
+    used = {name for driver in program.drivers for name in driver.blocks}
+    sizes, metadata = program.sizes, program.metadata
+    others = [i for i in range(sizes.n_v) if i not in program.preferred]
+    known = metadata.get("row_velocities") or [range(sizes.n_v - program.n_states)] * sizes.n_c
+    system = program.system if "system" in program.block_names else None
+    numbers = {
+        "velocities, coordinates, rows of constraints, holonomic ones":
+            (sizes.n_v, sizes.n_q, sizes.n_c, sizes.n_h),
+        "rank, degrees of freedom, inputs, parameters":
+            (sizes.n_v - sizes.n_dof, sizes.n_dof, sizes.n_u, sizes.n_p),
+        "velocities before states; whether inertias may be negative, states are projected":
+            (sizes.n_v - program.n_states, int(bool(metadata.get("indefinite"))), int(program.projects)),
+        "whether singular positions are crossed, by project too; whether outputs need accelerations":
+            (int(crosses_singular(program)),
+             int(crosses_singular(program) and any(d.name == "rhs" for d in program.drivers)),
+             int(bool(metadata["output_accelerations"]))),
+        "Euler parameters; unknowns, entries and relaxed ones of the linear system":
+            (len(program.quaternion_slots), len(system.unknowns) if system else 0, len(system.places) if system else 0,
+             len(system.relaxed) if system else 0),
+    }  # fmt: skip
+    tables = {
+        "ORDER": [*program.preferred, *others],
+        "PREFERRED_DEPENDENT": [int(i in others) for i in range(sizes.n_v)],
+        "ROW_GROUP": list(metadata.get("row_groups") or [0] * sizes.n_c),
+        "ROW_START": list(accumulate(map(len, known), initial=0)),
+        "ROW_VELOCITY": [k for row in known for k in row],
+        "PARENT": list(program.parent),
+        "COORDINATE": list(program.coordinate_of),
+    }
+    return {
+        "numbers": [(", ".join(map(str, values)), comment) for comment, values in numbers.items()],
+        "tables": tables,
+        "areas": [starts.get(name, 0) for name in re.findall(r"^    AREA_(\w+),", header, re.MULTILINE)],
+        "functions": [
+            f"{name}_block" if name in used and name in program.block_names else "NULL"
+            for name in re.findall(r"eomgen_function (\w+);", header)
+        ],
+    }
 
 
-def straight_file(program: Program) -> str:
-    """The file that calls the blocks of straight-line code of loops."""
-    return "straight_regular" if "regular_dynamics" in program.block_names else "straight_usual"
-
-
-def space_file(program: Program) -> str:
-    """The file that says how coordinates move with velocities."""
-    if program.given_rates:
-        return "space_given"
-    return "space_quaternions" if program.quaternion_slots or program.n_states else "space_plain"
-
-
-def derive_files(program: Program) -> tuple[str, ...]:
-    """The files of the Jacobian of a mechanism with loops, but for its driver."""
-    return (*DERIVE, "jacobian_bodies" if BY_BODIES[0] in program.block_names else "jacobian_here")
-
-
-def driver_files(program: Program) -> list[str]:
-    """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
-    direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
-    files: dict[str, None] = {}
-    if "mass_times" in program.block_names:
-        files["mass_by_columns"] = None
-    if program.composes_terms:
-        files |= {"terms": None, "terms_loops" if program.has_loops else "terms_tree": None}
-    if program.drivers:
-        space = space_file(program)
-        further = (f"{space}_more",) if program.has_loops or space == "space_plain" else ()
-        files.update(dict.fromkeys((space, *further)))
-    for driver in program.drivers:
-        if driver.name in ALONG:
-            needed: tuple[str, ...] = (driver.name,)
-        elif driver.name in SHIFTS:
-            needed = shift_files(program, driver.name, direct)
-        elif passes(program) and driver.name in ("rhs", "project", "outputs", "jacobian"):
-            needed = _passing_files(program, driver.name, direct)
-        elif "system" in driver.blocks:
-            needed = _system_files(program, driver.name, direct)
-        elif driver.name == "mass_matrix" or (program.tree_by_columns and "terms" not in driver.blocks):
-            needed = COLUMNS[driver.name]
-        elif not program.has_loops and driver.name == "jacobian":
-            along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
-            needed = ("tree", "tree_accelerate", *along)
-            if program.held is not None:
-                needed = ("tree", direct, "tree_jacobian_held")
-        elif not program.has_loops:
-            needed = TREES[driver.name]
-        elif driver.name == "rhs":
-            needed = (*rhs_files(program), "rhs")
-        elif driver.name == "jacobian":
-            needed = (*rhs_files(program), "multipliers", direct, *derive_files(program), "jacobian_plain")
-        elif driver.name == "outputs" and FORMED.intersection(driver.blocks):
-            needed = (*ACCELERATE, "outputs_accelerated")
-        else:
-            needed = LOOPS[driver.name]
-        files.update(dict.fromkeys(needed))
-    normal = ("correct_change", "normal") if program.given_rates and program.sizes.n_h else ()
-    return list(dict.fromkeys(file for name in files for file in (*(normal if name == "project" else ()), name)))
-
-
-def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
-    """Files of a driver of :func:`passes`."""
-    accelerates = {"system", *FORMED} & {block for d in program.drivers if d.name == name for block in d.blocks}
-    if name == "jacobian":
-        return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *derive_files(program), "jacobian_passing")
-    if name == "project":
-        rates = any(d.name == "rhs" for d in program.drivers)
-        near = "nearness_direct" if "dynamics" in program.block_names else "nearness"
-        across = (*rhs_files(program), "rhs_across", near, "project_passing")
-        return (*CLOSE, "is_closed", *(across if rates else ("project_drive",)))
-    if name == "outputs" and not accelerates:
-        return LOOPS[name]
-    return (*rhs_files(program), "rhs_across", f"{name}_passing")
-
-
-def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
-    """Files of a driver that solves the linear system of a method."""
-    if name == "jacobian":
-        return (*SOLVE, direct, "system_jacobian")
-    if program.has_loops and (program.projects or name == "outputs"):
-        return (*rhs_files(program), "rhs") if name == "rhs" else (*CLOSE, *SOLVE, "system_outputs_closed")
-    return (*SOLVE, f"system_{name}_given")
-
-
-def passing_areas(program: Program) -> list[tuple[str, int]]:
-    """Areas of :data:`PASSING`."""
-    if not passes(program):
+def _singular_areas(program: Program) -> list[tuple[str, int]]:
+    """Areas of the curve through a singular position."""
+    if not crosses_singular(program):
         return []
     n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
     values = 2 * (n_q + n)
     return [
-        ("STATE", n_q + n),  # q, v in the middle
-        ("NEXT", values),  # q, v, x' at a point
+        ("STATE", n_q + n),
+        ("NEXT", values),
         ("TANGENT", n * f),
         ("INVERSE", f * (f + n)),
-        ("HEADING", f),
+        ("HEADING", 2 * f),
         ("DIRECTION", n),
         ("AWAY", n_q + n),
         ("POINTS", 10 * n_q),
@@ -171,19 +93,19 @@ def passing_areas(program: Program) -> list[tuple[str, int]]:
 
 
 def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
-    """Areas of ``jacobian_bodies``; the first five follow one upon the other."""
+    """Areas of the Jacobian by bodies; the first five follow one upon the other."""
     known = next((b.n_in for b in program.blocks if b.name == BY_BODIES[1]), None)
     if known is None:
         return []
     n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
     again = sums_again(program)
     return [
-        ("SLOPES", n + 2),  # v, whether sound, whether far
+        ("SLOPES", n + 2),
         ("COEFFICIENTS", known - n_q),
-        ("TURNING", max(n_q, n)),  # a direction of q or of v
-        ("MET", len(again)),  # of each sum over pairs how many are near, 0 before they are looked for
-        ("SHAPES", sum(kept_of(one.function) for one in again)),  # these pairs
-        ("CHANGE", n_q + n),  # of q' and v'
+        ("TURNING", max(n_q, n)),
+        ("MET", len(again)),
+        ("SHAPES", sum(kept_of(one.function) for one in again)),
+        ("CHANGE", n_q + n),
         ("SPAN", 2 * f * (n_q + n)),
         ("SHARES", f * f),
     ]
@@ -204,7 +126,7 @@ def places_again(program: Program, block: Block) -> dict[str, str]:
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
-    """Areas of the work array.
+    """Areas of the work array; the header eomgen_solvers.h says what each holds.
 
     Parameters
     ----------
@@ -229,30 +151,35 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     matrix = n if program.held is None or program.composes_terms else n - program.n_states
     loads = len(program.held.loads) if program.held is not None else 0
     lengths = [
-        ("X", n_q + 2 * n + m + max(n_q + n, seeds, loads)),  # q, v, a, multipliers, dq, dv; du, dp or loads in place
+        ("X", n_q + 2 * n + m + max(n_q + n, seeds, loads)),
         ("SCALES", n + m),
-        ("TERMS", matrix * (matrix + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
-        ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
-        ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
+        ("TERMS", matrix * (matrix + 1) // 2 + n + m * n + m),
+        ("RESIDUAL", residual),
+        ("ALONG", n + 2 * m),
         ("RATES", n_q),
-        ("SHIFT", h + n + 2 * m if shifted else 0),  # C, r1, r2, r3 along du or dp
+        ("SHIFT", h + n + 2 * m if shifted else 0),
+        ("DIAGONAL", n),
+        ("MARKS", n_q + n),
     ]
     if program.composes_terms or "mass_times" in names:
         lengths.append(("FULL", n * n))
     if "mass_times" in names:
-        lengths.append(("UNIT", n_q + 2 * n))  # q, a, M a
+        lengths.append(("UNIT", n_q + 2 * n))
     if program.has_loops:
         if program.given_rates:
-            lengths += [("GRADIENT", h * n_q), ("NORMAL", m * m), ("MENDED", n_q)]  # dC/dq, its products, a change of q
+            lengths += [("GRADIENT", h * n_q), ("NORMAL", m * m), ("MENDED", n_q + m + n)]
         lengths += [
-            ("POSITION", h + m * n),  # C, C_q
+            ("POSITION", h + m * n),
             ("RATE", m),
             ("J", m * n),
             ("G", m * m),
-            ("GH", m * m if h < m else 0),  # of the holonomic rows alone
+            ("GH", m * m if h < m else 0),
             ("E", 2 * m),
+            ("NOISE", m),
             ("STEP", n),
             ("ROWS", m * (n + 1 + m)),
+            ("PARTITION", 1 + 3 * n),
+            ("PIVOTING", 6 * m + 1 + n),
             ("B", n * f),
             ("MASS", n * n),
             ("MB", n * f),
@@ -260,26 +187,27 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
-            *passing_areas(program),
+            *_singular_areas(program),
             ("CLOSING", n + 3 if "closing" in names else 0),
             ("DYNAMICS", 2 * n + 2 if "dynamics" in names else 0),
         ]
     if "system" in names and program.system is not None:
         size, places = len(program.system.unknowns), len(program.system.places)
         lengths += [
-            ("SYSTEM", places + 3 * size),  # entries of K, r, sizes of equations and of unknowns
+            ("SYSTEM", places + 3 * size),
             ("LU", size * size),
-            ("ROW", size),  # scales
+            ("ROW", size),
             ("COLUMN", size),
             ("DEFECT", 2 * size),
-            ("MOTION", n_q + n + size),  # q, v, z
+            ("PLAN", 3 * size),
+            ("MOTION", n_q + n + size),
         ]
     if "dae_tangent" in names:
-        lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
+        lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]
     lengths += _areas_of_bodies(program)
     lengths += held_areas(program)
     if "inverse_tangent" in names:
-        lengths.append(("TORQUES", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
+        lengths.append(("TORQUES", 2 * (n_q + 2 * n) + n))
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.texts import summary_text
 from ..errors import UsageError, cannot, no_choice
-from ..layer import read_layer
+from ..layer import read_native
 from ..program import Program
 from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
@@ -100,14 +100,13 @@ def emit_package(
 def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     """Sources in C and Cython, what builds them, and what of eomgen they need."""
     sources = emit_c(program)
-    written = (*sources, *read_layer())
+    written = {**sources, **read_native()}
     context |= {
         "c_files": [name for name in written if name.endswith(".c")],
         "headers": [name for name in written if name.endswith((".h", ".pxi"))],
     }
     return {
-        **sources,
-        **read_layer(),
+        **written,
         "setup.py": render("python/setup.py.j2", context),
         **_python_files(context),
     }

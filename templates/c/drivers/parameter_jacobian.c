@@ -1,5 +1,0 @@
-static int parameter_jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                                 double *restrict out, double *restrict w)
-{
-    return shift_driver(SHIFT_BLOCK(parameter), NP, t, x, u, c, out, w);
-}

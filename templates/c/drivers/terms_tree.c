@@ -1,1 +1,0 @@
-#define terms_block tree_terms
