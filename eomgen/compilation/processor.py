@@ -17,7 +17,7 @@ NEEDS: dict[int, tuple[str, ...]] = {8: ("AVX512F", "AVX512VL", "AVX512DQ", "FMA
 @functools.cache
 def lane_width() -> int:
     """States side by side in the kernels that are compiled here: what this processor takes at a time."""
-    if not _is_x86():
+    if not is_x86():
         return 2
     try:  # NumPy has asked the processor already; its dispatch relies on this table
         features = import_module("numpy._core._multiarray_umath").__cpu_features__
@@ -26,7 +26,8 @@ def lane_width() -> int:
     return next(width for width, needs in NEEDS.items() if all(features.get(name) for name in needs))
 
 
-def _is_x86() -> bool:
+def is_x86() -> bool:
+    """Whether this processor runs x86-64 code."""
     return platform.machine().lower() in ("x86_64", "amd64")
 
 
@@ -56,7 +57,7 @@ def choose_lanes(sources: Mapping[str, str], wanted: int | None = None) -> tuple
     UsageError
         A width that only other processors have.
     """
-    if wanted in (4, 8) and not _is_x86():
+    if wanted in (4, 8) and not is_x86():
         raise no_choice(f"lanes must be None, 0 or 2 on {platform.machine()}, not {wanted}")
     width = lane_width() if wanted is None else wanted
     widths = lane_files(sources)
