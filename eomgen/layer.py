@@ -27,48 +27,45 @@ SOLVERS = ("linear_algebra", "projection", "embedding", "systems", "singular", "
 
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
-    "_native.pyx": ("cython/_native.pyx",),
-    "_model.pxi": ("cython/_model.pxi",),
-    "_numbers.pxi": ("cython/_numbers.pxi",),
-    "_batches.pxi": ("cython/_batches.pxi",),
-    "_kernel.pxi": ("cython/_kernel.pxi",),
-    "_calls.pxi": ("cython/_calls.pxi",),
-    "_lanes.pxi": ("cython/_lanes.pxi",),
-    "_steppers.pxi": ("cython/_steppers.pxi",),
-    "_journeys.pxi": ("cython/_journeys.pxi",),
-    "_frozen.pxi": ("cython/_frozen.pxi",),
-    "_integrators.pxi": ("cython/_integrators.pxi",),
-    "_ensembles.pxi": ("cython/_ensembles.pxi",),
-    "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
-    "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
-    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45")),
-    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
-    SOLVER: tuple(f"native/{name}.c" for name in SOLVERS),
-    "_contacts.pxi": ("cython/_contacts.pxi",),
-    "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),
+    "_native.pyx": ("_native.pyx",),
+    "_model.pxi": ("_model.pxi",),
+    "_numbers.pxi": ("_numbers.pxi",),
+    "_batches.pxi": ("_batches.pxi",),
+    "_kernel.pxi": ("_kernel.pxi",),
+    "_calls.pxi": ("_calls.pxi",),
+    "_lanes.pxi": ("_lanes.pxi",),
+    "_steppers.pxi": ("_steppers.pxi",),
+    "_journeys.pxi": ("_journeys.pxi",),
+    "_frozen.pxi": ("_frozen.pxi",),
+    "_integrators.pxi": ("_integrators.pxi",),
+    "_ensembles.pxi": ("_ensembles.pxi",),
+    "eomgen_steppers.h": ("steppers/eomgen_steppers.h",),
+    "eomgen_loop.h": ("steppers/eomgen_loop.h",),
+    "eomgen_methods.h": tuple(f"steppers/{name}.c" for name in ("dop853", "rk45")),
+    "eomgen_steppers.c": tuple(f"steppers/{name}.c" for name in STEPPERS),
+    SOLVER: tuple(f"{name}.c" for name in SOLVERS),
+    "_contacts.pxi": ("_contacts.pxi",),
+    "eomgen_contacts.h": ("contacts/eomgen_contacts.h",),
     "eomgen_contact_steps.h": (
-        "c/contacts/maps.c",
-        "c/steppers/lu.c",
-        *(
-            f"c/contacts/{name}.c"
-            for name in ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
-        ),
+        "contacts/maps.c",
+        "steppers/lu.c",
+        *(f"contacts/{name}.c" for name in ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")),
     ),
-    "eomgen_contacts.c": ("c/contacts/plain.c",),
-    "eomgen_wide_contacts.c": ("c/contacts/wide.c",),
-    "eomgen_wide_steps.c": ("c/steppers/wide.c",),
-    "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
-    "eomgen_ensembles.c": ("c/ensembles/one_run.c", "c/ensembles/ensembles.c"),
+    "eomgen_contacts.c": ("contacts/plain.c",),
+    "eomgen_wide_contacts.c": ("contacts/wide.c",),
+    "eomgen_wide_steps.c": ("steppers/wide.c",),
+    "eomgen_ensembles.h": ("ensembles/eomgen_ensembles.h",),
+    "eomgen_ensembles.c": ("ensembles/one_run.c", "ensembles/ensembles.c"),
     "eomgen_lane_runs.h": (
         *(
-            "c/ensembles/lane_steps.c",
-            "c/steppers/taylor_terms.c",
-            "c/ensembles/lane_taylor.c",
-            "c/ensembles/lane_alone.c",
-            "c/ensembles/lane_runs.c",
+            "ensembles/lane_steps.c",
+            "steppers/taylor_terms.c",
+            "ensembles/lane_taylor.c",
+            "ensembles/lane_alone.c",
+            "ensembles/lane_runs.c",
         ),
     ),
-    **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
+    **{f"eomgen_runs{width}.c": (f"ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 
 #: Headers that models and the layer share.
@@ -85,7 +82,7 @@ def read_layer() -> dict[str, str]:
 
 def read_sources(parts: Sequence[str]) -> str:
     """The text of some parts of the layer's C source, as ``steppers/loop``, with the limits that it names."""
-    text = "\n".join(_read(f"c/{part}.c") for part in parts)
+    text = "\n".join(_read(f"{part}.c") for part in parts)
     return definitions(text) + text
 
 
@@ -98,12 +95,10 @@ def read_native() -> dict[str, str]:
 def read_header(name: str) -> str:
     """The text of a header that models and the layer share, as it comes with eomgen."""
     if name not in SOLVER_HEADERS:
-        return _read(f"c/{name}")
-    text = _read(f"native/{name}")
+        return (shipped("templates") / "c" / name).read_text(encoding="utf-8")
+    text = _read(name)
     return definitions(text) + text
 
 
 def _read(part: str) -> str:
-    folder, _, name = part.partition("/")
-    path = shipped("native") / name if folder == "native" else shipped("templates") / part
-    return path.read_text(encoding="utf-8")
+    return (shipped("native") / part).read_text(encoding="utf-8")

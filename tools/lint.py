@@ -78,8 +78,8 @@ def limits() -> Iterator[str]:
     definitions = import_module("eomgen.base.limits.in_c").definitions
     for folder, pattern in (
         ("eomgen/native", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
-        ("templates/c/ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
-        ("templates/c/steppers", r"\d(?:\.\d+)?e-\d+"),
+        ("eomgen/native/ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
+        ("eomgen/native/steppers", r"\d(?:\.\d+)?e-\d+"),
     ):
         for file in sorted((ROOT / folder).glob("*.[ch]")):
             text = re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -40,7 +40,7 @@ def environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
-        loader=FileSystemLoader(shipped("templates")),
+        loader=FileSystemLoader([shipped("templates"), shipped("native")]),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -10,7 +10,7 @@ strictly convex quadratic programs, Math. Program. 27 (1983), 1-33).  What slide
 Sweeps over single contacts move one impulse at a time and take thousands where light links lie between heavy bodies;
 here the number of steps is that of the edges that change.
 
-``templates/c/contacts/pivots.c`` does the same.
+``eomgen/native/contacts/pivots.c`` does the same.
 """
 
 from __future__ import annotations

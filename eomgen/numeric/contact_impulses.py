@@ -17,7 +17,7 @@ method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257), and one contact i
 holds, or slides to either side.  Before all that, many contacts are solved by the edges of their cones
 (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to :func:`solve_smoothed`.
 
-``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
+``eomgen/native/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def as_real(given: Any) -> Array | None:
 
     Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
     in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none, nor is what fails to
-    convert, whatever it raises.  The compiled layer has the same rule in C, templates/cython/_numbers.pxi.
+    convert, whatever it raises.  The compiled layer has the same rule in C, eomgen/native/_numbers.pxi.
     """
     try:
         if type(given) is np.ndarray:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..runtime.signals import Forcing
     from .rigid_rows import RigidContacts
 
-DONE, TOO_LONG = 0, 1  #: what a step comes back with: templates/c/contacts/eomgen_contacts.h
+DONE, TOO_LONG = 0, 1  #: what a step comes back with: eomgen/native/contacts/eomgen_contacts.h
 NEEDED = ("mass_matrix", "near_pairs", "motion_axes", "bias_apart")
 OF_CONSTRAINTS = ("constraint_jacobian", "velocity_constraints", "constraints")
 
