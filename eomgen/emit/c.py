@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from ..base.texts import comment_lines
 from ..layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
 from ..program import KERNELS, Block, Program
 from ..program.loop_blocks import LARGE
@@ -33,6 +34,8 @@ PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 #: Characters of a C literal, which compilers need not take longer than 4095, and of one of its lines, which become four
 #: times as long at most.  gcc reads the metadata of 1,600 bodies as literals in 0.06 s, as numbers in 1.0 s.
 LITERAL, LINE = 4000, 28
+#: A block of more inputs has no comment with their names.
+NAMED = 100
 #: All that could end a literal, begin an escape, a trigraph or a comment, be read as code, or is no plain character.
 UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:-]")
 
@@ -133,8 +136,13 @@ def _print_precompute(program: Program) -> Printed:
 
 
 def _print_function(program: Program, block: Block, branches: bool) -> Printed:
+    """A block below the names of what it reads, where these are few."""
     rolled = print_rolled(program, block) if program.is_rolled(block.name) else None
-    return rolled or (print_block_of_branches if branches else print_block)(program, block)
+    printed = rolled or (print_block_of_branches if branches else print_block)(program, block)
+    if len(block.inputs) > NAMED:
+        return printed
+    names = comment_lines(f"{block.name}: x = {', '.join(block.inputs)}", "   ")
+    return printed._replace(text=f"/* {names} */\n{printed.text.lstrip()}")
 
 
 def _printed_for_lanes(program: Program, printed: list[Printed]) -> dict[str, Printed]:
