@@ -13,10 +13,10 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.codegen.c import emit_c
+from eomgen.codegen.program import Limits
 from eomgen.compilation import Options, compile_model, load_core
-from eomgen.emit import emit_c
 from eomgen.module import Module
-from eomgen.program import Limits
 
 from .large_loops import closed_chain, timed
 from .latency import cold_cache

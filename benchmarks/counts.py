@@ -9,12 +9,12 @@ from tempfile import TemporaryDirectory
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.codegen.loops.block_groups import USUAL
 from eomgen.equations import METHODS
 from eomgen.equations.reduction import reduce_to_independent
 from eomgen.graph.count import count
 from eomgen.graph.substitute import substitute
 from eomgen.kinematics import analyse
-from eomgen.program.block_groups import USUAL
 
 from .large_loops import closed_chain, four_bars
 from .loop_robots import ROBOTS as LOOP_ROBOTS

@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import Any
 
 from eomgen import pipeline
-from eomgen.emit import emit_c
+from eomgen.codegen.c import emit_c
 from eomgen.graph.count import count
 
 from .models import chain, spatial_chain

@@ -57,9 +57,9 @@ class Ours:
 
     def __init__(self, file: str, lock: tuple[str, ...], folder: Path) -> None:
         from eomgen import pipeline
+        from eomgen.codegen.c import emit_c
         from eomgen.compilation import Options, find_compiler
         from eomgen.compilation.options import compile_flags
-        from eomgen.emit import emit_c
 
         model = robot(file, lock)
         equations = model.derive()

@@ -14,7 +14,7 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.emit import emit_c
+from eomgen.codegen.c import emit_c
 
 from .linkages import v_engine
 from .measure import work

@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.codegen.c import emit_c
 from eomgen.compilation.compiler import find_compiler
 from eomgen.compilation.options import Options, compile_flags
-from eomgen.emit import emit_c
 
 from .linkages import n_four_bar
 from .models import EXAMPLES

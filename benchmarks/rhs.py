@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from eomgen import pipeline
+from eomgen.codegen.c import emit_c
 from eomgen.compilation import compile_c_library
 from eomgen.compilation.compiler import find_compiler
 from eomgen.compilation.options import Options, compile_flags
-from eomgen.emit import emit_c
 
 from .latency import cold_cache
 from .measure import Sample

@@ -16,8 +16,8 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.codegen.c import emit_c
 from eomgen.compilation.compiler import find_compiler
-from eomgen.emit import emit_c
 
 from .measure import ROOT, Sample
 

@@ -13,8 +13,8 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.codegen.loops.block_groups import REGULAR, USUAL
 from eomgen.graph.count import Operations
-from eomgen.program.block_groups import REGULAR, USUAL
 
 from .call import compile_call_loop, over_kernel
 from .loop_robots import ROBOTS

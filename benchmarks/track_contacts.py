@@ -16,11 +16,11 @@ import numpy as np
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.base.kernel_table import KERNELS
+from eomgen.codegen.c import emit_c
+from eomgen.codegen.c_pairs import pair_files
+from eomgen.codegen.files import read_template
 from eomgen.compilation.compiler import find_compiler
 from eomgen.compilation.options import Options, compile_flags
-from eomgen.emit import emit_c
-from eomgen.emit.c_pairs import pair_files
-from eomgen.emit.sources import read_template
 
 from .report import Limit, Report, Table
 from .tracks import track

@@ -15,7 +15,7 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.emit import emit_c
+from eomgen.codegen.c import emit_c
 
 from .measure import work
 from .report import Limit, Report, Table

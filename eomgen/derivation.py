@@ -29,8 +29,8 @@ from .records import dataclass
 from .runtime.near_names import unknown
 
 if TYPE_CHECKING:
+    from .codegen.choice import Choice
     from .describe.mechanism import Mechanism
-    from .program.choice import Choice
 
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
@@ -124,8 +124,8 @@ def derive_mechanism(
     described: float = 0.0,
 ) -> Derived:
     """The equations of motion of what a model says; ``described`` is the time (s) that reading it took."""
-    from .program.choice import choose
-    from .program.reaction_laws import with_reactions
+    from .codegen.choice import choose
+    from .codegen.reactions import with_reactions
 
     seconds = {"describe": described}
     chosen = choose_method(mechanism, method)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base.files import as_path
-from .emit import emit_package
-from .emit.write import write_package
+from .codegen.package import emit_package
+from .codegen.write import write_package
 from .errors import EomgenError, cannot
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel

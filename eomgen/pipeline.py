@@ -30,8 +30,8 @@ from .runtime.near_names import read_names
 from .targets import TARGETS, find_function, find_target
 
 if TYPE_CHECKING:
+    from .codegen.program import Program
     from .describe.builder import Builder
-    from .program.program import Program
     from .runtime.protocols import Core
 
 
@@ -86,8 +86,8 @@ def derive_as(
 @np.errstate(all="ignore")
 def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """Stage 4, Derivation -> Program: the functions to generate for a target."""
+    from .codegen.build import program_of
     from .describe.digest import model_digest
-    from .program.build_program import program_of
 
     row = find_target(target)
     kernels = read_names("kernels", kernels or ())

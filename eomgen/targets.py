@@ -101,10 +101,10 @@ def find_function(name: str) -> Callable[..., Any]:
 
 
 TARGETS: dict[str, Target] = {
-    "cython": Target("extension module", "emit.package.cython_package", load="codegen.targets.cython.load"),
+    "cython": Target("extension module", "codegen.package.cython_package", load="codegen.targets.cython.load"),
     "numpy": Target(
         "Python that imports NumPy alone, no compiler",
-        "emit.package.numpy_package",
+        "codegen.package.numpy_package",
         load="codegen.targets.numpy.load",
         arrays=True,
     ),

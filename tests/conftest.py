@@ -23,7 +23,7 @@ ROOMS = {
     "forces": "elements forces",
     "runs": "analysis ensembles identification runtime simulation",
     "model": "base describe loading robots",
-    "code": "base codegen compilation device emit generation layer program targets",
+    "code": "base codegen compilation device generation layer targets",
     "shown": "base cli explain printing reading show",
     "core": "alone base graph numeric pipeline records simplify syntax_trees verification",
     "attack": "base describe robots",

@@ -26,7 +26,7 @@ SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
     "numeric/closure.py": {1e-8},
-    "program/loop_blocks.py": {1e-100},
+    "codegen/loops/loop_blocks.py": {1e-100},
     "robots/robot.py": {1e-11},
     "rotations/quaternions.py": {1e-4},
     "verification/digits.py": {1e-6},
@@ -126,7 +126,7 @@ def directions() -> Iterator[str]:
             here, there = ("base" if one == "errors" else one for one in (here, there))  # one floor
             if here != there and here not in ("", "__main__") and there and rows[there] >= rows[here]:
                 yield f"{name} imports {other}, which stands in the same row of ARCHITECTURE.md or above"
-    carried = {part.removesuffix(".py") for part in import_module("eomgen.emit.package").CARRIED}
+    carried = {part.removesuffix(".py") for part in import_module("eomgen.codegen.package").CARRIED}
     for name, others in graph.items():
         homes = {other.split(".")[1] for other in others if "." in other} - carried
         if f"{name}.".split(".")[1] in carried and (homes := homes - BEYOND.get(name.removeprefix("eomgen."), set())):

@@ -20,7 +20,7 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     Parameters
     ----------
     sources : mapping of str to str
-        From :func:`eomgen.emit.emit_numpy`.
+        From :func:`eomgen.codegen.targets.numpy.emit_numpy`.
     name : str
         Name of the model.
     twins : mapping of str to callable, optional

@@ -22,7 +22,7 @@ from .options import Options
 from .processor import lane_width
 
 #: What sources, layer and flags follow from, apart from the program and the templates: of eomgen.
-WRITERS = ("graph", "program", "emit", "compilation", "base", "numeric", "native", "layer.py")
+WRITERS = ("graph", "codegen", "compilation", "base", "numeric", "native", "layer.py")
 
 
 class Shortcut:

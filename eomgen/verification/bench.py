@@ -14,15 +14,15 @@ from ..base.kernel_table import NAMED
 from ..base.limits.analyses import NUDGE
 from ..base.limits.constraints import EXACT
 from ..base.limits.numbers import TINY
+from ..codegen.collect import collect_terms
 from ..graph.core import Expr
-from ..program.collect import collect_terms
 from .cases import Case
 from .rounding_sizes import FOLDED, UNIT, bounded
 from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:
+    from ..codegen.terms import SystemTerms
     from ..derivation import Derivation
-    from ..program.terms import SystemTerms
     from ..runtime.bound_model import BoundModel
 
 DEEP = 3  #: states that are looked at in many digits

@@ -12,8 +12,8 @@ from . import bodies
 from .digits import FIRST, SECOND, Digits, Number, Numbers, context
 
 if TYPE_CHECKING:
+    from ..codegen.terms import SystemTerms
     from ..derivation import Derivation
-    from ..program.terms import SystemTerms
     from .cases import Case
 
 Values = dict[str, Number]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...emit.c import emit_c
-from ...emit.example_state import example_state
-from ...emit.single_precision import in_single_precision
-from ...emit.sources import number_texts, render
-from ...program import Program
+from ..c import emit_c
+from ..files import example_state, number_texts, render
+from ..program import Program
+from ..single_precision import in_single_precision
 
 
 def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:

@@ -13,19 +13,18 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...device.device_module import DeviceModule
-from ...emit.c import count_constants, emit_c
-from ...emit.c_functions import used_calls
-from ...emit.c_text import print_precompute
-from ...emit.example_state import example_state
-from ...emit.package import carry, folders_of
-from ...emit.pair_sums_used import refuse_sums
-from ...emit.sources import render
-from ...emit.straight import cut
 from ...errors import cannot
 from ...layer import read_layer, read_sources
-from ...program import Block, KernelDriver, Program
 from ...simulation.events import GO_ON, RESET, crowd_of
 from ...targets import CUDA_REQUIREMENTS, DEVICE_KERNELS, TIMED_ON_DEVICE
+from ..c import count_constants, emit_c
+from ..c_functions import used_calls
+from ..c_text import print_precompute
+from ..files import example_state, render
+from ..package import carry, folders_of
+from ..pair_sums import refuse_sums
+from ..program import Block, KernelDriver, Program
+from ..statements import cut
 
 if TYPE_CHECKING:
     from ...device.arrays_on_device import Device

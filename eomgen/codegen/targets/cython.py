@@ -11,8 +11,8 @@ from ...compilation.native_faults import blame_source
 from ...compilation.shortcut import Shortcut
 from ...errors import ToolchainError, no_such
 from ...graph.functions import Function
-from ...program import Program
-from ...program.fingerprint import fingerprint
+from ..fingerprint import fingerprint
+from ..program import Program
 
 
 def load(
@@ -28,8 +28,8 @@ def load(
         shortcut = Shortcut(fingerprint(program), chosen)
         artifact = shortcut.find()
         if artifact is None:
-            from ...emit import emit_c
-            from ...emit.sources import keep_bytecode
+            from ..c import emit_c
+            from ..files import keep_bytecode
 
             keep_bytecode(shortcut.cache.templates)
             sources = emit_c(program)

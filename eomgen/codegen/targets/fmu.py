@@ -29,15 +29,15 @@ from ...base.texts import html_text, one_line
 from ...compilation.build import compile_c_library
 from ...compilation.options import Options
 from ...describe.units import read_unit
-from ...emit.c import emit_c
-from ...emit.sources import number_texts, read_template, render
 from ...errors import ModelError, Problem, bad_file, no_choice
 from ...layer import read_layer
-from ...program import Program
 from ...runtime.allowed_parameters import bounds_of
 from ...runtime.bound_model import BoundModel
 from ...runtime.signals import Forcing
 from ...targets import FMI_VERSIONS
+from ..c import emit_c
+from ..files import number_texts, read_template, render
+from ..program import Program
 
 
 def check_version(version: str) -> str:

@@ -13,17 +13,16 @@ from typing import Any, NamedTuple
 from ...base.files import find_module, load_source
 from ...base.kernel_table import NAMED
 from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
-from ...emit.c_functions import used_calls
-from ...emit.example_state import example_state
-from ...emit.numpy_text import print_block_of_lists, print_constants_of_lists
-from ...emit.pair_sums_used import refuse_sums
-from ...emit.sources import render
 from ...errors import MissingDependencyError, cannot
 from ...graph.functions import Function
 from ...numeric.scales import Space
 from ...numeric.user_functions import Curve, Surface
-from ...program import Program
 from ...targets import TRACED_KERNELS
+from ..c_functions import used_calls
+from ..files import example_state, render
+from ..pair_sums import refuse_sums
+from ..program import Program
+from ..python_text import print_block_of_lists, print_constants_of_lists
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
 LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}

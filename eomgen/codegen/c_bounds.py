@@ -1,0 +1,120 @@
+"""what a call of a C function costs at most: operations, and bytes on the stack."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from math import floor, log2, prod
+
+from ..base.limits.crossings import REACH, SHORTEST
+from ..graph.count import Operations
+from ..numeric.passing import PAIRS
+from .program import Block, Program
+
+#: Bytes of the registers that a function saves, its return address and alignment, on processors of up to 32 registers.
+_FRAME = 32 * 8
+_PLACE = 8  #: bytes of a variable, also where numbers or pointers have 4
+_NUMBER = re.compile(r"\b([A-Z]\w*) = ([\w +*]+)")
+_STRUCT = re.compile(r"typedef struct \{\n(.*?)\} (\w+);", re.DOTALL)
+_FUNCTION = re.compile(r"^[a-zA-Z][\w *]*?\b(\w+)\(([^;{}]*?)\)\s*\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
+_ARRAY = re.compile(r"\w+((?:\[[^\]]+\])+)")
+_CALL = re.compile(r"\b(\w+)\(")
+_EVALUATION = re.compile(r"\bEVALUATE\((\w+)")  #: of a straight-line function of the model, by the solvers
+
+
+def operations_of(program: Program, name: str) -> str:
+    """What one call of a public function carries out, in words."""
+    kernel = next(k for k in program.kernels if k.name == name)
+    if isinstance(kernel, Block):
+        return f"{_counted(program.counts[program.twins.get(name, name)])}"
+    together = _counted(sum((program.counts[part] for part in kernel.blocks), Operations()))
+    if not program.has_loops and name == "rhs" and "tree" not in program.block_names and not program.tree_by_columns:
+        return f"{together}, and {_factoring(program.parent)} to solve for the accelerations"
+    return f"{together} in straight-line parts, which it may repeat"
+
+
+def states_beside_change_points() -> int:
+    """How many states a function looks at, at most, where the position that it is given is next to a change point."""
+    return 1 + 2 * PAIRS * (floor(log2(REACH / SHORTEST)) + 1)
+
+
+def _counted(operations: Operations) -> str:
+    parts = {
+        "additions": operations.additions,
+        "multiplications": operations.multiplications,
+        "divisions": operations.divisions,
+        **operations.functions,
+        "comparisons and choices": sum(operations.choices.values()),
+    }
+    return ", ".join(f"{n} {what}" for what, n in parts.items() if n) or "no operations"
+
+
+def _factoring(parent: Sequence[int]) -> int:
+    """Additions, multiplications and divisions of M = L^T D L along the tree, and of one solution with it."""
+    above: list[int] = []
+    for k in parent:
+        above.append(0 if k < 0 else above[k] + 1)
+    # ratios, a multiplication and an addition for each entry above; two passes over L and one over D
+    return sum(n + n * (n + 1) for n in above) + sum(4 * n + 1 for n in above)
+
+
+def stack_of(sources: Iterable[str]) -> dict[str, int]:
+    """Bytes on the stack that each function of C sources needs at most, with all that it calls of them.
+
+    Every variable is counted with a place of its own, which compilers need not give it, and every function with a frame
+    of its own, also where it becomes a part of its caller.
+
+    Parameters
+    ----------
+    sources : iterable of str
+        Texts of the files.
+    """
+    texts = list(sources)
+    numbers = {name: value for text in texts for name, value in _NUMBER.findall(text)}
+    structs = {name: body for text in texts for body, name in _STRUCT.findall(text)}
+    types = "|".join(("real", "double", "float", "int", "flag", "bits", "short", *structs))
+    declaration = re.compile(rf"^\s*(?:for \()?(?:const )?({types})\b([^;]*);", re.MULTILINE)
+
+    def places(text: str) -> int:
+        found = 0
+        for kind, names in declaration.findall(text):
+            each = places(structs[kind]) if kind in structs and not names.lstrip().startswith("*") else 1
+            arrays = _ARRAY.findall(re.sub(r"=\s*\{[^{}]*\}|=[^,]*", "", names))
+            found += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
+        return found
+
+    own: dict[str, int] = {}
+    calls: dict[str, set[str]] = {}
+    for text in texts:
+        for name, parameters, body in _FUNCTION.findall(text):
+            needed = _FRAME + _PLACE * (places(body) + parameters.count(",") + 1)
+            own[name] = max(own.get(name, 0), needed)
+            called = (*_CALL.findall(body), *(f"{function}_block" for function in _EVALUATION.findall(body)))
+            calls.setdefault(name, set()).update(called)
+
+    @cache
+    def total(name: str) -> int:
+        return own[name] + max((total(callee) for callee in calls[name] & own.keys() - {name}), default=0)
+
+    return {name: total(name) for name in own}
+
+
+def _length(lengths: str, numbers: Mapping[str, str]) -> int:
+    """Numbers in an array, each of its lengths of sums and products of names and whole numbers."""
+    return prod(_value(length, numbers) for length in re.findall(r"\[([^\]]+)\]", lengths))
+
+
+def _value(text: str, numbers: Mapping[str, str]) -> int:
+    statement = ast.parse(text.strip()).body[0]
+    assert isinstance(statement, ast.Expr)
+    return _whole(statement.value, numbers)
+
+
+def _whole(node: ast.expr, numbers: Mapping[str, str]) -> int:
+    """The value of a sum or product of whole numbers and of names of such."""
+    if isinstance(node, ast.BinOp):
+        left, right = _whole(node.left, numbers), _whole(node.right, numbers)
+        return left * right if isinstance(node.op, ast.Mult) else left + right
+    return _value(numbers[node.id], numbers) if isinstance(node, ast.Name) else int(ast.unparse(node))

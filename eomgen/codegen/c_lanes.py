@@ -1,0 +1,104 @@
+"""the straight-line functions of a model once more, for several states side by side (lanes).
+
+The right-hand side of closed loops has lanes where it is made of straight-line blocks: lanes that need more, such as
+pivoting, are left to the function of one state (templates/c/closed_lanes.c.j2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..base.limits.in_c import definitions
+from .c_functions import declarations, used_calls
+from .c_pairs import pair_declarations
+from .c_text import used_helpers
+from .files import read_template, render
+from .loops.block_groups import REGULAR, USUAL
+from .program import Block, Program
+
+#: Public functions that have lanes where they are straight-line code.
+LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
+#: Likewise, in modules that are made of them alone: they are long, and few who have the others in batches want these.
+DERIVATIVES = ("inverse_dynamics_derivatives",)
+
+#: Width -> instructions it needs on x86-64 beyond those that every such processor has, and their name in
+#: eomgen_processor.h.
+WIDTHS: dict[int, tuple[tuple[str, ...], str]] = {
+    2: ((), ""),
+    4: (("avx2",), "EOMGEN_AVX2"),
+    8: (("avx512f", "avx512vl", "avx512dq"), "EOMGEN_AVX512"),
+}
+
+
+#: Blocks of which the right-hand side of loops in lanes is made.
+CLOSED = (*USUAL, *REGULAR)
+
+
+def loops_in_lanes(program: Program) -> bool:
+    """Whether there are loops whose right-hand side has lanes."""
+    driven = {name for d in program.drivers if d.name == "rhs" for name in d.blocks}
+    return driven.issuperset(USUAL) and not program.given_rates
+
+
+def rhs_blocks(program: Program) -> list[str]:
+    """Names of the blocks of the right-hand side in lanes; none if it has no lanes."""
+    if loops_in_lanes(program):
+        return [name for name in CLOSED if name in program.block_names]
+    rhs = program.twins.get("rhs", "rhs")
+    return [rhs] if rhs in public_blocks(program) else []
+
+
+def public_blocks(program: Program) -> set[str]:
+    """Names of the blocks behind public functions that are straight-line code and have lanes."""
+    made = {k.name for k in program.kernels}
+    wanted = {program.twins.get(name, name) for name in (*LANES, *(DERIVATIVES if made <= {*DERIVATIVES} else ()))}
+    return wanted & {program.twins.get(k.name, k.name) for k in program.kernels if isinstance(k, Block)}
+
+
+def lane_blocks(program: Program) -> dict[str, Block]:
+    """The blocks that have lanes, by name; those of the right-hand side first."""
+    first = rhs_blocks(program)
+    named = public_blocks(program).union(first)
+    found = [b for b in program.blocks if b.name in named]
+    return {b.name: b for b in sorted(found, key=lambda b: b.name not in first)}
+
+
+def lane_kernels(program: Program) -> list[str]:
+    """Names of the public functions that have lanes."""
+    blocks, twins, closed = public_blocks(program), program.twins, loops_in_lanes(program)
+    return [k.name for k in program.kernels if twins.get(k.name, k.name) in blocks or (closed and k.name == "rhs")]
+
+
+def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
+    """The header with the text of the functions, and a file for each width; none without such functions."""
+    blocks, first = lane_blocks(program), rhs_blocks(program)
+    if not blocks:
+        return {}
+    name = program.name
+    roots = [y for b in blocks.values() for y in b.roots]
+    inside = {
+        **context,
+        "helpers": [
+            *used_helpers(program, roots),
+            *declarations(program, used_calls(program)),
+            *pair_declarations(program),
+        ],
+        "blocks": [context["printed"][b] for b in blocks],
+        "first": len(first),
+        "closed": loops_in_lanes(program),
+        "regular": REGULAR[0] in program.block_names,
+        "limits": definitions(read_template("c/closed_lanes.c.j2")),
+    }
+    call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
+    files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
+    for width, (tests, feature) in WIDTHS.items():
+        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": bool(first)}
+        shown["series"] = context["series"]
+        files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
+        if first:
+            fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": call}
+            files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", fused)
+            if context["series"]:
+                files[f"{name}_series_lanes{width}.c"] = render("c/series_lanes.c.j2", fused)
+    return files

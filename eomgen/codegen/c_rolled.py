@@ -1,0 +1,292 @@
+"""the segments of a block -> C99 functions, one for each kind, that go through tables of places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..graph.core import Expr
+from .c_layout import places_again
+from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
+from .program import Block, Program
+from .segments import FEW, Place, SegmentKind, Segments, find_segments
+from .statements import Pieces, PrintedFunction, conditions, references
+
+CALLED = 24  #: runs in one function; more go through a table of runs
+ROW = 12  #: numbers in a line of a table
+CARRIED = 6  #: values that a loop keeps in variables from one body to the next at most
+#: A function is made of loops where that takes the text of so many times fewer statements.
+ALIKE = 2
+
+
+def print_rolled(program: Program, block: Block) -> Printed | None:
+    """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
+    texts = references(program, block.inputs)
+    again = places_again(program, block)
+    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts, again)
+
+
+def print_rolled_precompute(program: Program) -> Printed | None:
+    """The same of ``precompute_block``."""
+    texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
+    return _print(program, "precompute", program.hoisted, (), frozenset(), texts, {})
+
+
+def _print(
+    program: Program,
+    block: str,
+    outputs: Sequence[Expr],
+    checks: Sequence[Expr],
+    skipped: frozenset[int],
+    texts: dict[int, str],
+    again: dict[str, str],
+) -> Printed | None:
+    graph, name = program.graph, f"{block}_block"
+    given = {i: _place(text) for i, text in texts.items()}
+    longest = max(1, program.limits.statements // 2)
+    found = find_segments(graph, outputs, checks, skipped, given, longest, program.is_searched(block))
+    if ALIKE * found.written > found.carried_out:
+        return None
+    found.lists.again = again
+    carried = _find_carried(found)
+    printed = [
+        _print_kind(program, found, kind, along, f"{name}_{n}")
+        for n, (kind, along) in enumerate(zip(found.kinds, carried, strict=True))
+    ]
+    made = {i for k in found.kinds for segment in k.members for i in segment}
+    direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
+    bare = tuple(sorted({y.id for y in checks} - made))
+    pieces = Pieces((), direct, bare, 0)
+    printer = BlockPrinter(program, texts, pieces)
+    main = direct_results(printer, pieces)
+    main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
+    angles, first = _print_angles(found, name)
+    runs, calls = _print_runs(found.runs, name, len(found.kinds))
+    text = function_text(f"static flag {name}", set(ARGUMENTS), [*main, *first, *calls])
+    return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
+
+
+class PlaceTable:
+    """What differs between the members of a kind: rows of whole numbers, each column up to a constant.
+
+    Columns that differ by a constant share one; columns that grow evenly need none.
+    """
+
+    def __init__(self, name: str, members: int) -> None:
+        self.name, self.steps = name, np.arange(members)
+        self.columns: dict[bytes, int] = {}
+        self.rows: list[np.ndarray] = []
+
+    def text(self, column: Sequence[float]) -> str:
+        """The text of what stands in a column at row ``m``."""
+        values = np.asarray(column, dtype=np.int64)
+        start = int(values[0])
+        apart = values - start
+        if not apart.any():
+            return str(start)
+        step = int(apart[1])
+        if (apart == step * self.steps).all():
+            return f"{start} + {step}*m" if step >= 0 else f"{start} - {-step}*m"
+        key = apart.tobytes()
+        if key not in self.columns:
+            self.columns[key] = len(self.rows)
+            self.rows.append(values)
+        at = self.columns[key]
+        offset = start - int(self.rows[at][0])
+        return f"{self.name}[{at}]" + (f" + {offset}" if offset > 0 else f" - {-offset}" if offset else "")
+
+
+def _place(text: str) -> Place:
+    return (text, 0) if text == "t" else (text[0], int(text[2:-1]))
+
+
+def _print_list(found: Segments, i: int, name: str) -> str:
+    """A function that makes a list of a sum over pairs."""
+    by_array: dict[str, list[tuple[int, float]]] = {}
+    for place, operand in found.lists.fills(i):
+        array, at = found.places[operand]
+        by_array.setdefault(array, []).append((place, at))
+    tables, filled = "", []
+    for array, pairs in by_array.items():
+        to = f"{name}_to_{array}"
+        tables += f"EOMGEN_SHARED const int {to}[{len(pairs)}] = {{\n{_lines([place for place, _ in pairs])}\n}};\n"
+        value = "t"
+        if array != "t":
+            kind, form = ("double", "same({})") if array == "const" else ("int", f"{array}[{{}}]")
+            source = f"{name}_from_{array}"
+            tables += (
+                f"EOMGEN_SHARED const {kind} {source}[{len(pairs)}] = {{\n{_lines([at for _, at in pairs])}\n}};\n"
+            )
+            value = form.format(f"{source}[i]")
+        filled.append(f"for (int i = 0; i < {len(pairs)}; i++) {{ w[{to}[i]] = {value}; }}")
+    unused = " ".join(f"(void){a};" for a in ("out", *({"t", "x", "u", "c"} - set(by_array)), "first", "last"))
+    lines = "\n".join(f"    {line}" for line in (unused, *found.lists.lines(i, filled)))
+    head = f"static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)"
+    return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
+
+
+class FromBefore(NamedTuple):
+    """What every member of a kind reads from the one before it, so that it stays in a variable."""
+
+    reads: dict[int, int]  #: what the first member reads -> number of the export of the member before
+    first: dict[int, int]  #: number of the export -> where the first member reads it
+    alone: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
+
+
+def _find_carried(found: Segments) -> list[FromBefore]:
+    """Of every kind; kinds that carry much are left as they are, since registers are few."""
+    result = []
+    read: set[int] = set()
+    for kind in found.kinds:
+        stride, n = len(kind.exports), len(kind.members)
+        reads, first = {}, {}
+        for column in zip(*kind.reads, strict=True):
+            places = [int(at) if array == "w" else -1 for array, at in (found.places[j] for j in column)]
+            e = places[1] - kind.start if n > 1 else -1
+            follows = 0 <= e < stride and all(at == kind.start + m * stride + e for m, at in enumerate(places[1:]))
+            if follows and e not in first and n > FEW:
+                reads[column[0]], first[e] = e, places[0]
+                read.add(places[0])  # which may lie inside a chain of another kind
+            else:
+                read.update(places)
+        if len(reads) > CARRIED:
+            read.update(kind.start + m * stride + e for e in first for m in range(n))
+            reads, first = {}, {}
+        result.append((reads, first))
+    return [
+        FromBefore(reads, first, frozenset(e for e in first if read.isdisjoint(
+            range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
+        for kind, (reads, first) in zip(found.kinds, result, strict=True)
+    ]  # fmt: skip
+
+
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: FromBefore, name: str) -> str:
+    """A function that evaluates members ``first`` to ``last`` of a kind."""
+    if found.lists.is_list(kind.members[0][0]):
+        return _print_list(found, kind.members[0][0], name)
+    n = len(kind.members)
+    table = PlaceTable("i", n)
+    numbers: dict[tuple[float, ...], int] = {}
+    fixed, loads = {}, {}
+    used: set[str] = set()
+    for column in zip(*kind.reads, strict=True):
+        i = column[0]
+        where = [found.places[j] for j in column]
+        array = where[0][0]
+        if array == "const":
+            values = tuple(value for _, value in where)
+            if len(set(values)) > 1:
+                fixed[i] = f"k[{numbers.setdefault(values, len(numbers))}]"
+        elif i in carried.reads:
+            fixed[i] = f"r{carried.reads[i]}"
+        elif array == "w":
+            loads[i] = table.text([at for _, at in where])
+        else:
+            used.add(array)
+            fixed[i] = "t" if array == "t" else f"{array}[{table.text([at for _, at in where])}]"
+    statements = kind.members[0]
+    stride = len(kind.exports)
+    stores = {
+        statements[index]: table.text([kind.start + e + m * stride for m in range(n)])
+        for e, index in enumerate(kind.exports)
+        if e not in carried.alone
+    }
+    results = {
+        i: tuple(table.text([found.results[one[k]][at] for one in kind.members]) for at in range(len(found.results[i])))
+        for k, i in enumerate(statements)
+        if i in found.results
+    }
+    kept = {*(statements[index] for index in kind.exports), *results}
+    checks = found.checks.intersection(statements)
+    inlined = conditions(program.graph, statements, kept, checks)
+    printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
+    printer.lists = found.lists
+    lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
+    lines += [f"r{e} = {printer.real(statements[kind.exports[e]])};" for e in carried.first]
+    before, after = _print_carried(kind, carried)
+    used.update("w" for _ in before)
+    head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
+    head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []
+    before += [f"(void){a};" for a in ARGUMENTS if a not in {*printer.used, *used}]
+    body = "\n".join(f"        {line}" for line in head + lines)
+    tables = ""
+    if table.rows:
+        rows = np.array(table.rows).T.tolist()
+        tables += f"EOMGEN_SHARED const int {name}_places[{n}][{len(table.rows)}] = {{\n{_rows(rows)}\n}};\n"
+    if numbers:
+        every = list(zip(*numbers, strict=True))
+        tables += f"EOMGEN_SHARED const double {name}_numbers[{n}][{len(numbers)}] = {{\n{_rows(every)}\n}};\n"
+    loop = "for (int m = first; m < last; m++)"
+    opening, closing = ("".join(f"    {line}\n" for line in part) for part in (before, after))
+    return (
+        f"{tables}static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)\n{{\n    EOMGEN_BEGIN\n{opening}"
+        f"    {loop} {{\n{body}\n    }}\n{closing}    EOMGEN_RETURN\n}}\n"
+    )
+
+
+def _print_carried(kind: SegmentKind, carried: FromBefore) -> tuple[list[str], list[str]]:
+    """What comes before and after the loop over members."""
+    stride = len(kind.exports)
+    before, after = [], []
+    for e, place in carried.first.items():
+        last = f"{kind.start + e - stride} + {stride}"
+        before.append(f"real r{e} = w[first ? {last}*first : {place}];")
+        if e in carried.alone:
+            after.append(f"w[{last}*last] = r{e};")
+    return before, after
+
+
+def _rows(rows: Sequence[Sequence[float]]) -> str:
+    return ",\n".join("    { " + ", ".join(repr(x) for x in row) + " }" for row in rows)
+
+
+def _print_angles(found: Segments, name: str) -> tuple[str, list[str]]:
+    """Sines and cosines of all symbols that are angles: a table of their places, if it needs one, and statements."""
+    n = len(found.angles)
+    if not n:
+        return "", []
+    at = [int(found.places[a][1]) for a in found.angles]
+    apart, table = f"{at[0]} + ", ""
+    closing = ""
+    if at != list(range(at[0], at[0] + n)):
+        table = f"EOMGEN_SHARED const int {name}_angles[{n}] = {{\n{_lines(at)}\n}};\n"
+        apart, closing = f"{name}_angles[", "]"
+    angle = [f"x[{apart}m{f' + {k}' if k else ''}{closing}]" for k in range(4)]
+    whole = n - n % 4
+    lines = [f"bits far = sincos_one(x[{at[0]}], w, w + {n});"]
+    if whole:
+        four = f"far |= sincos_four({', '.join(angle)}, w + m, w + {n} + m);"
+        lines.append(f"for (int m = 0; m < {whole}; m += 4) {{ {four} }}")
+    lines += [f"far |= sincos_one(x[{at[k]}], w + {k}, w + {n + k});" for k in range(whole, n)]
+    far = f"for (int m = 0; m < {n}; m++) {{ sincos_far({angle[0]}, w + m, w + {n} + m); }}"
+    return table, [*lines, f"if (any_far(far)) {{ {far} }}"]
+
+
+def _print_runs(runs: Sequence[tuple[int, int]], name: str, kinds: int) -> tuple[str, list[str]]:
+    """Calls of all functions in order: a table of the runs, if there are many, and statements."""
+    done = [0] * kinds
+    if len(runs) <= CALLED:
+        lines = []
+        for kind, count in runs:
+            lines.append(f"EOMGEN_REJECT({name}_{kind}(t, x, u, c, out, w, {done[kind]}, {done[kind] + count}))")
+            done[kind] += count
+        return "", lines
+    flat = [number for run in runs for number in run]
+    table = f"EOMGEN_SHARED const int {name}_runs[{len(flat)}] = {{\n{_lines(flat)}\n}};\n"
+    cases = [f"    case {k}: EOMGEN_REJECT({name}_{k}(t, x, u, c, out, w, first, last)) break;" for k in range(kinds)]
+    return table, [
+        f"int done[{kinds}] = {{ 0 }};",
+        f"for (int r = 0; r < {len(flat)}; r += 2) {{",
+        f"    const int kind = {name}_runs[r], first = done[kind], last = first + {name}_runs[r + 1];",
+        "    done[kind] = last;",
+        "    switch (kind) {",
+        *cases,
+        "    }",
+        "}",
+    ]
+
+
+def _lines(numbers: Sequence[float]) -> str:
+    return ",\n".join("    " + ", ".join(map(str, numbers[k : k + ROW])) for k in range(0, len(numbers), ROW))

@@ -1,0 +1,267 @@
+"""a straight-line block -> C99 functions in static single assignment.
+
+Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.  The text is written over the type
+``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
+from ..graph.core import Expr
+from ..graph.nodes import Node
+from ..graph.traverse import reachable
+from .c_functions import each_lane, each_name
+from .c_layout import places_again
+from .pair_sums import CopiedRun, PairLists, copied_runs
+from .program import Block, Program
+from .statements import CIRCULAR, FindPairs, Pieces, PrintedFunction, cut, gather_angles, print_angles, references
+
+SIGNATURE = (
+    "real t, const real *restrict x, const real *restrict u,\n"
+    "    const real *restrict c, real *restrict out, real *restrict w"
+)
+ARGUMENTS = ("t", "x", "u", "c", "out", "w")
+#: A row of at least so many zero results is filled by a loop.
+FILLED = 12
+NOWHERE: Mapping[str, str] = MappingProxyType({})  #: where no sum over pairs keeps anything
+
+
+def literal(value: float) -> str:
+    """A number as a C expression that reads back exactly."""
+    text = repr(value)
+    return f"({text})" if text.startswith("-") else text
+
+
+class BlockPrinter:
+    """Prints the statements of one block; variables are numbered through all its pieces."""
+
+    def __init__(self, program: Program, references: dict[int, str], pieces: Pieces) -> None:
+        every = (i for piece in pieces.pieces for i in piece.statements)
+        self.lists = PairLists(program.graph, every, pieces.work)
+        self.pairs = pieces.pairs
+        self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
+        self.zero = program.graph.zero.id
+        self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
+        self._fixed = references
+        self._beside_numbers = operations_with(lambda row: row.takes_numbers)
+        self._variables: dict[int, str] = {}
+        self.used: set[str] = set()  #: arguments read or written since last emptied
+
+    def _name(self, i: int) -> str:
+        if i not in self._variables:
+            self._variables[i] = f"v{len(self._variables)}"
+        return self._variables[i]
+
+    def operand(self, i: int) -> str:
+        fixed = self._fixed.get(i)
+        if fixed is not None:
+            self.used.add(fixed[0])
+            return fixed
+        node = self._nodes[i]
+        return literal(node[1]) if node[0] == "const" else self._name(i)
+
+    def real(self, i: int) -> str:
+        """An operand as a ``real`` even if it is a number."""
+        node = self._nodes[i]
+        return f"same({self.operand(i)})" if node[0] == "const" else self.operand(i)
+
+    def operands(self, node: Node) -> list[str]:
+        """The operands of an operation; beside a value, arithmetic takes a number as it is."""
+        if node[0] in self._beside_numbers and not all(self._nodes[k][0] == "const" for k in node[1:]):
+            return [self.operand(k) for k in node[1:]]
+        return [self.real(k) for k in node[1:]]
+
+    def condition(self, i: int, piece: PrintedFunction) -> str:
+        if i in piece.inlined:
+            node = self._nodes[i]
+            return OPERATIONS[node[0]].c.format(*self.operands(node))
+        return f"({self.real(i)} != 0.0)"
+
+    def failed(self, i: int, piece: PrintedFunction | None) -> str:
+        """The text of a check that is not passed; NaN passes, and is found in the result."""
+        node = self._nodes[i]
+        if piece is not None and i in piece.inlined and node[0] == "lt":
+            return "{} >= {}".format(*self.operands(node))
+        return f"{self.real(i)} <= 0.0"
+
+    def _value(self, i: int, piece: PrintedFunction) -> str:
+        node = self._nodes[i]
+        kind = node[0]
+        if self.lists.call(i) is not None:
+            self.used.add("w")
+            return f"w[{self.lists.place(i)}]"
+        if kind in self._calls:
+            function, orders = self._calls[kind]
+            return f"{each_name(function.name, orders)}({', '.join(map(self.real, node[1:]))})"
+        if kind in CIRCULAR and node[1] in self._angles:
+            return f"{'sines' if kind == 'sin' else 'cosines'}[{self._angles[node[1]]}]"
+        row = OPERATIONS[kind]
+        if row.kind != ARITHMETIC and row.chooses:
+            return row.c.format(self.condition(node[1], piece), *map(self.real, node[2:]))
+        text = row.c.format(*self.operands(node))
+        return f"choose({text}, same(1.0), same(0.0))" if row.kind == CONDITION else text
+
+    def lines(self, piece: PrintedFunction) -> list[str]:
+        result: list[str] = []
+        loaded: set[int] = set()
+        angles = gather_angles(self._graph, piece, self.pairs)
+        self._angles = {}
+        first = frozenset(angles.first)
+        for i in angles.first:
+            self._statement(i, piece, loaded, result)
+        if angles.arguments:
+            for i in angles.arguments:
+                self._read(i, piece, loaded, result)
+            result += print_angles([self.real(i) for i in angles.arguments])
+            self._angles = {i: k for k, i in enumerate(angles.arguments)}
+        for i in piece.statements:
+            if i not in first:
+                self._statement(i, piece, loaded, result)
+        return result
+
+    def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
+        if self.lists.is_list(i):
+            self._load(i, piece, loaded, result)
+            self.used |= {"x", "w"} if self.lists.again else {"w"}
+            result += self.lists.lines(i, [f"w[{place}] = {self.real(x)};" for place, x in self.lists.fills(i)])
+            return
+        if i not in piece.inlined:
+            self._load(i, piece, loaded, result)
+            result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
+        if i in piece.checks:
+            if i in piece.inlined:
+                self._load(i, piece, loaded, result)
+            result.append(f"EOMGEN_REJECT({self.failed(i, piece)})")
+        if i in piece.results:
+            self.used.add("out")
+            result += [f"out[{k}] = {self._name(i)};" for k in piece.results[i]]
+        if i in piece.stores:
+            self.used.add("w")
+            result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
+
+    def _load(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
+        """Read values of earlier pieces just before their first use."""
+        for k in self._nodes[i][1:]:
+            if k in piece.inlined:
+                self._load(k, piece, loaded, result)
+            else:
+                self._read(k, piece, loaded, result)
+
+    def _read(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
+        """Read a value of an earlier piece, if it is one."""
+        if i in piece.loads and i not in loaded and not self.lists.is_list(i):
+            loaded.add(i)
+            self.used.add("w")
+            result.append(f"const real {self._name(i)} = w[{piece.loads[i]}];")
+
+
+def function_text(head: str, used: set[str], lines: Sequence[str]) -> str:
+    """A C function of the arguments of all blocks."""
+    unused = [f"(void){a};" for a in ARGUMENTS if a not in used]
+    text = "\n".join(f"    {line}" for line in ([" ".join(unused)] if unused else []) + list(lines))
+    return f"{head}({SIGNATURE})\n{{\n    EOMGEN_BEGIN\n{text}\n    EOMGEN_RETURN\n}}\n"
+
+
+class Printed(NamedTuple):
+    """The C text of one straight-line function: the pieces it calls, if it is long, without their linkage."""
+
+    text: str
+    pieces: tuple[tuple[str, str], ...]  #: name and text of each
+    work: int  #: doubles of work needed
+    in_pairs: bool = False  #: whether statements of alike branches are vectors, so that the text has no lanes
+
+
+def print_block(
+    program: Program, block: Block, printing: type[BlockPrinter] = BlockPrinter, find: FindPairs | None = None
+) -> Printed:
+    """The C functions of a block, ``<name>_block`` and its pieces; ``find`` is that of :func:`~.statements.cut`."""
+    graph, outputs = program.graph, list(block.outputs)
+    runs = copied_runs(graph, outputs)
+    for run in runs:
+        outputs[run.first : run.first + run.length] = [graph.zero] * run.length
+    lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
+    pieces = cut(
+        graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find, block.guards
+    )
+    texts = references(program, block.inputs)
+    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block), printing)
+
+
+def print_pieces(
+    program: Program,
+    name: str,
+    pieces: Pieces,
+    texts: dict[int, str],
+    runs: Sequence[CopiedRun] = (),
+    again: Mapping[str, str] = NOWHERE,
+    printing: type[BlockPrinter] = BlockPrinter,
+) -> Printed:
+    """Print cut statements as one function, or as several and one that calls them.
+
+    ``runs`` are copied at the end; ``again`` is that of :class:`~.pair_sums.PairLists`.
+    """
+    printer = printing(program, texts, pieces)
+    printer.lists.again = again
+    main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
+    used = {*printer.used, *(["out"] if pieces.direct else [])}
+    functions: list[tuple[str, str]] = []
+    if len(pieces.pieces) == 1:
+        main += printer.lines(pieces.pieces[0])
+        used |= printer.used
+    elif pieces.pieces:
+        used = set(ARGUMENTS)
+        for k, piece in enumerate(pieces.pieces):
+            printer.used.clear()
+            lines = printer.lines(piece)
+            part = f"{program.name}_{name}_{k}"
+            functions.append((part, function_text(f"flag {part}", printer.used, lines)))
+            main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
+    main += printer.lists.copies(runs)
+    used |= {"out", "w"} if runs else set()
+    return Printed(
+        function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end, pieces.pairs is not None
+    )
+
+
+def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
+    """Results that need no statement; a long run of zeros is cleared at once, and later results overwrite."""
+    zero, direct = printer.zero, pieces.direct
+    zeros = [k for k, i in direct if i == zero]
+    lines = []
+    if len(zeros) >= FILLED:
+        lines.append(f"memset(out + {zeros[0]}, 0, {zeros[-1] - zeros[0] + 1} * sizeof *out);")
+        direct = tuple((k, i) for k, i in direct if i != zero)
+    return lines + [f"out[{k}] = {printer.real(i)};" for k, i in direct]
+
+
+def print_precompute(program: Program) -> Printed:
+    """``precompute_block``, which fills the hoisted constants; its work lies behind them."""
+    graph = program.graph
+    texts = {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
+    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
+    return print_pieces(program, "precompute_block", pieces, texts)
+
+
+def helper(row: Operation) -> str:
+    """The definition that the C text of an operation needs, in every lane; empty where headers have it."""
+    letters = "abc"[: row.arity]
+    name = row.c.partition("(")[0]
+    head = f"EOMGEN_SHARED inline real {name}({', '.join(f'real {x}' for x in letters)})\n{{\n"
+    if row.body:
+        return f"{head}    return {row.body};\n}}\n"
+    if not name.startswith("each_"):
+        return ""
+    if row.arity < 3:
+        return f"EOMGEN_EACH{'_PAIR' if row.arity == 2 else ''}({name}, {row.name})\n"
+    return f"{head}    real y = same(0.0);\n    {each_lane(row.name, letters)}\n    return y;\n}}\n"
+
+
+def used_helpers(program: Program, roots: Sequence[Expr]) -> list[str]:
+    """Definitions of the helper functions that these expressions need."""
+    nodes = program.graph.nodes
+    operations = {nodes[i][0] for i in reachable(program.graph, (y.id for y in roots))}
+    return [text for name, row in OPERATIONS.items() if name in operations and (text := helper(row))]

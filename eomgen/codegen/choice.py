@@ -1,0 +1,163 @@
+"""Kinematics -> the method whose right-hand side takes fewer operations, and both counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from copy import copy
+from functools import cached_property
+
+from ..equations import METHODS, TreeEquations
+from ..graph.count import count
+from ..graph.evaluate import compile_evaluator
+from ..kinematics import Kinematics
+from ..kinematics.loads import drives_cut_joint
+from ..kinematics.mobility import Mobility
+from ..records import dataclass
+from .collect import collect_terms
+from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
+from .loops.body_loops import BodyLoops
+from .loops.embedded_loops import EmbeddedLoops
+from .loops.loop_blocks import LoopBlocks, estimate
+from .program import Limits
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What ``auto`` took and why.
+
+    Attributes
+    ----------
+    method : str
+    operations : mapping of str to int
+        Multiplications, additions and divisions of the right-hand side by each method compared; of ``embedding`` only
+        those of the factorisation where they alone are more than all of ``recursive``.  Counted when they are read:
+        where only one method is left nothing depends on them.
+    """
+
+    method: str
+    operations: Mapping[str, int]
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{method} {n}" for method, n in self.operations.items())
+        return f"{self.method} chosen; operations of the right-hand side: {counts}"
+
+
+class CountedLater(Mapping[str, int]):
+    """Operations that are counted when they are first read; copies and pickles hold plain numbers."""
+
+    def __init__(self, counted: Callable[[], dict[str, int]]) -> None:
+        self._counted = counted
+
+    @cached_property
+    def _found(self) -> dict[str, int]:
+        return self._counted()
+
+    def __getitem__(self, method: str) -> int:
+        return self._found[method]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+    def __reduce__(self) -> tuple[type[dict[str, int]], tuple[dict[str, int]]]:
+        return dict, (self._found,)
+
+
+def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
+    """Derive by ``embedding`` and by ``recursive``; keep the one whose right-hand side takes fewer operations."""
+    if drives_cut_joint(kinematics):  # its inertia couples branches: what recursion cannot have
+        return METHODS["embedding"](kinematics), None
+    if kinematics.constraints.labels:
+        return _choose_with_constraints(kinematics, mobility)
+    return _choose_of_tree(kinematics)
+
+
+def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
+    """By the operations once the state is on the constraints, which takes the same in both.
+
+    An embedded system that is too large to be written out is not derived.  Joints that move (almost) no mass by
+    themselves, as those of light rods may, are for embedding.
+    """
+    operations: dict[str, int] = {}
+    factors = estimate(kinematics.constraints.jacobian, mobility.n_dof)
+    embedding = None
+    if not mobility.n_dof or factors <= Limits().unrolled_loops:
+        embedding = METHODS["embedding"](kinematics)
+        embedded = EmbeddedLoops(collect_terms(kinematics, mobility, embedding))
+        if not mobility.n_dof or not embedded.determined:
+            return embedding, None
+        operations["embedding"] = _count(embedded)
+    recursive = METHODS["recursive"](kinematics)
+    if not has_long_paths(kinematics.parent):
+        embedding = embedding or METHODS["embedding"](kinematics)
+        recursive = _with_shorter(recursive, embedding)
+    bodies = BodyLoops(collect_terms(kinematics, mobility, recursive))
+    if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
+        return embedding or METHODS["embedding"](kinematics), None
+    if "embedding" not in operations:
+        return recursive, Choice("recursive", CountedLater(lambda: {"recursive": _count(bodies)}))
+    operations["recursive"] = _count(bodies)
+    assert embedding is not None
+    chosen = embedding if operations["embedding"] <= operations["recursive"] else recursive
+    return chosen, Choice(chosen.method, operations)
+
+
+def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
+    """The recursive form with the mass matrix, forces and inverse dynamics of the other where these are shorter."""
+    found = copy(recursive)
+    found.take_mass_matrix(embedding)
+    if count(list(embedding.bias)).total < count(list(recursive.bias)).total:
+        found.bias = embedding.bias
+    if count(list(embedding.inverse_dynamics)).total < count(list(recursive.inverse_dynamics)).total:
+        found.inverse_dynamics = embedding.inverse_dynamics
+    return found
+
+
+def _count(blocks: LoopBlocks) -> int:
+    outputs, checks = blocks.dynamics()
+    return count([*outputs, *checks]).total
+
+
+def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> bool:
+    """Whether articulated bodies can be used at the reference and at most other configurations of the mechanism."""
+    m = kinematics.mechanism
+    numbers = {p.name: 1.0 if p.value is None else float(p.value) for p in m.parameters} | {
+        u.name: u.value for u in m.inputs
+    }
+    known = (*kinematics.names, *kinematics.velocity_names, *numbers, "t")
+    evaluate = compile_evaluator([bodies.is_sound], known)
+    rest = [0.0] * len(kinematics.velocity_names)
+    found = [bool(evaluate([*sample, *rest, *numbers.values(), 0.0])[0] == 1.0) for sample in mobility.samples]
+    return found[0] and 2 * sum(found) > len(found)
+
+
+def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
+    """Without constraints.
+
+    The mass matrix of a large tree is not even formed where factoring it would take more than the recursive method does
+    in all.
+    """
+    recursive = METHODS["recursive"](kinematics)
+    assert recursive.accelerations is not None
+    operations = {"recursive": count(list(recursive.accelerations)).total}
+    factoring = factoring_operations(kinematics.parent)
+    large = not is_unrolled(kinematics.parent, Limits().unrolled)
+    if factoring >= operations["recursive"] and has_long_paths(kinematics.parent):
+        return recursive, Choice("recursive", {"embedding": factoring, **operations})
+    embedding = METHODS["embedding"](kinematics)
+    if large:
+        lower = [x for i, row in enumerate(embedding.mass_matrix) for x in row[: i + 1]]
+        total = factoring + count([*lower, *embedding.bias]).total
+    else:
+        turned = embedding.turned
+        mass, bias = turned.system if turned else (embedding.mass_matrix, embedding.bias)
+        solution = solve(factorize(mass, kinematics.parent), [-h for h in bias])
+        total = count(turned.accelerations(solution) if turned else solution).total
+    operations = {"embedding": total, **operations}
+    chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding
+    return chosen, Choice(chosen.method, operations)

@@ -1,0 +1,204 @@
+"""loops whose state is far from any change point -> the shortest straight-line form.
+
+All motions are v = B y with the preferred velocities y: B follows from the rows by orthogonal combinations
+(:mod:`..linear_algebra`), block by block, so that every leg of a platform is paid for alone.  With weights W = S^-2 of
+the coordinates the nearest motion is the one with B^T W (v - B y) = 0, of as many unknowns as there are freedoms; so
+the step onto the constraints, velocities and accelerations share B, and no matrix has the size of the rows.
+
+Where columns of B are long, or what they follow from is nearly dependent, the forms of :mod:`.loop_blocks` take over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from ...base.limits.constraints import LOST
+from ...base.limits.crossings import NEAR_SQUARE
+from ...graph.core import Expr
+from ...graph.substitute import substitute
+from ..linear_algebra import OrthogonalFactor, Row, SparseFactor, connected, factorize, fronts, times, work
+from .embedded_loops import SPREAD, embedded_accelerations
+from .leg_motions import Leg, Motions
+from .loop_blocks import LoopBlocks, largest, total_magnitude
+
+ENDLESS = 1e300  #: the length of a step that is not known here
+ROW = 64  #: columns beside one from which on rows tell what is near, as columns of 160 four-bars no longer can
+
+
+class RegularLoops:
+    """The expressions of both blocks.
+
+    Parameters
+    ----------
+    loops : LoopBlocks
+        Those that take over.
+    """
+
+    def __init__(self, loops: LoopBlocks) -> None:
+        self.loops, self.terms = loops, loops.terms
+        preferred = set(self.terms.preferred)
+        self.dependent = [k for k in range(self.terms.n_v) if k not in preferred]
+        place = {k: j for j, k in enumerate(self.dependent)}
+        self._left = [{place[k]: x for k, x in row.items() if k in place} for row in loops.rows]
+        self.order = fronts(self._left, len(self.dependent))
+        weights = [1.0 / s for s in loops.s]
+        self.weights = [x * x for x in weights]
+
+    @property
+    def estimate(self) -> int:
+        """About how many multiplications the linear algebra takes, by the pattern alone."""
+        total = work(self.order or (), 1) + self.terms.n_dof**3 // 6
+        for part in connected(self._left):
+            own = [row for row, left in zip(self.loops.rows, self._left, strict=True) if not part.isdisjoint(left)]
+            freedoms = len(set().union(*own)) - len(part)
+            total += len(part) * freedoms * (freedoms + 2)
+        return total
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a mass matrix, all rows are of positions, and hold the dependent velocities."""
+        return self.order is not None and self.loops.h == len(self.loops.J) and not self.terms.by_columns
+
+    # -- motions --------------------------------------------------------------------------------------------------
+    @cached_property
+    def _factor(self) -> OrthogonalFactor:
+        assert self.order is not None
+        return OrthogonalFactor(self._left, len(self.dependent), self.order)
+
+    def _particular(self, right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+        """x (n,) with C_q x = right and no independent part, and what redundant rows leave of right."""
+        x = [self.terms.graph.zero] * self.terms.n_v
+        found, left = self._factor.solve(right)
+        for k, value in zip(self.dependent, found, strict=True):
+            x[k] = value
+        return x, left
+
+    @cached_property
+    def _motions(self) -> Motions:
+        """B (n rows of f)."""
+        zero = self.terms.graph.zero
+        columns = [self._particular([-row.get(k, zero) for row in self.loops.rows])[0] for k in self.terms.preferred]
+        for k, column in zip(self.terms.preferred, columns, strict=True):
+            column[k] = self.terms.graph.one
+        rows = [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
+        return Motions(rows, self.terms.n_dof, self._legs())
+
+    def _legs(self) -> list[Leg]:
+        """The parts that fewer rows hold than freedoms drive."""
+        graph, m, place = self.terms.graph, len(self._left), {k: j for j, k in enumerate(self.terms.preferred)}
+        found = []
+        for part in self._factor.parts:
+            held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
+            drive = [{place[k]: -x for k, x in self.loops.rows[i].items() if k in place} for i in held]
+            if len(held) >= len(set().union(*drive)):
+                continue
+            unit = [self._factor.solve([graph.one if j == i else graph.zero for j in range(m)])[0] for i in held]
+            inverse = [{j: x[k] for j, x in enumerate(unit) if not x[k].is_zero} for k in sorted(part)]
+            found.append(Leg(tuple(self.dependent[k] for k in sorted(part)), inverse, drive))
+        return found
+
+    @cached_property
+    def _weighted(self) -> list[Row]:
+        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._motions.columns]
+
+    @cached_property
+    def _products(self) -> list[Row]:
+        """B^T W B."""
+        f = range(self.terms.n_dof)
+        lower = self._motions.gram([{k: x} for k, x in enumerate(self.weights)])
+        return [{j: lower[key] for j in f if (key := (max(i, j), min(i, j))) in lower} for i in f]
+
+    @cached_property
+    def _nearest(self) -> SparseFactor:
+        return factorize(self._products)
+
+    def _along(self, x: Sequence[Expr]) -> list[Expr]:
+        """y (f,) for which B y is nearest to x."""
+        return self._nearest.solve(times(self._weighted, x))
+
+    @cached_property
+    def _in_a_row(self) -> bool:
+        """Whether a column is compared with so many others that what it has across them is small away from change
+        points, too: 0.4 / n of the last crank of n four-bars in a row, where every loop leaves a row to the next.
+        """
+        return self._factor.longest > ROW
+
+    def _follows(self) -> list[Expr]:
+        """Whether the dependent velocities follow well from the independent ones: not by columns that are nearly
+        parallel, or short beside others, nor so that they move many times as fast.
+        """
+        graph, s = self.terms.graph, self.loops.s
+        found = self._across(LOST if self._in_a_row else NEAR_SQUARE)
+        for j, k in enumerate(self.terms.preferred):
+            square = self._products[j][j] * (s[k] * s[k])
+            found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
+        return found
+
+    def _across(self, limit: float) -> list[Expr]:
+        """Whether every column has more than this part of its square across those before it."""
+        graph, s = self.terms.graph, self.loops.s
+        scales = [s[k] * s[k] for k in self.dependent]
+        lengths = [x * k for x, k in zip(self._factor.squares, scales, strict=True)]
+        least: dict[int, Expr] = {}
+        for part in self._factor.parts:
+            least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * NEAR_SQUARE)
+        found = []
+        for columns, usual, apart in self._factor.apart:
+            for k in columns:
+                usual, apart = usual * graph.apply("max", lengths[k], least[k]), apart * scales[k]
+            found.append(graph.apply("lt", usual * limit, apart))
+        return found
+
+    def _far(self) -> list[Expr]:
+        """Conditions besides by which no change point is near: none where columns tell that already."""
+        if not self._in_a_row:
+            return []
+        columns = self.loops.all_of(self._across(NEAR_SQUARE))
+        return [self.terms.graph.apply("or", columns, self.loops.separate_rows())]
+
+    @property
+    def guards(self) -> list[Expr]:
+        """As of LoopBlocks."""
+        return self.loops.guards
+
+    # -- blocks ---------------------------------------------------------------------------------------------------
+    def closing(self) -> list[Expr]:
+        """As of LoopBlocks; the length is endless where another form is to take the step."""
+        graph, loops = self.terms.graph, self.loops
+        e = loops.residuals
+        size = total_magnitude(e) * (loops.unit / float(loops.h))
+        d, rest = self._particular(e)
+        left = total_magnitude(rest) * loops.unit if rest else graph.zero
+        dz = [x - y for x, y in zip(d, times(self._motions.rows, self._along(d)), strict=True)]
+        length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
+        length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
+        return [size, left, length, *(-x for x in dz)]
+
+    @cached_property
+    def _rate(self) -> list[Expr]:
+        return [x * i for x, i in zip(self.terms.constraint_rate, self.loops.inverse, strict=True)]
+
+    @cached_property
+    def moved(self) -> list[Expr]:
+        """Projected velocities (n,)."""
+        terms = self.terms
+        v = [terms.graph.symbol(name) for name in terms.v]
+        given, _ = self._particular([-x for x in self._rate])
+        y = [v[k] for k in terms.preferred]
+        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions.rows, y), strict=True)]
+        y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
+        return [a + b for a, b in zip(given, times(self._motions.rows, y), strict=True)]
+
+    def dynamics(self) -> tuple[list[Expr], list[Expr]]:
+        """As of LoopBlocks; where it is sound, no change point is near."""
+        terms = self.terms
+        v = [terms.graph.symbol(name) for name in terms.v]
+        here = substitute([*terms.bias, *terms.gamma], dict(zip(v, self.moved, strict=True)))
+        gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
+        given, _ = self._particular([-x for x in gamma])
+        a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
+        conditions = [*self._follows(), *self._far(), self.loops.long_rows()]
+        if self.loops.redundant:  # whose rates may contradict each other
+            conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
+        return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks

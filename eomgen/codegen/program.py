@@ -1,0 +1,288 @@
+"""Frozen types of the stage program: which functions to generate, of which inputs, sharing which values.
+
+Values that depend on parameters alone are hoisted: computed once for a set of parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from functools import cached_property
+from math import prod
+from typing import Any
+
+from ..base.kernel_table import Sizes
+from ..equations.tree_equations import LinearSystem
+from ..graph.core import Expr, Graph
+from ..graph.count import Operations, count
+from ..graph.traverse import LEAVES, reachable
+from ..records import dataclass
+from .held_columns import HeldColumns
+from .loops.block_groups import REGULAR, USUAL
+
+
+def hoist(graph: Graph, roots: Sequence[Expr], parameters: Sequence[str]) -> tuple[tuple[Expr, ...], frozenset[int]]:
+    """Find the maximal operations of parameters only.
+
+    Returns
+    -------
+    hoisted : tuple of Expr
+        Operations of parameters and numbers only that something else uses, ascending by id.
+    parameter_only : frozenset of int
+        Ids of all operations of parameters and numbers only.
+    """
+    nodes = graph.nodes
+    names = frozenset(parameters)
+    fixed: set[int] = set()  # leaves included
+    inner: set[int] = set()
+    hoisted: set[int] = set()
+    for i in reachable(graph, (y.id for y in roots)):
+        node = nodes[i]
+        if node[0] in LEAVES:
+            if node[0] == "const" or node[1] in names:
+                fixed.add(i)
+        elif all(k in fixed for k in node[1:]):
+            fixed.add(i)
+            inner.add(i)
+        else:
+            hoisted.update(k for k in node[1:] if k in inner)
+    hoisted.update(y.id for y in roots if y.id in inner)
+    return tuple(Expr(graph, i) for i in sorted(hoisted)), frozenset(inner)
+
+
+def count_apart(outputs: Sequence[Expr], parameter_only: frozenset[int]) -> Operations:
+    """Operations of the outputs without those of parameters only."""
+    if not outputs:
+        return Operations()
+    graph = outputs[0].graph
+    used = reachable(graph, (y.id for y in outputs))
+    every, apart = count(outputs), count([Expr(graph, i) for i in used if i in parameter_only])
+    return Operations(
+        every.multiplications - apart.multiplications,
+        every.additions - apart.additions,
+        every.divisions - apart.divisions,
+        every.negations - apart.negations,
+        _difference(every.functions, apart.functions),
+        _difference(every.choices, apart.choices),
+    )
+
+
+def _difference(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
+    return {name: n - b.get(name, 0) for name, n in a.items() if n != b.get(name, 0)}
+
+
+#: Blocks that only trees have whose accelerations are known without their mass matrix.
+BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Sizes at which the generated code changes its form; every field changes the sources."""
+
+    #: trees whose mass matrix takes no more to factor than that of a chain of so many velocities get a straight-line
+    #: rhs, larger ones loops
+    unrolled: int = 24
+    unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
+    jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
+    jacobian_recursive: int = 40_000  #: the same of one made by recursion over composite bodies
+    #: pairs of bodies in contacts between groups above which derivatives are made direction by direction: each pair has
+    #: up to 36 entries, which as text take some 10 kB, against 1 kB a body of one direction
+    jacobian_pairs: int = 64
+    statements: int = 1500  #: statements in one generated function at most
+    #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open
+    #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
+    #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
+    rolled: int = 16_000
+    #: The same where all functions together are longer than ``long``, so that they take long to compile.  Measured
+    #: (benchmarks/tracks.py) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
+    rolled_of_long: int = 2_500
+    long: int = 50_000
+    #: Functions of mechanisms with more first-order states go through these in loops too, whatever their length.
+    #: Measured on a cart with two wheels on a bed of soil: 4 kB of text for each cell of three states instead of 14, in
+    #: the same time of a call, 3.4 us for 40 cells and 15 us for 200.
+    states: int = 60
+    #: Functions of more operations are searched for what repeats itself without a mark of the graph (constraint rows,
+    #: their factor, derivatives).  Short loops keep more in memory, so the two blocks of the right-hand side of loops
+    #: are searched only above the second number.  Measured (rows of 160 and 320 four-bars), microseconds of loops and
+    #: of text without: 22 and 17 at 25,000 operations, 41 and 50 at 49,000, where the text without leaves the
+    #: second-level cache and takes twice as long to compile.
+    repeated: int = 32_000
+    repeated_dynamics: int = 40_000
+
+
+@dataclass(frozen=True)
+class Port:
+    """A named group of inputs of a function, in order."""
+
+    name: str
+    symbols: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A straight-line function of the concatenated inputs of its ports.
+
+    Attributes
+    ----------
+    checks : tuple of Expr
+        Where one is <= 0 the function reports a singular mass matrix (status 2); NaN shows in the result.
+    guards : tuple of Expr
+        Looked at before all else: where one is <= 0 nothing need be found, and C for one state ends there (status 2).
+    public : bool
+        Whether users call it; else only drivers do.
+    """
+
+    name: str
+    ports: tuple[Port, ...]
+    outputs: tuple[Expr, ...]
+    shape: tuple[int, ...]
+    checks: tuple[Expr, ...] = ()
+    guards: tuple[Expr, ...] = ()
+    public: bool = True
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Symbol names of x, in order."""
+        return tuple(s for port in self.ports for s in port.symbols)
+
+    @property
+    def roots(self) -> tuple[Expr, ...]:
+        """All that is evaluated."""
+        return (*self.outputs, *self.checks, *self.guards)
+
+    @property
+    def n_in(self) -> int:
+        """Length of x."""
+        return sum(len(port.symbols) for port in self.ports)
+
+    @property
+    def n_out(self) -> int:
+        """Length of out."""
+        return len(self.outputs)
+
+
+@dataclass(frozen=True)
+class KernelDriver:
+    """A public function that target code with loops and Newton iterations computes from blocks.
+
+    Attributes
+    ----------
+    blocks : tuple of str
+        Names of the blocks it calls.
+    """
+
+    name: str
+    ports: tuple[Port, ...]
+    shape: tuple[int, ...]
+    blocks: tuple[str, ...]
+
+    @property
+    def n_in(self) -> int:
+        """Length of x."""
+        return sum(len(port.symbols) for port in self.ports)
+
+    @property
+    def n_out(self) -> int:
+        """Length of out."""
+        return prod(self.shape)
+
+
+@dataclass(frozen=True)
+class Program:
+    """Everything a target needs.
+
+    Attributes
+    ----------
+    name : str
+        Prefix of all public functions.
+    metadata : dict
+        What model.json says: names, sizes, units, values, shapes and operations of the kernels.
+    hoisted : tuple of Expr
+        Values of parameters only, computed once per parameter set and kept in ``c[n_p:]``.
+    parameter_only : frozenset of int
+        Ids of all nodes that no block evaluates: the hoisted values and what they are made of.
+    counts : mapping of str to Operations
+        Per block, hoisted work apart under ``precompute``.
+    """
+
+    name: str
+    metadata: dict[str, Any]
+    graph: Graph
+    time: str
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+    parameters: tuple[str, ...]
+    inputs: tuple[str, ...]
+    sizes: Sizes
+    blocks: tuple[Block, ...]
+    drivers: tuple[KernelDriver, ...]
+    hoisted: tuple[Expr, ...]
+    parameter_only: frozenset[int]
+    preferred: tuple[int, ...]
+    parent: tuple[int, ...]
+    counts: Mapping[str, Operations]
+    quaternion_slots: tuple[tuple[int, int], ...] = ()
+    given_rates: bool = False
+    coordinate_of: tuple[int, ...] = ()
+    n_states: int = 0  #: first-order states, the last of the velocities
+    limits: Limits = field(default_factory=Limits)
+    system: LinearSystem | None = None
+    projects: bool = True
+    held: HeldColumns | None = None
+
+    @property
+    def has_loops(self) -> bool:
+        """Whether there are constraint rows, so that states are projected."""
+        return self.sizes.n_c > 0
+
+    @property
+    def block_names(self) -> frozenset[str]:
+        """Names of all blocks."""
+        return frozenset(b.name for b in self.blocks)
+
+    def is_rolled(self, name: str) -> bool:
+        """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
+        if self.n_states > self.limits.states:
+            return True
+        long = sum(counted.total for counted in self.counts.values()) > self.limits.long
+        return self.counts[name].total > (self.limits.rolled_of_long if long else self.limits.rolled)
+
+    def is_searched(self, name: str) -> bool:
+        """Whether what is alike in a block, or in ``precompute``, is found without marks of the graph too."""
+        limits = self.limits
+        most = limits.repeated_dynamics if name in (*USUAL, *REGULAR) else limits.repeated
+        return self.counts[name].total > most
+
+    @cached_property
+    def twins(self) -> dict[str, str]:
+        """Blocks that compute exactly what an earlier one does -> the name of that one; never blocks of drivers."""
+        needed = {name for d in self.drivers for name in d.blocks}
+        first: dict[tuple[object, ...], str] = {}
+        found = {}
+        for b in self.blocks:
+            key = (b.inputs, tuple(y.id for y in b.outputs), tuple(y.id for y in b.checks))
+            if first.setdefault(key, b.name) != b.name and b.name not in needed:
+                found[b.name] = first[key]
+        return found
+
+    @property
+    def composes_terms(self) -> bool:
+        """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
+        return not self.tree_by_columns and any("bias" in d.blocks for d in self.drivers)
+
+    @property
+    def by_columns(self) -> bool:
+        """Whether drivers make the mass matrix, and the Jacobian of a tree, column by column."""
+        return not self.block_names.isdisjoint(BY_COLUMNS)
+
+    @property
+    def tree_by_columns(self) -> bool:
+        """Whether that is a tree, whose drivers need nothing else."""
+        return self.by_columns and not self.has_loops
+
+    @property
+    def kernels(self) -> tuple[Block | KernelDriver, ...]:
+        """The public functions, in the order of the metadata."""
+        found: dict[str, Block | KernelDriver] = {b.name: b for b in self.blocks if b.public}
+        found.update((d.name, d) for d in self.drivers)
+        return tuple(found[name] for name in self.metadata["kernels"])

@@ -1,0 +1,629 @@
+"""Kinematics with laws that depend on reactions -> kinematics in which forces and reactions are solved together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base import algebra
+from ..base.algebra import correlated
+from ..base.limits.constraints import MEASURED
+from ..base.limits.numbers import SINGULAR
+from ..base.limits.systems import UNTOUCHED
+from ..base.operations import CONDITION, OPERATIONS
+from ..describe.mechanism import Event, Mechanism
+from ..equations import METHODS
+from ..equations.tree_equations import TreeEquations
+from ..errors import ModelError, Problem
+from ..forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
+from ..forces.branches import where
+from ..forces.joint_reactions import is_carried, multiplier_of, reaction_of
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import substitute, symbols_of
+from ..graph.traverse import operands, reachable
+from ..kinematics import Kinematics
+from ..kinematics.carried_reactions import carried_reactions
+from ..kinematics.eliminate import Matrix, dot, eliminate, total
+from ..kinematics.kinematics import ForceTerms
+from ..kinematics.mobility import Mobility
+from ..kinematics.reaction_parts import force_and_moment
+from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
+from ..kinematics.switched import SwitchedRow, switched_rows
+from ..kinematics.wrenches import JointWrenches, Row6
+from .factor import factorize, solve
+from .held_constraints import LinearValues, closed, hold, solve_switched, switched_matrix
+from .laws import MANY, laws_in, pieces_of, solve_laws
+
+
+def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
+    """What the named multipliers stand for: l = -(C_q C_q^T)^-1 C_q (M a + h), of independent constraints."""
+    given = kinematics.mechanism.given
+    if given is None or not given.multipliers:
+        return {}
+    graph, rows = kinematics.graph, kinematics.constraints.jacobian
+    gram = [[_dot(graph.zero, one, other) for other in rows] for one in rows]
+    right = [-_dot(graph.zero, row, equations.inverse_dynamics) for row in rows]
+    values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
+    names = {f"constraint_{k + 1}": name for k, name in enumerate(given.multipliers)}
+    return {
+        graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
+    }
+
+
+def _dot(total: Expr, one: tuple[Expr, ...], other: tuple[Expr, ...]) -> Expr:
+    for x, y in zip(one, other, strict=True):
+        total = total + x * y
+    return total
+
+
+PROBES = 3  #: states at which components are looked at
+_REMEDY = (
+    "let the forces act in the plane of the loop, or give a joint of the loop more freedom (cylindrical, spherical); "
+    "reactions(t, x) gives the smallest of all solutions"
+)
+
+
+def refuse_undetermined(
+    kinematics: Kinematics,
+    every: Mapping[str, Row6],
+    idle: Sequence[Expr],
+    values: Mapping[Expr, Expr],
+    users: Users,
+) -> None:
+    """Refuse what depends on multipliers that no equation determines, unless they are 0 in the smallest reactions.
+
+    Parameters
+    ----------
+    every : mapping
+        Wrench of each joint, along the axes of S.
+    idle : sequence
+        The multipliers of equations that vanish, on which these wrenches depend.
+    values : mapping
+        What the symbols of reactions and multipliers stand for, in terms of ``idle`` too.
+
+    Raises
+    ------
+    ModelError
+    """
+    if is_zero(list(jacobian(list(values.values()), list(idle)).values())):
+        return
+    open_ = _open(kinematics, every, idle)
+    if not open_:
+        return
+    graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
+    problems = list[Problem]()
+    for name, quantity in mechanism.reaction_quantities.items():
+        symbols = motion.derived_symbols(mechanism, {name})
+        if _depends(substitute([graph.symbol(name)], symbols), values, open_):
+            part = f"reaction({quantity.of}).{quantity.part}" if quantity.part else f"multiplier({quantity.of})"
+            message = f"{part} is undetermined: rigid bodies do not determine how the joints of a loop share this load"
+            problems.append(mechanism.problem(quantity.path, message, _REMEDY, "EG-UNDETERMINED"))
+    for force in mechanism.forces:
+        if force.by_reaction and _depends(users.laws.get(force.name, ()), values, open_):
+            message = f"the load of joint {getattr(force, 'joint', '')!r} is undetermined: rigid bodies do not "
+            message += "determine how the joints of a loop share it"
+            problems.append(mechanism.problem(f"forces.{force.name}", message, _REMEDY, "EG-UNDETERMINED"))
+    if problems:
+        raise ModelError(problems)
+
+
+def _depends(found: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
+    """Whether what is asked for depends on such multipliers."""
+    slopes = jacobian(substitute(list(found), dict(values)), list(on))
+    return not is_zero(list(slopes.values()))
+
+
+def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr]) -> list[Expr]:
+    """The multipliers that are not 0 in the smallest reactions, nor independent of such ones."""
+    parts = list[list[Expr]]()
+    for spec in kinematics.mechanism.joints:
+        if spec.name in every:
+            parts += [list(part) for part in force_and_moment(kinematics.motion, spec, every[spec.name])]
+    flat = [x for part in parts for x in part]
+    slopes = jacobian(flat, list(idle))
+    base = substitute(flat, dict.fromkeys(idle, kinematics.graph.zero))
+    places = list(slopes)
+    numbers = _probed([*base, *slopes.values()])
+    related = np.zeros((len(idle), len(idle)), dtype=bool)
+    moved = np.zeros(len(idle), dtype=bool)
+    for values in numbers:
+        S = np.zeros((len(flat), len(idle)))
+        for (i, j), d in zip(places, values[len(flat) :], strict=True):
+            S[i, j] = d
+        for k in range(0, len(flat), 3):  # forces and moments apart: their scales differ
+            some, wrench = S[k : k + 3], values[k : k + 3]
+            related |= np.abs(some.T @ some) > UNTOUCHED
+            moved |= np.abs(some.T @ wrench) > UNTOUCHED
+    for _ in idle:  # what is related to something open is open too
+        moved = moved | related @ moved
+    return [multiplier for multiplier, is_open in zip(idle, moved, strict=True) if is_open]
+
+
+def _probed(expressions: Sequence[Expr]) -> np.ndarray:
+    expressions = _with_every_choice(expressions)
+    names = sorted(symbols_of(expressions))
+    values = np.random.default_rng(2).uniform(0.5, 1.5, (PROBES, len(names)))
+    with np.errstate(all="ignore"):
+        evaluate = compile_evaluator(expressions, names)
+        return np.array([evaluate(row.tolist()) for row in values])
+
+
+def _with_every_choice(expressions: Sequence[Expr]) -> list[Expr]:
+    """Expressions in which a choice is a combination of its values, so that what acts far from a state is seen too."""
+    graph = expressions[0].graph
+    new: dict[int, Expr] = {}
+    for i in reachable(graph, (x.id for x in expressions)):
+        operation = graph.nodes[i][0]
+        parts = [new[k] for k in operands(graph.nodes[i])]
+        row = OPERATIONS.get(operation)
+        if not parts or row is None or not row.bends:
+            new[i] = Expr(graph, graph.make(operation, *(x.id for x in parts)) if parts else i)
+            continue
+        key = graph.nodes[i][1] if row.chooses else i  # choices by one condition are made together
+        if row.kind == CONDITION or operation == "sign":
+            new[i] = graph.symbol(f"choice {i}")
+            continue
+        values = parts[1:] if row.chooses else parts
+        new[i] = graph.zero
+        for k, x in enumerate(values):
+            new[i] = new[i] + graph.symbol(f"choice {key}.{k}") * x
+    return [new[x.id] for x in expressions]
+
+
+def is_zero(expressions: Sequence[Expr]) -> bool:
+    """Whether expressions vanish whatever their symbols are."""
+    left = [x for x in expressions if not x.is_zero]
+    return not left or bool((np.abs(_probed(left)) < UNTOUCHED).all())
+
+
+class Users(NamedTuple):
+    """The laws that speak of reactions, by force element; and, through the mechanism, all other expressions that do."""
+
+    mechanism: Mechanism
+    laws: Mapping[str, Sequence[Expr]]
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.laws)
+
+    @property
+    def paths(self) -> list[str]:
+        """Places in the description, forces first; constraints that close where nothing else speaks of reactions."""
+        asked = [q.path for q in self.mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
+        held = [f"constraints.{s.constraint.name}" for s in self.mechanism.switched if s.constraint is not None]
+        return [*(f"forces.{name}" for name in self.forces), *dict.fromkeys(asked)] or held
+
+    def verb(self, plural: str) -> str:
+        """The verb as it stands behind :meth:`together`."""
+        return plural if self.forces else f"{plural}s"
+
+    def together(self, message: str, remedy: str) -> Problem:
+        """A problem of all laws, or of the first expression that speaks of reactions."""
+        place = f"forces.{' and '.join(self.forces)}" if self.forces else self.paths[0]
+        return self.mechanism.problem(place, message, remedy, "EG-UNSUPPORTED")
+
+
+def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
+    """A law whose choices make so many pieces that it is not judged whether it has one solution."""
+    message = f"its law of a reaction has more than {MANY} pieces, made by abs, max, min, conditions and their products"
+    remedy = "write it as a sum of terms with fewer of them, which are judged one by one, or as a smooth function"
+    return mechanism.problem(f"forces.{force}", message, remedy, "EG-TOO-LARGE")
+
+
+def refuse_joints(kinematics: Kinematics) -> None:
+    """Refuse friction in joints whose reaction has no force across, or along, the z axis of S."""
+    graph, mechanism = kinematics.graph, kinematics.mechanism
+    specs, problems = {spec.name: spec for spec in mechanism.joints}, []
+    for force in mechanism.forces:
+        if not isinstance(force, ReactionFriction) or not isinstance(force.path, JointCoordinate):
+            continue
+        spec = specs[force.joint]
+        columns = spec.joint.subspace(graph, [kinematics.motion.coordinates[n][0] for n in spec.coordinates])
+        of = [velocity.of for velocity in spec.joint.velocities]
+        place = spec.coordinates.index(force.path.name)
+        own = columns[of.index(place)] if place in of else ()
+        turns = spec.joint.coordinates[place].kind == "angle"
+        straight = [[not part[2].is_zero and part[0].is_zero and part[1].is_zero for part in own]]
+        free = [any(not linear[k].is_zero for _, linear in columns) for k in range(3)]
+        if straight != [[turns, not turns]] or free[0] or free[1]:
+            message = f"joint {spec.name!r} is {spec.joint.type_name}, which has no force across one fixed axis"
+            remedy = "coefficient is known of revolute, prismatic and cylindrical joints; give coulomb instead"
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNSUPPORTED"))
+        elif force.thrust_radius is not None and free[2]:
+            message = f"thrust_radius is given, and joint {spec.name!r} slides along its axis, so it carries no thrust"
+            problems.append(
+                mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out", "EG-UNSUPPORTED")
+            )
+    if problems:
+        raise ModelError(problems)
+
+
+def without_inertia(kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]]) -> list[str]:
+    """What moves, by name, in a motion behind which a matrix has inertia at no configuration; nothing if there is none.
+
+    Where there is none at single configurations only, as Euler angles make it, a run that gets there says so.
+    """
+    values = {p.name: p.value for p in kinematics.mechanism.parameters}
+    if mobility.assumed or any(value is None for value in values.values()):
+        return []
+    flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
+    names = sorted(symbols_of(flat))
+    evaluator = compile_evaluator(flat, names)
+    weights = None
+    for place in mobility.samples or (mobility.q_reference,):
+        known = dict(zip(kinematics.names, place, strict=True)) | values
+        with np.errstate(all="ignore"):
+            M = np.reshape(evaluator([float(known.get(name) or 0.0) for name in names]), (n, n))
+        M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)  # M may be given by one of its triangles
+        if not np.isfinite(M).all():
+            continue
+        sizes, directions = algebra.eigh(correlated(M))
+        if not n or sizes[0] > SINGULAR:
+            return []
+        if weights is None:
+            weights = np.abs(directions[:, 0])
+    if weights is None:
+        return []
+    return [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
+
+
+def refuse_without_inertia(moved: Sequence[str], users: Users) -> None:
+    """Refuse a motion that loops leave, behind which there is no inertia."""
+    if moved:
+        message = f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} meets no inertia"
+        raise ModelError([users.together(message, "give every body mass, or inertia about its joint")])
+
+
+def refuse_redundant(mobility: Mobility, users: Users) -> None:
+    """Refuse mechanisms whose reactions are not unique."""
+    if not mobility.redundant:
+        return
+    message = "depends on the reaction of a joint, and reactions are not unique: "
+    message += f"{', '.join(mobility.redundant)} follow from the other constraints"
+    remedy = "release only these rows by joints with more freedom, or take a law without reactions"
+    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-UNDETERMINED") for path in users.paths])
+
+
+#: Equations of a mechanism onto which velocities are brought together with closed ones; of more they are judged only.
+MOST = 120
+
+
+class RowAfter(NamedTuple):
+    """One equation after an event: 1 where it has to hold, C' and its slopes by v, C and its size."""
+
+    on: Expr
+    jacobian: Sequence[Expr]
+    rate: Expr
+    error: Expr  #: C; 0 for equations of velocities
+    change: Expr  #: of it by the event
+    size: Expr
+
+
+@dataclass(frozen=True)
+class AfterEvents:
+    """The velocities after events.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    rows : sequence of SwitchedRow
+    columns : matrix
+        By row, the accelerations that a unit of its multiplier makes.
+    """
+
+    kinematics: Kinematics
+    rows: Sequence[SwitchedRow]
+    columns: Matrix
+
+    def velocities(self) -> dict[str, tuple[tuple[str, Expr], ...]]:
+        """New velocities by event, of those that close constraints or give coordinates or velocities new values."""
+        k = self.kinematics
+        moving = {*k.names, *k.velocity_names}
+        switched = [s.state for s in k.mechanism.switched]
+        found = dict[str, tuple[tuple[str, Expr], ...]]()
+        for event in k.mechanism.events:
+            given = dict(event.reset)
+            closes = any(given.get(state) == k.graph.one for state in switched)
+            if closes or not moving.isdisjoint(given):
+                found[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
+        return found
+
+    def _after(self, event: Event, closes: bool) -> list[Expr]:
+        k, given = self.kinematics, dict(event.reset)
+        new = {k.graph.symbol(name): value for name, value in given.items()}
+        v = given_v = substitute(list(k.v), new)
+        own = [self._closed(row, given, new) for row in self.rows]
+        lasting = list[RowAfter]()
+        if not {*k.names, *k.velocity_names}.isdisjoint(given):
+            lasting = self._lasting(own, new)
+            held = [one._replace(on=closed(row)) for one, row in zip(own, self.rows, strict=True)] if closes else own
+            acting = [*(lasting if len(lasting) <= MOST else ()), *held]
+            v = self._moved(v, v, acting, [self._shortest(one) for one in acting])
+        if closes:  # an impact
+            v = self._moved(v, given_v, own, substituted(self.columns, new))
+        fits = k.graph.one
+        for one in (*lasting, *own):
+            fits = fits * self._fulfilled(one, given_v, v)
+        no_number = k.graph.apply("log", fits)  # 0 where all are fulfilled
+        return [x + no_number for x in v]
+
+    def _moved(
+        self, v: Sequence[Expr], known: Sequence[Expr], acting: Sequence[RowAfter], columns: Matrix
+    ) -> list[Expr]:
+        """Velocities that fulfil equations, from v by multiples of columns; their rates are those at ``known``."""
+        rates = [_rate(one, known, v) for one in acting]
+        inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
+                 for one in acting]  # fmt: skip
+        A = switched_matrix(inner, [one.on for one in acting])
+        (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
+        return [
+            total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]) for j, before in enumerate(v)
+        ]
+
+    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
+        """Equations that may be no numbers while they are open: those of what closes now."""
+        on = given.get(row.state, closed(row))
+        rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
+        before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
+        return RowAfter(on, J, rate, error, error - before, self._size(row.kind))
+
+    def _lasting(self, own: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
+        """The equations of the mechanism that are connected with closed ones, beside which they have to hold."""
+        c, found = self.kinematics.constraints, []
+        on = own[0].on
+        for one in own[1:]:
+            on = where(one.on, 1.0, on)
+        reached = {k for row in self.rows for k, x in enumerate(row.jacobian) if not x.is_zero}
+        known = [{k for k, x in enumerate(row) if not x.is_zero} for row in c.jacobian]
+        while more := set[int]().union(*(row for row in known if row & reached)) - reached:
+            reached |= more
+        for i, (J, rate, kind) in enumerate(zip(c.jacobian, c.velocity, c.kinds, strict=True)):
+            if not known[i] & reached:
+                continue
+            value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
+            now, speed, *slopes = substitute([value, rate, *J], new)
+            found.append(RowAfter(on, slopes, speed, now, now - value, self._size(kind)))
+        return found
+
+    def _shortest(self, one: RowAfter) -> list[Expr]:
+        """Of an equation, the change of velocities in its direction, lengths in the length of the mechanism."""
+        sizes = (self._size(kind) for kind in self.kinematics.velocity_kinds)
+        return [-(j * size * size) for j, size in zip(one.jacobian, sizes, strict=True)]
+
+    def _size(self, kind: str) -> Expr:
+        return self.kinematics.length_scale if kind == "length" else self.kinematics.graph.one
+
+    def _fulfilled(self, one: RowAfter, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
+        """1 where an equation holds after the event, or need not hold, else 0."""
+        graph, sizes = self.kinematics.graph, [one.size]
+        for j, v, w in zip(one.jacobian, before, after, strict=True):
+            if not j.is_zero:
+                sizes.append(graph.apply("abs", j) * (graph.apply("abs", v) + graph.apply("abs", w)))
+        holds = graph.apply("le", graph.apply("abs", _rate(one, before, after)), MEASURED * total(sizes))
+        if not one.change.is_zero:  # an error that was there before may stay, and may go
+            off = graph.apply("min", graph.apply("abs", one.change), graph.apply("abs", one.error))
+            holds = holds * graph.apply("le", off, MEASURED * one.size)
+        return where(one.on, holds, 1.0)
+
+
+def _rate(one: RowAfter, known: Sequence[Expr], v: Sequence[Expr]) -> Expr:
+    """C' at velocities v, from that at known ones."""
+    return total([one.rate, *(j * (x - y) for j, x, y in zip(one.jacobian, v, known, strict=True) if not j.is_zero)])
+
+
+def substituted(matrix: Matrix, new: Mapping[Expr, Expr]) -> Matrix:
+    """A matrix with new values of symbols."""
+    return [substitute(list(row), new) for row in matrix]
+
+
+def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
+    """Replace the reactions that laws speak of by what they are at a state.
+
+    Raises
+    ------
+    ModelError
+        A reaction that rigid bodies do not determine, or of a joint that has none; a law of too many pieces.
+    """
+    refuse_joints(kinematics)
+    graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
+    laws, speaking = dict[Expr, None](), dict[str, list[Expr]]()
+    for terms in kinematics.forces:
+        own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_carried)]
+        if any(pieces_of(law, is_carried) is None for law in own):
+            raise ModelError([too_many_pieces(mechanism, terms.force.name)])
+        laws |= dict.fromkeys(own)
+        speaking |= {terms.force.name: own} if own else {}
+    asked = [graph.symbol(name) for name in mechanism.reaction_quantities]
+    seen = substitute(asked, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
+    names = sorted(name for name in symbols_of([*laws, *seen]) if is_carried(name))
+    forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
+    users = Users(mechanism, speaking)
+    rows, held = switched_rows(kinematics)
+    linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
+    linear = replace(linear, forces=(*linear.forces, *held))
+    symbols = [graph.symbol(name) for name in names]
+    values, known, after = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
+    if not (names or laws or rows):  # what is asked for is 0 in every state: the moment about a hinge
+        pass
+    elif laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
+        reactions, multipliers = _reactions(
+            linear, mobility, [*names, *(r.multiplier.node[1] for r in rows)], rows, users
+        )
+        measured = [*reactions, *(dot([*r.jacobian, r.rest], [*kinematics.a, graph.one]) for r in rows)]
+        unknown = [*forces, *(row.multiplier for row in rows)]
+        a, columns = _motion(linear, mobility, unknown, users)
+        found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
+        if rows:
+            by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
+            after = AfterEvents(kinematics, rows, by_multipliers).velocities()
+        still, gain = hold(found, rows, len(laws))
+        gain = _asked_at_states(kinematics, gain) if laws else gain
+        symbols += [row.multiplier for row in rows]
+        values, known = solve_laws(list(laws), symbols, still, gain)
+    else:  # outputs of a tree: they may speak of accelerations
+        values = _reactions(linear, mobility, names, (), users)[0]
+    motion = copy(motion)
+    motion.carried = dict(zip(names, values, strict=False))
+    whole = replace(kinematics, forces=(*kinematics.forces, *held))
+    solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
+    solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), velocities_after=after)
+    known_rows = tuple((row.label, row.state, row.kind) for row in rows)
+    return replace(solved, held_rows=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
+
+
+def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
+    """A gain of parameters alone as one of the state, so that it fails with a state, as others do, not before."""
+    if not kinematics.names or not symbols_of([k for row in gain for k in row]) <= {*kinematics.parameter_names}:
+        return gain
+    q = kinematics.graph.symbol(kinematics.names[0])
+    true = kinematics.graph.apply("le", 0.0, q * q)
+    return [[k * true for k in row] for row in gain]
+
+
+def _before_accelerations(mechanism: Mechanism) -> bool:
+    """Whether expressions speak of reactions that are evaluated before accelerations are known."""
+    found = [x for event in mechanism.events for x in (event.expression, *(value for _, value in event.reset))]
+    for state in mechanism.states:
+        found += [state.rate, *([] if state.sampled is None else [state.sampled])]
+    return not mechanism.reaction_quantities.keys().isdisjoint(symbols_of(found))
+
+
+def _loads(terms: ForceTerms) -> list[MarkerLoad | CoordinateLoad]:
+    return [*terms.marker_loads, *terms.coordinate_loads, *terms.marker_remainder, *terms.coordinate_remainder]
+
+
+def _with(loads: tuple[AnyLoad, ...], values: Iterator[Expr]) -> tuple[AnyLoad, ...]:
+    return tuple(with_entries(load, values) for load in loads)
+
+
+def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematics:
+    """Other parts of the entries of the loads."""
+    flat = [e for terms in kinematics.forces for load in _loads(terms) for e in entries_of(load)]
+    values = iter(substitute(flat, mapping) if mapping else flat)
+    found = []
+    for terms in kinematics.forces:
+        markers, along = _with(terms.marker_loads, values), _with(terms.coordinate_loads, values)
+        rest, rest_along = _with(terms.marker_remainder, values), _with(terms.coordinate_remainder, values)
+        found.append(ForceTerms(terms.force, markers, along, terms.potential, rest, rest_along))
+    return replace(kinematics, forces=tuple(found))
+
+
+# -- linear parts ---------------------------------------------------------------------------------------------------
+def _linear_parts(
+    solved: Sequence[Expr], measured: Sequence[Expr], forces: Sequence[Expr], a: Sequence[Expr], columns: Matrix
+) -> LinearValues:
+    """Expressions of accelerations and multipliers, ``solved``, in terms of the forces alone."""
+    graph = solved[0].graph
+    slopes = jacobian(list(measured), [*solved, *forces])
+    base = substitute(list(measured), dict.fromkeys([*solved, *forces], graph.zero))
+    still, gain = [], []
+    for i, N in enumerate(base):
+        row = [slopes.get((i, j), graph.zero) for j in range(len(solved) + len(forces))]
+        still.append(total([N, *(d * x for d, x in zip(row, a, strict=False))]))
+        own = row[len(solved) :]
+        gain.append(
+            [total([f, *(d * x for d, x in zip(row, c, strict=False))]) for f, c in zip(own, columns, strict=True)]
+        )
+    return LinearValues(still, gain)
+
+
+def _motion(
+    kinematics: Kinematics, mobility: Mobility, forces: Sequence[Expr], users: Users
+) -> tuple[list[Expr], Matrix]:
+    """[a; l] without the laws' forces, and what a unit of each of them changes: M a + h + C^T l = 0, C a = -gamma."""
+    graph, constraints = kinematics.graph, kinematics.constraints
+    tree = METHODS["embedding"](kinematics)
+    slopes, n = jacobian(list(tree.bias), list(forces)), len(kinematics.v)
+    bias = substitute(list(tree.bias), dict.fromkeys(forces, graph.zero))
+    C = [constraints.jacobian[i] for i in mobility.independent_rows]
+    gamma = [constraints.gamma[i] for i in mobility.independent_rows]
+    mass_matrix, parent = tree.mass_matrix, kinematics.parent
+    still = without_inertia(kinematics, mobility, mass_matrix)
+    if still and C:
+        # massless bodies that loops move: (M + s C^T C) a + C^T l = -h - s C^T gamma has the same solution
+        s = total([mass_matrix[i][i] for i in range(n)]) / total([x * x for row in C for x in row])
+        columns = [list(column) for column in zip(*C, strict=True)]
+        pushed = [[s * dot(one, other) for other in columns] for one in columns]
+        mass_matrix = tuple(
+            tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(mass_matrix, pushed, strict=True)
+        )
+        bias = [h + s * dot(column, gamma) for h, column in zip(bias, columns, strict=True)]
+        parent = tuple(range(-1, n - 1))
+        still = without_inertia(kinematics, mobility, mass_matrix)
+    refuse_without_inertia(still, users)
+    right = [[-h for h in bias]]
+    right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
+    factor = factorize(mass_matrix, parent)
+    free = [solve(factor, column) for column in right]
+    moved = [solve(factor, row) for row in C]
+    schur = [[dot(row, y) for y in moved] for row in C]
+    found = []
+    for k, a in enumerate(free):
+        gap = [dot(row, a) + (g if k == 0 else 0.0) for row, g in zip(C, gamma, strict=True)]
+        held = eliminate(schur, gap)
+        for y, multiplier in zip(moved, held, strict=True):
+            a = [x - multiplier * z for x, z in zip(a, y, strict=True)]
+        found.append([*a, *held])
+    return found[0], found[1:]
+
+
+def _reactions(
+    kinematics: Kinematics,
+    mobility: Mobility,
+    names: Sequence[str],
+    held: Sequence[SwitchedRow],
+    users: Users,
+) -> tuple[list[Expr], list[Expr]]:
+    """The components in terms of accelerations, multipliers and forces, and the multipliers of ``labels``.
+
+    Raises
+    ------
+    ModelError
+    """
+    graph = kinematics.graph
+    wrenches = JointWrenches(kinematics)
+    labels = [kinematics.constraints.labels[i] for i in mobility.independent_rows]
+    refuse_redundant(mobility, users)
+    own = {label: graph.symbol(f"multiplier[{label}]") for label in labels}
+    idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in own}
+    every = carried_reactions(wrenches, own | idle)
+    known = own | idle | {row.label: row.multiplier for row in held}
+    where = [reaction_of(name) for name in names]
+    reactions = []
+    for name, place in zip(names, where, strict=True):
+        row = multiplier_of(name)
+        if place is not None:
+            reactions.append(every[place[0]][place[1]])
+        else:
+            reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), users)])
+    if idle:
+        stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
+        refuse_undetermined(kinematics, every, list(idle.values()), stands, users)
+        reactions = substitute(reactions, dict.fromkeys(idle.values(), graph.zero))
+    return reactions, [own[label] for label in labels]
+
+
+def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users) -> str:
+    """The label of an equation, which may be named by its element where that has no other.
+
+    Raises
+    ------
+    ModelError
+    """
+    own = [label for label in labels if label.partition(".")[0] == name.partition(".")[0]]
+    if name in own:
+        return name
+    if name == name.partition(".")[0] and len(own) == 1:
+        return own[0]
+    message = f"there is no equation {name!r}" if own else f"{name.partition('.')[0]!r} has no equation"
+    quantities = kinematics.mechanism.reaction_quantities
+    path = next(q.path for q in quantities.values() if not q.part and q.of == name)
+    remedy = f"there are: {', '.join(own or labels) or 'none'}; joints have equations where they close a loop"
+    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])

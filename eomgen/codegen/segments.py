@@ -1,0 +1,547 @@
+"""A straight-line block -> alike segments of its statements, each kind to be written once, as a loop.
+
+A recursion over a big tree does the same for many bodies, but for where it reads and writes.  The graph marks where the
+part of another body begins.  Statements between two marks are a segment; segments whose statements are the same
+function of what they read are of one kind.  What has no marks is cut where it repeats itself.  Statements stay in the
+order in which the graph was made, but that the segments of one body in several passes come together where what they
+read allows, and that loops in a row become one loop: what a loop has stored would be read from memory member by member
+(loop fusion: K. Kennedy and K. McKinley, Maximizing loop parallelism and improving data locality via loop fusion and
+distribution, LNCS 768 (1994), 301-320).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from heapq import heapify, heappop, heappush
+from itertools import chain, groupby
+
+import numpy as np
+
+from ..graph.core import Expr, Graph
+from ..graph.traverse import LEAVES, parts, reachable
+from ..records import dataclass
+from .pair_sums import PairLists
+from .statements import CIRCULAR
+
+#: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
+Place = tuple[str, float]
+#: Statements with what they read by number, and which of them are checked or are results, how often.
+Signature = tuple[object, ...]
+
+
+class SegmentReader:
+    """Segments -> what they are made of, apart from where they read."""
+
+    def __init__(
+        self,
+        graph: Graph,
+        known: Mapping[int, Place],
+        results: Mapping[int, tuple[int, ...]],
+        checked: Collection[int],
+        alone: Collection[int],
+    ) -> None:
+        self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
+        self.alone = alone
+        self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
+
+    def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
+        """The signature of a segment, and what it reads from outside in order of first use."""
+        if segment not in self.found:
+            self.found[segment] = self._read(segment)
+        return self.found[segment]
+
+    def letters(self, segment: Sequence[int]) -> list[Signature]:
+        """What each statement of a segment is like: where it reads, and whether others need it, but not which."""
+        nodes, known = self.nodes, self.known
+        found = []
+        for i in segment:
+            node = nodes[i]
+            letter: list[object] = [node[0]]
+            for j in node[1:]:
+                place = known.get(j)
+                letter.append("w" if place is None else place[0])
+            letter += [len(self.results.get(i, ())), i in self.checked]
+            found.append(tuple(letter))
+        return found
+
+    def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
+        nodes, known = self.nodes, self.known
+        local = {i: k for k, i in enumerate(segment)}
+        numbers: dict[int, int] = {}
+        signature: list[object] = []
+        for i in segment:
+            node = nodes[i]
+            signature.append((node[0], i) if i in self.alone else node[0])
+            for j in node[1:]:
+                if j in self.alone and j not in self.known:
+                    continue  # a list
+                at = local.get(j)
+                if at is None:
+                    at = numbers.get(j)
+                    if at is None:
+                        numbers[j] = at = -1 - len(numbers)
+                        place = known.get(j)
+                        signature.append("w" if place is None else place[0])
+                signature.append(at)
+            if i in self.results:
+                signature.append((len(self.results[i]),))
+            if i in self.checked:
+                signature.append("check")
+        return tuple(signature), tuple(numbers)
+
+
+FEW = 3  #: segments of fewer members are not worth a loop
+#: A repeat saves the text of so many statements, or is left alone: a loop is a function of its own, which keeps what
+#: others read in memory.
+WORTH = 60
+
+
+def find_repeats(letters: Sequence[Hashable], longest: int, worth: int = WORTH) -> list[tuple[int, int, int]]:
+    """Start, period and count of stretches that repeat themselves, in order, none overlapping another.
+
+    Parameters
+    ----------
+    letters : sequence
+        What each statement is like, equal for those that may be alike.
+    longest : int
+        The longest period.
+    worth : int
+        How many statements a repeat spares at least.
+    """
+    numbers: dict[Hashable, int] = {}
+    text = np.array([numbers.setdefault(x, len(numbers)) for x in letters], dtype=np.int32)
+    waiting = []
+    for period in range(1, min(longest, len(text) // FEW) + 1):
+        waiting += [_offer(start, period, end) for start, end in _stretches(text, period, worth)]
+    heapify(waiting)
+    taken = np.zeros(len(text), dtype=bool)
+    found = []
+    while waiting:
+        _, period, start, end = heappop(waiting)
+        free = _free_parts(taken, start, end)
+        if free == [(start, end)]:
+            count = (end - start) // period
+            found.append((start, period, count))
+            taken[start : start + count * period] = True
+            continue
+        for first, last in free:
+            if _saved(first, period, last) >= worth:
+                heappush(waiting, _offer(first, period, last))
+    return sorted(found)
+
+
+def _saved(start: int, period: int, end: int) -> int:
+    """Statements that need not be written; none of too few members."""
+    count = (end - start) // period
+    return (count - 1) * period if count >= FEW else 0
+
+
+def _offer(start: int, period: int, end: int) -> tuple[int, int, int, int]:
+    return -_saved(start, period, end), period, start, end
+
+
+def _stretches(text: np.ndarray, period: int, worth: int) -> list[tuple[int, int]]:
+    """Start and end of all that repeat themselves after a period and are worth a loop."""
+    unlike = np.flatnonzero(text[period:] != text[:-period])
+    edges = np.concatenate(([-1], unlike, [len(text) - period]))
+    starts, ends = edges[:-1] + 1, edges[1:] + period
+    count = (ends - starts) // period
+    good = (count >= FEW) & ((count - 1) * period >= worth)
+    return list(zip(starts[good].tolist(), ends[good].tolist(), strict=True))
+
+
+def _free_parts(taken: np.ndarray, start: int, end: int) -> list[tuple[int, int]]:
+    """What of a stretch is not taken."""
+    free = np.concatenate(([True], taken[start:end], [True]))
+    edges = np.flatnonzero(free[1:] != free[:-1]) + start
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+Segment = tuple[int, ...]
+
+PERIOD = 16  #: kinds that alternate at most
+CALLS = 8  #: of functions that have to be spared
+SEVERAL = 4  #: members of one loop that belong with one of another at most
+ENDS = 2  #: members at the ends of two loops that may stay outside of the common one
+
+
+def fuse(reader: SegmentReader, segments: Sequence[Segment], longest: int, entries: Mapping[int, int]) -> list[Segment]:
+    """Segments of at most so many statements in an order in which they can be evaluated.
+
+    ``entries`` maps what is no statement, but an entry of a list, to the list that has to be there first.
+    """
+    return _Runs(reader, longest, entries).fused(_alternating(reader, segments, longest))
+
+
+def _alternating(reader: SegmentReader, segments: Sequence[Segment], longest: int) -> list[Segment]:
+    """Segments; groups of them that repeat themselves are one where that makes members of one kind."""
+    result: list[Segment] = []
+    done = 0
+    for start, period, count in find_repeats([reader.read(segment)[0] for segment in segments], PERIOD, CALLS):
+        groups = [segments[k : k + period] for k in range(start, start + count * period, period)]
+        if period == 1 or sum(map(len, groups[0])) > longest or any(s[0] in reader.alone for s in groups[0]):
+            continue
+        result += segments[done:start]
+        done = start + count * period
+        joined = [sum(group, ()) for group in groups]
+        kinds = Counter(reader.read(one)[0] for one in joined)
+        usual, often = kinds.most_common(1)[0]
+        for group, one in zip(groups, joined, strict=True):
+            result += [one] if often >= FEW and reader.read(one)[0] == usual else group
+    return [*result, *segments[done:]]
+
+
+class _Groups:
+    """Members of a run, so many together from one of the first on."""
+
+    def __init__(self, run: list[Segment], size: int, start: int) -> None:
+        self.run, self.size, self.start = run, size, start
+        ends = range(start + size, len(run) + 1, size)
+        self.groups: list[Segment] = [sum(run[end - size : end], ()) for end in ends]
+
+    def group(self, member: int) -> int:
+        """The number of the group of a member; those outside have numbers below and above."""
+        return (member - self.start) // self.size
+
+    def member(self, group: int) -> int:
+        """The first member of a group."""
+        return self.start + group * self.size
+
+
+class _Runs:
+    """Runs of segments of one kind, in order, and which of them a statement is in."""
+
+    def __init__(self, reader: SegmentReader, longest: int, entries: Mapping[int, int]) -> None:
+        self.reader, self.longest, self.entries = reader, longest, entries
+        self.runs: list[list[Segment]] = []  #: by number; a run that has become part of another is empty
+        self.order: list[int] = []  #: numbers in the order of evaluation
+        self.place: list[int] = []  #: of a number in that order
+        self.home: dict[int, tuple[int, int]] = {}  #: statement -> number of its run, member
+
+    def fused(self, segments: Sequence[Segment]) -> list[Segment]:
+        for _, group in groupby(segments, key=lambda segment: self.reader.read(segment)[0]):
+            run = list(group)
+            if len(run) < FEW or run[0][0] in self.reader.alone or not self._join(run):
+                self._insert(len(self.order), [run])
+        return [segment for k in self.order for segment in self.runs[k]]
+
+    def _insert(self, at: int, runs: Sequence[list[Segment]], instead: int = 0) -> None:
+        """Put runs at a place of the order, in the place of so many there."""
+        new = range(len(self.runs), len(self.runs) + len(runs))
+        self.runs += runs
+        self.place += [0] * len(runs)
+        for k in self.order[at : at + instead]:
+            self.runs[k] = []
+        self.order[at : at + instead] = new
+        for place in range(at, len(self.order)):
+            self.place[self.order[place]] = place
+        for k in new:
+            for m, segment in enumerate(self.runs[k]):
+                self.home.update(dict.fromkeys(segment, (k, m)))
+
+    def _reads(self, segment: Segment) -> Iterator[tuple[int, int]]:
+        """Place of the run, and member, of all that a segment reads."""
+        for i in self.reader.read(segment)[1]:
+            found = self.home.get(self.entries.get(i, i))
+            if found is not None:
+                yield self.place[found[0]], found[1]
+
+    def _kind(self, segment: Segment) -> object:
+        return self.reader.read(segment)[0]
+
+    def _join(self, run: list[Segment]) -> bool:
+        """Make one loop of a run and of that from which its middle member reads last, if that is possible.
+
+        Where one has several times as many members, so many of them belong with one of the other.
+        """
+        at, _ = max(self._reads(run[len(run) // 2]), default=(-1, 0))
+        if at < 0:
+            return False
+        other = self.runs[self.order[at]]
+        if other[0][0] in self.reader.alone:
+            return False
+        several, of_other = (max(1, round(len(a) / len(b))) for a, b in ((run, other), (other, run)))
+        if max(several, of_other) > SEVERAL or len(other[0]) * of_other + len(run[0]) * several > self.longest:
+            return False
+        return any(
+            self._join_groups(at, _Groups(other, of_other, one), _Groups(run, several, two))
+            for one in range(of_other)
+            for two in range(several)
+        )
+
+    def _join_groups(self, at: int, other: _Groups, run: _Groups) -> bool:
+        if len(run.groups) < FEW:
+            return False
+        middle = len(run.groups) // 2
+        place, last = max(self._reads(run.groups[middle]), default=(-1, 0))
+        if place != at:
+            return False
+        ahead = other.group(last) - middle  # group m of the run comes behind group m + ahead of the other
+        first, end = max(0, -ahead), min(len(run.groups), len(other.groups) - ahead)
+        if not first <= middle < end:
+            return False
+        joined = [(*other.groups[m + ahead], *run.groups[m]) for m in range(first, end)]
+        usual = self._kind(joined[middle - first])
+        if any(self._kind(one) != usual for one in joined[max(0, middle - first - 1) : middle - first + 2]):
+            return False  # told by three of them, without reading all
+        alike = [k for k, one in enumerate(joined) if self._kind(one) == usual]
+        first, end, joined = first + alike[0], first + alike[-1] + 1, joined[alike[0] : alike[-1] + 1]
+        most = max(len(run.groups), len(other.groups))
+        if len(alike) < max(FEW, most - ENDS) or len(alike) < len(joined):
+            return False
+        for m in range(first, end):
+            for place, member in self._reads(run.groups[m]):
+                if place > at or (place == at and other.group(member) > m + ahead):
+                    return False
+        before, after = other.member(first + ahead), other.member(end + ahead)
+        early, late = run.run[: run.member(first)], run.run[run.member(end) :]
+        if any(read >= (at, before) for one in early for read in self._reads(one)):
+            return False
+        self._insert(at, [part for part in (other.run[:before], early, joined, other.run[after:]) if part], 1)
+        if late:
+            self._insert(len(self.order), [late])
+        return True
+
+
+@dataclass(frozen=True)
+class SegmentKind:
+    """Segments that are the same function of what they read.
+
+    Attributes
+    ----------
+    members : tuple of tuple of int
+        Statements of every segment, in order of evaluation.
+    reads : tuple of tuple of int
+        Ids that every segment reads from outside, numbered alike.
+    exports : tuple of int
+        Indices of statements that later segments read; place ``k`` of the block of member ``m`` holds entry k.
+    start : int
+        Where in the work array the blocks of the members begin.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    reads: tuple[tuple[int, ...], ...]
+    exports: tuple[int, ...]
+    start: int
+
+
+@dataclass(frozen=True)
+class Segments:
+    """All of a block.
+
+    Attributes
+    ----------
+    kinds : tuple of SegmentKind
+    runs : tuple of (int, int)
+        Number of a kind, and how many of its members come next.
+    angles : tuple of int
+        Symbols whose sines and cosines are computed first, from places 0 and ``len(angles)`` of the work array on.
+    places : mapping of int to Place
+        Where each value is that a segment reads from outside.
+    results : mapping of int to tuple of int
+        Node id -> places in the result.
+    checks : frozenset of int
+    lists : PairLists
+        Of sums over pairs; each is a segment of its own.
+    work : int
+    """
+
+    kinds: tuple[SegmentKind, ...]
+    runs: tuple[tuple[int, int], ...]
+    angles: tuple[int, ...]
+    places: Mapping[int, Place]
+    results: Mapping[int, tuple[int, ...]]
+    checks: frozenset[int]
+    lists: PairLists
+    work: int
+
+    @property
+    def written(self) -> int:
+        """Statements that are written."""
+        return sum(len(kind.members[0]) for kind in self.kinds)
+
+    @property
+    def carried_out(self) -> int:
+        """Statements that are carried out."""
+        return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
+
+
+def find_segments(
+    graph: Graph,
+    outputs: Sequence[Expr],
+    checks: Sequence[Expr],
+    skipped: frozenset[int],
+    given: Mapping[int, Place],
+    longest: int,
+    searched: bool = True,
+) -> Segments:
+    """The segments of a block and the kinds that they are of.
+
+    Parameters
+    ----------
+    skipped : frozenset of int
+        Operations that are not evaluated here.
+    given : mapping of int to Place
+        Symbols and hoisted values.
+    longest : int
+        Most statements in a segment.
+    searched : bool
+        Whether statements between marks are searched for what repeats itself.
+    """
+    nodes = graph.nodes
+    places: dict[int, list[int]] = {}
+    for k, y in enumerate(outputs):
+        places.setdefault(y.id, []).append(k)
+    checked = frozenset(y.id for y in checks)
+    every = reachable(graph, [*places, *checked], stop=skipped)
+    statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
+    kept = {*places, *checked}
+    turning = [i for i in statements if nodes[i][0] in CIRCULAR and i not in kept]
+    turning = [i for i in turning if given.get(nodes[i][1], ("", 0))[0] == "x"]
+    angles = sorted({nodes[i][1] for i in turning})
+    known: dict[int, Place] = dict(given)
+    known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
+    slot = {a: k for k, a in enumerate(angles)}
+    known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
+    lists = PairLists(graph, statements, 2 * len(angles))
+    items = {i for i in statements if graph.calls and lists.call(i) is not None and not lists.is_list(i)}
+    known.update((i, ("w", lists.place(i))) for i in items)
+    alone = {*lists.every, *(items & kept)}
+    early = {*turning, *(items - kept)}
+    left = [i for i in statements if i not in early]
+    results = {i: tuple(at) for i, at in places.items()}
+    reader = SegmentReader(graph, known, results, checked, alone)
+    groups = _grouped(graph, _apart(parts(graph, left), alone), items - kept, alone)
+    common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
+    segments: list[tuple[int, ...]] = []
+    for group, alike in zip(groups, common, strict=True):
+        segments += [tuple(chain.from_iterable(group))] if alike else group
+    segments = _merged(segments, _kept(reader, segments))
+    if searched:
+        segments = _repeated(reader, segments, _kept(reader, segments), 2 * longest)
+        segments = _merged(segments, _kept(reader, segments))
+    segments = _shortened(segments, _kept(reader, segments), longest)
+    segments = fuse(reader, segments, longest, {i: nodes[i][1] for i in items - kept})
+    read = [reader.read(segment) for segment in segments]
+    return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
+
+
+def _apart(every: Sequence[tuple[int, Sequence[int]]], alone: Collection[int]) -> list[tuple[int, tuple[int, ...]]]:
+    """Segments cut so that some statements are segments of their own."""
+    found: list[tuple[int, tuple[int, ...]]] = []
+    for number, part in every:
+        for by_itself, grouped in groupby(part, key=alone.__contains__):
+            run = tuple(grouped)
+            found += [(0, (i,)) for i in run] if by_itself else [(number, run)]
+    return found
+
+
+def _grouped(
+    graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]], items: Collection[int], alone: Collection[int]
+) -> list[list[tuple[int, ...]]]:
+    """Segments of several passes over one body together, as far as what they read allows.
+
+    A segment goes to the last group that it reads from, unless that holds one of the same pass, or a list.  Entries of
+    lists (``items``) are there when their list is.
+    """
+    nodes = graph.nodes
+    groups: list[list[tuple[int, ...]]] = []
+    passes: list[set[int]] = []
+    home: dict[int, int] = {}
+    for number, segment in every:
+        read = (nodes[j][1] if j in items else j for i in segment for j in nodes[i][1:])
+        last = max((home.get(j, -1) for j in read), default=-1)
+        if last < 0 or not number or number in passes[last] or groups[last][0][0] in alone:
+            last = len(groups)
+            groups.append([])
+            passes.append(set())
+        groups[last].append(segment)
+        passes[last].add(number)
+        home.update(dict.fromkeys(segment, last))
+    return groups
+
+
+def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+    """Whether a segment is one of several of its kind."""
+    signatures = [reader.read(segment)[0] for segment in segments]
+    counts = Counter(signatures)
+    return [counts[signature] >= FEW for signature in signatures]
+
+
+def _kept(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+    """Whether a segment stays as it is: one of several of its kind, or a list."""
+    alike = _common(reader, segments)
+    return [segment[0] in reader.alone or common for segment, common in zip(segments, alike, strict=True)]
+
+
+def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool]) -> list[tuple[int, ...]]:
+    """Segments; rare ones that follow each other are one."""
+    result: list[tuple[int, ...]] = []
+    for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
+        every = [segment for segment, _ in run]
+        result += every if alike else [tuple(chain.from_iterable(every))]
+    return result
+
+
+def _repeated(
+    reader: SegmentReader, segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int
+) -> list[tuple[int, ...]]:
+    """Segments; rare ones are cut where they repeat themselves."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        done = 0
+        for start, period, count in () if alike else find_repeats(reader.letters(segment), longest):
+            result += [segment[done:start]] if start > done else []
+            done = start + period * count
+            result += [segment[k : k + period] for k in range(start, done, period)]
+        result += [segment[done:]] if done < len(segment) else []
+    return result
+
+
+def _shortened(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
+    """Segments; rare ones are as long as may be."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        step = len(segment) if alike else longest
+        result += [segment[k : k + step] for k in range(0, len(segment), step)]
+    return result
+
+
+def _laid_out(
+    segments: Sequence[tuple[int, ...]],
+    read: Sequence[tuple[Signature, tuple[int, ...]]],
+    angles: tuple[int, ...],
+    known: dict[int, Place],
+    results: Mapping[int, tuple[int, ...]],
+    checked: frozenset[int],
+    lists: PairLists,
+) -> Segments:
+    """Where every value goes that a later segment reads."""
+    number: dict[Signature, int] = {}
+    kind_of = [number.setdefault(signature, len(number)) for signature, _ in read]
+    members: list[list[int]] = [[] for _ in number]
+    for s, k in enumerate(kind_of):
+        members[k].append(s)
+    home: dict[int, tuple[int, int]] = {}  #: statement -> kind, index
+    for s, segment in enumerate(segments):
+        home.update((i, (kind_of[s], at)) for at, i in enumerate(segment))
+    first: list[dict[int, tuple[int, int]]] = [{} for _ in number]  #: index of an export -> who reads it first, where
+    for s, (_, reads) in enumerate(read):
+        for at, i in enumerate(reads):
+            if i in home:
+                k, index = home[i]
+                use = (kind_of[s], at)
+                if use < first[k].get(index, (len(number), 0)):
+                    first[k][index] = use
+    work = lists.end
+    kinds = []
+    for k, of in enumerate(members):
+        exports = tuple(sorted(first[k], key=first[k].__getitem__))
+        for m, s in enumerate(of):
+            base = work + m * len(exports)
+            known.update((segments[s][index], ("w", base + e)) for e, index in enumerate(exports))
+        kinds.append(SegmentKind(tuple(segments[s] for s in of), tuple(read[s][1] for s in of), exports, work))
+        work += len(of) * len(exports)
+    runs = tuple((k, len(list(run))) for k, run in groupby(kind_of))
+    return Segments(tuple(kinds), runs, angles, known, results, checked, lists, work)
