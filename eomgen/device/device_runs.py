@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from ..base.value_rules import read_count
 from ..errors import cannot, ill_shaped, no_choice
 from ..runtime.given_start import Span
-from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
-from ..simulation.tolerances import check_tolerances
+from ..simulation.run_arguments import check_method, check_tolerances, declare, find_span, ordered_times, own_step
 from .arrays_on_device import Array
 from .device_functions import DeviceFunctions
 

@@ -1,19 +1,23 @@
-"""Stage runtime: what many runs came to, by name."""
+"""What many runs came to, by name; its picture, HTML and xarray Dataset."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..base.algebra import Array
 from ..base.files import as_path, whole_file
-from ..base.notation import Notation
-from ..errors import bad_file, cannot, off_range
+from ..base.inline_pictures import picture_html, side_by_side
+from ..base.notation import TIME, Notation, label
+from ..base.texts import html_table, html_text
+from ..base.value_rules import read_count
+from ..errors import UsageError, bad_file, cannot, off_range
 from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
+from ..runtime.storage import attributes, free
 from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .given_cases import Cases
@@ -26,6 +30,165 @@ if TYPE_CHECKING:
 
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
+
+
+# -- a picture of one column -------------------------------------------------------------------------------------------
+
+
+class DrawnEnsemble(Protocol):
+    """What an :class:`~.ensemble.Ensemble` is drawn from."""
+
+    t: Any
+    count: int
+    names: tuple[str, ...]
+    reduced: dict[str, Any]
+
+    def __getitem__(self, name: str) -> Any: ...
+
+    def unit(self, name: str) -> str: ...
+
+    @property
+    def notation(self) -> Notation: ...
+
+
+def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
+    """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
+    values, limit = ensemble[name], read_count("limit, of the runs drawn,", limit, 1)
+    if ax is None:
+        plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
+        ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
+    printed = label(ensemble.notation.mathtext(name), ensemble.unit(name))
+    if "mean" in ensemble.reduced:
+        row = ensemble.names.index(name)
+        spread = np.sqrt(ensemble.reduced["variance"][row])
+        ax.fill_between(ensemble.t, values - spread, values + spread, alpha=0.3, label="mean ± deviation")
+        ax.plot(ensemble.t, values, label="mean")
+        ax.plot(ensemble.t, ensemble.reduced["least"][row], "k:", lw=0.8, label="least, greatest")
+        ax.plot(ensemble.t, ensemble.reduced["greatest"][row], "k:", lw=0.8)
+        ax.legend(frameon=False)
+    elif values.ndim == 2:
+        chosen = np.unique(np.linspace(0, ensemble.count - 1, min(limit, ensemble.count)).astype(int))
+        ax.plot(ensemble.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
+    else:
+        ax.hist(values[np.isfinite(values)], bins="auto")
+        ax.set_xlabel(f"{printed} at $t$ = {ensemble.t[0]:.6g} s")
+        ax.set_ylabel("runs")
+        return ax
+    ax.set_xlabel(TIME)
+    ax.set_ylabel(printed)
+    return ax
+
+
+# -- HTML --------------------------------------------------------------------------------------------------------------
+
+
+PANELS = 3  #: columns that are drawn
+ROWS = 12  #: columns whose numbers are listed
+FAILURES = 5  #: runs that are named
+
+
+def ensemble_html(ensemble: Any) -> str:
+    """A picture of the first columns, and mean, deviation, least and greatest of all."""
+    failed = ensemble.failures()
+    facts = [("runs", f"{ensemble.count}" + (f", {len(failed)} of which failed" if failed else ""))]
+    facts += [("times", f"{len(ensemble.t)}"), ("end", f"{ensemble.t[-1]:.6g} s")]
+    facts += [(f"run {one.run} failed", f"at t = {one.t:.6g} s: {one.message}") for one in failed[:FAILURES]]
+    text = html_table(repr(ensemble).strip("<>").partition(":")[0], facts)
+    try:
+        summary = ensemble.summary()
+    except UsageError:  # a reduction of the user's own kept something else
+        return text
+    return side_by_side(picture_html(lambda: _figure(ensemble)), text + _table(summary))
+
+
+def _table(summary: dict[str, dict[str, float]]) -> str:
+    heads = ("", "mean", "deviation", "least", "greatest")
+    rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
+    for name, values in list(summary.items())[:ROWS]:
+        cells = "".join(f"<td>{values[head]:.5g}</td>" for head in heads[1:])
+        rows.append(f"<tr><th style='text-align:left'>{html_text(name)}</th>{cells}</tr>")
+    if len(summary) > ROWS:
+        rows.append(f"<tr><td colspan='5'>and {len(summary) - ROWS} more: summary()</td></tr>")
+    return f"<table>{''.join(rows)}</table>"
+
+
+def _figure(ensemble: Any) -> Any:
+    names = ensemble.names[:PANELS]
+    figure = require("matplotlib.figure", "matplotlib", "a picture").Figure
+    made = figure(figsize=(5.6, 0.6 + 1.7 * len(names)), layout="constrained")
+    for k, name in enumerate(names):
+        ensemble.plot(name, made.add_subplot(len(names), 1, k + 1))
+    return made
+
+
+# -- xarray ------------------------------------------------------------------------------------------------------------
+
+
+STATISTICS = ("count", "mean", "variance", "least", "greatest")
+#: Of each run, and what it is.
+TOLD = {"status": "0 where the end was reached", "t_end": "how far the run came (s)", "steps": "steps that were taken"}
+
+
+def dataset_of_runs(ensemble: Any) -> xarray.Dataset:
+    """The Dataset of :meth:`.ensemble.Ensemble.to_xarray`."""
+    xr = require("xarray", "xarray", "to_xarray")
+    variables, coordinates = (_statistics if "variance" in ensemble.reduced else _runs)(ensemble)
+    coordinates["t"] = ("t", ensemble.t, {"units": "s", "long_name": "time"})
+    metadata = ensemble.metadata
+    words = {"model": metadata["name"], "metadata": json.dumps(metadata)}
+    made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
+    return made
+
+
+def _statistics(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables over statistics and times."""
+    label = free("statistic", set(ensemble.names))
+    variables = {
+        name: (
+            (label, "t"),
+            np.array([ensemble.reduced[key][row] for key in STATISTICS], dtype=float),
+            _words(ensemble, name),
+        )
+        for row, name in enumerate(ensemble.names)
+    }
+    return variables, {label: (label, list(STATISTICS))}
+
+
+def _runs(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables over the runs, and times where some were kept; coordinates of the runs."""
+    if ensemble.x is None:
+        kept = f"this ensemble kept only the results of its reduction ({', '.join(ensemble.reduced)})"
+        raise cannot(f"{kept}; run it with reduce='states' or 'statistics'")
+    varied = ensemble.varied()
+    # an initial value of the grid is called as in `varied`, so that it does not hide the column of its name
+    labels = {name: name if name in ensemble.parameters_and_inputs else f"initial_{name}" for name in ensemble.grid}
+    run = free("run", {*ensemble.names, *varied})
+    dimensions = tuple(labels.values()) or (run,)
+    shape = tuple(map(len, ensemble.grid.values())) or (ensemble.count,)
+    coordinates: dict[str, Any] = {
+        labels[name]: (labels[name], values, _words(ensemble, name)) for name, values in ensemble.grid.items()
+    } or {run: (run, np.arange(ensemble.count), {"long_name": "number of the run"})}
+    for name, row in varied.items():
+        words = _words(ensemble, name.removeprefix("initial_"))
+        coordinates.setdefault(name, (dimensions, row.reshape(shape), words))
+    variables: dict[str, Any] = {}
+    for name in ensemble.names:
+        values, words = np.asarray(ensemble[name]), _words(ensemble, name)
+        if ensemble.samples is None:
+            variables[name] = (dimensions, values.reshape(shape), words)
+        else:
+            variables[name] = ((*dimensions, "t"), values.T.reshape(*shape, len(ensemble.t)), words)
+    for name, what in TOLD.items():
+        own = free(name, {*variables, *coordinates})
+        variables[own] = (dimensions, getattr(ensemble, name).reshape(shape), {"long_name": what})
+    return variables, coordinates
+
+
+def _words(ensemble: Any, name: str) -> dict[str, str]:
+    return attributes(name, {name: ensemble.unit(name)}, ensemble.model_metadata)
+
+
+# -- the ensemble ------------------------------------------------------------------------------------------------------
 
 
 class Failure(NamedTuple):
@@ -242,7 +405,6 @@ class Ensemble:
         MissingDependencyError
             xarray is not installed.
         """
-        from .labelled_runs import dataset_of_runs
 
         return dataset_of_runs(self)
 
@@ -304,7 +466,6 @@ class Ensemble:
         limit : int
             Draw at most this number of runs, evenly chosen.
         """
-        from .column_picture import draw
 
         drawn: Axes = draw(self, name, ax, limit)
         return drawn
@@ -334,6 +495,5 @@ class Ensemble:
         return f"<Ensemble of {self._module.name}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"
 
     def _repr_html_(self) -> str:
-        from .ensemble_display import ensemble_html
 
         return ensemble_html(self)

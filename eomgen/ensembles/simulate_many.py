@@ -19,18 +19,23 @@ from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
-from ..simulation.clocks import require_forward
 from ..simulation.compiled import can_run
+from ..simulation.events import require_forward
 from ..simulation.progress import Progress, wanted
-from ..simulation.run_arguments import check_method, declare, find_span, longest_step, ordered_times, own_step
-from ..simulation.tolerances import check_tolerances
+from ..simulation.run_arguments import (
+    check_method,
+    check_tolerances,
+    declare,
+    find_span,
+    longest_step,
+    ordered_times,
+    own_step,
+)
 from .block import LOST, Plan, find_events
-from .case_grid import grid_axes, spread_grid
 from .ensemble import Ensemble
-from .given_cases import Cases, collect_cases
+from .given_cases import Cases, collect_cases, grid_axes, spread_grid
 from .reductions import GRAIN, Reduction, choose_reduction
-from .run_blocks import RUNS, Kept, choose_size, run_local, split
-from .store import stored_length
+from .run_blocks import RUNS, Kept, choose_size, run_local, split, stored_length
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -187,8 +192,7 @@ def _run(
 ) -> Iterator[tuple[int, Kept]]:  # fmt: skip
     if client is None:
         return run_local(module, cases, plan, reduction, parts, missing, threads, watch)
-    from .cluster import run_on_workers
-    from .handle import describe
+    from .cluster import describe, run_on_workers
 
     return run_on_workers(client, module, describe(module), cases, plan, reduction, parts, missing, watch)
 
@@ -265,7 +269,7 @@ def _open_store(
     folder: str | Path, module: BoundModel, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
 ) -> Any:
     from ..runtime.identity import code_digest
-    from .store import Store
+    from .run_blocks import Store
 
     def _plain(x: Any) -> Any:
         if isinstance(x, Signal):

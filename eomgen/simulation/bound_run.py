@@ -12,7 +12,7 @@ from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL
 from ..errors import EvaluationError, SimulationError
 from ..runtime.signals import Forcing
-from .stalled import Crawling
+from .stalling import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

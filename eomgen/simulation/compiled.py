@@ -20,7 +20,7 @@ from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution
 from .integrate import MESSAGES as WORDS
-from .tolerances import check_tolerances
+from .run_arguments import check_tolerances
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

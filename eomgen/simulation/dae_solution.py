@@ -23,14 +23,11 @@ from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
-from .event_values import EventValues
-from .events import GO_ON, UNWATCHED, Events, instant, warn_of_unknown
+from .events import GO_ON, UNWATCHED, Events, EventValues, Resets, instant, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
-from .resets import Resets
-from .run_arguments import find_span, find_state, ordered_times
-from .stalled import Crawling
-from .tolerances import check_step, check_tolerances
+from .run_arguments import check_step, check_tolerances, find_span, find_state, ordered_times
+from .stalling import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

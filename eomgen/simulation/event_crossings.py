@@ -29,8 +29,7 @@ from ..base.limits.runs import (
 )
 from ..errors import ZenoError
 from ..numeric.roots import Found, Search, search_least, search_root
-from .event_values import EventValues
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of, instant
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, EventValues, RunEvent, crowd_of, instant
 
 
 class Step(NamedTuple):

@@ -1,7 +1,9 @@
-"""Simulation: events of the model and of one run -> what integrators watch for, and what happens then.
+"""Events of the model and of one run -> what integrators watch for, and what happens then.
 
 An event is a zero of an expression or function of time and state.  Those of the model are compiled with it; those given
 for a run are its names, expressions as text, or functions f(t, x) with SciPy's attributes.
+
+A clock is an event, t - offset - k period, and the state that holds k, the number of its next time.
 """
 
 from __future__ import annotations
@@ -10,26 +12,29 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from math import isfinite, nan
+from math import ceil, isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base.algebra import Array
+from ..base.limits.constraints import MEASURED
 from ..base.limits.numbers import TINY
-from ..base.limits.runs import CROWD, EARLIEST, INSTANT
+from ..base.limits.runs import AHEAD, CROWD, CROWDED, EARLIEST, INSTANT, MOST_STEPS, TOUCHING, WHOLE
 from ..base.texts import shown
 from ..base.value_rules import as_count
-from ..errors import ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range
+from ..errors import UsageError, ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range, untrue
 from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state
+from ..runtime.refusals import require_switched
 from ..runtime.room import as_real
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.formulas import Formula
     from ..runtime.signals import Forcing
+
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
 STOP = 3  #: an integrator stops there and goes on, from another state or the same
@@ -334,3 +339,252 @@ def _value_of(kernel: Any, forcing: Forcing, i: int) -> Callable[[float, Array],
     if forcing:
         return lambda t, x: float(kernel(t, x, u=forcing(t, x))[i])
     return lambda t, x: float(kernel(t, x)[i])
+
+
+# -- values of events --------------------------------------------------------------------------------------------------
+
+
+AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call
+
+
+class EventValues:
+    """Values of events, at one state or each at its own.
+
+    Parameters
+    ----------
+    events : sequence of RunEvent
+    """
+
+    def __init__(self, events: Sequence[RunEvent]) -> None:
+        self.events = events
+        self.together: dict[int, tuple[Together, list[int]]] = {}  #: what gives several values, and of which events
+        self.alone: list[int] = []
+        for i, event in enumerate(events):
+            if event.source is None:
+                self.alone.append(i)
+            else:
+                self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
+
+    def __call__(self, t: float, x: Array, for_slope: bool = False) -> Array:
+        """The values (n,) of all events at a time and state; ``for_slope``: for a difference quotient, off the path."""
+        g = np.empty(len(self.events))
+        for i in self.alone:
+            g[i] = self.events[i](t, x, for_slope)
+        for together, places in self.together.values():
+            values = together.values(t, x)
+            for i in places:
+                event = self.events[i]
+                g[i] = event.seen_value(t, float(values[event.source[1]]))  # type: ignore[index]
+        return g
+
+    def each(self, asked: Sequence[int], times: Array, states: Array) -> list[float]:
+        """The value of event asked[k] at times[k] and states[k], for every k."""
+        values: dict[int, float] = {}
+        for together, places in self.together.values():
+            if together.columns is None or len(asked) < 2:
+                continue
+            watched = set(places)
+            mine = [k for k, i in enumerate(asked) if i in watched]
+            size = max(AT_ONCE // len(places), 1)
+            for part in (mine[n : n + size] for n in range(0, len(mine), size)):
+                table = together.columns(times[part], np.ascontiguousarray(states[part].T))
+                for column, k in enumerate(part):
+                    event = self.events[asked[k]]
+                    values[k] = event.seen_value(float(times[k]), float(table[event.source[1], column]))  # type: ignore[index]
+        return [values[k] if k in values else self.events[i](float(times[k]), states[k]) for k, i in enumerate(asked)]
+
+
+# -- resets ------------------------------------------------------------------------------------------------------------
+
+
+class Resets:
+    """What an integrator that starts anew at each reset has to remember.
+
+    Parameters
+    ----------
+    events : sequence of RunEvent
+    rhs : callable
+        (t, x) -> x'.
+    start, end : float
+        Of the run (s).
+    """
+
+    def __init__(
+        self, events: Sequence[RunEvent], rhs: Callable[[float, Array], Array], start: float, end: float
+    ) -> None:
+        self.events, self.rhs, self.span = events, rhs, end - start
+        self.count, self.crowded, self.last = 0, 0, np.inf
+        self.most = crowd_of([event.action for event in events])
+
+    def note(self, t: float, before: Array, after: Array, fired: Sequence[int]) -> None:
+        """Take note of events that happened at time t and led from one state to another.
+
+        Raises
+        ------
+        ZenoError
+            Resets follow each other ever faster, or lead nowhere.
+        """
+        self.count += 1
+        self.crowded = self.crowded + 1 if abs(t - self.last) < CROWDED * abs(self.span) else 0
+        self.last = t
+        for e in fired:
+            event = self.events[e]
+            came, goes = (self.rate(event, t, state) for state in (before, after))
+            stuck = not abs(goes) > TOUCHING * abs(came) or (event.action == WAIT and goes < 0.0)
+            stuck = stuck and abs(event(t, after)) <= TOUCHING * abs(came * self.span)  # not where its value jumped
+            again = event.direction * came < 0.0  # the zero it just left
+            if event.action in (RESET, WAIT) and (stuck or again):
+                self.crowded = self.most
+            event.left = (t, self.side(event, t, after))
+        if self.crowded >= self.most:
+            raise self.endless()
+
+    def endless(self) -> ZenoError:
+        """The error for resets that never end."""
+        return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action != GO_ON])
+
+    def rate(self, event: RunEvent, t: float, x: Array) -> float:
+        """How fast an event's value changes along the motion, in the direction of the run."""
+        h = AHEAD * self.span
+        event.left = None
+        return float((event(t + h, x + h * np.asarray(self.rhs(t, x)), for_slope=True) - event(t, x)) / abs(h))
+
+    def side(self, event: RunEvent, t: float, x: Array) -> float:
+        """The side of zero, 1 or -1, to which the value of an event goes that is zero now; 0 where it stays.
+
+        Its rate tells; where it has none, as that of a body at rest, the value after a midpoint step of the run.
+        """
+        rate = self.rate(event, t, x)
+        if rate != 0.0:
+            return float(np.sign(rate))
+        h = AHEAD**0.5 * self.span
+        middle = x + 0.5 * h * np.asarray(self.rhs(t, x))
+        return float(np.sign(event(t + h, x + h * np.asarray(self.rhs(t + 0.5 * h, middle)), for_slope=True)))
+
+
+# -- clocks of sampled states ------------------------------------------------------------------------------------------
+
+
+FINEST = 1e-3  #: part of a period that times must tell apart
+
+
+def at_next_samples(
+    module: BoundModel, t: float, x: Array, span: tuple[float, float] | None = None, initial: Any = None
+) -> Array:
+    """The state x (n_x,) at time t with clocks whose next time is past set to their first one that is not.
+
+    A sampling time at t itself happens.  A clock that is ahead by more than its period, as that of a state from the end
+    of another run, is set back; one that has not begun stays so.
+
+    Raises
+    ------
+    UsageError
+        A period is not positive, a counter not whole, or the `span` of the run goes backwards.
+    """
+    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    if span is not None:
+        require_forward(module, *span)
+        require_agreement(module, t, x, initial)
+    if not clocks:
+        return x
+    values = module.kernels.timed("events")
+    found = np.array(x, dtype=float)
+    for clock in clocks:
+        event, place = int(clock["event"]), int(clock["counter"])
+        states, first = ", ".join(clock["states"]), np.where(np.arange(len(found)) == place, 0.0, found)
+        late, period = _lateness(values, t, found, event, place)[0], _lateness(values, 0.0, first, event, place)[1]
+        if not period > 0.0:
+            raise off_range(f"the period of {states} is {period:.6g} s; give a positive time between samples")
+        start, end = span or (t, t)
+        if abs(end - start) > MOST_STEPS * period:
+            raise UsageError(
+                f"a run from {start:g} to {end:g} s has {abs(end - start) / period:.2g} samples of {states}, one every "
+                f"{period:g} s, so it would not end; give a shorter span",
+                code="EG-ENDLESS",
+            )
+        if (latest := max(abs(start), abs(end))) + FINEST * period == latest:
+            raise off_range(
+                f"the period of {states}, {period:g} s, is lost in rounding at times near {latest:g} s; begin the run "
+                "nearer to t = 0"
+            )
+        if not abs(found[place] - round(found[place])) < WHOLE:
+            name = module.x_names[place]
+            raise off_range(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
+        if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
+            found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
+            while found[place] >= 1.0 and _lateness(values, t, _less_one(found, place), event, place)[0] <= instant(t):
+                found[place] -= 1.0  # the period has been rounded
+        while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
+            found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
+    return found
+
+
+def _less_one(x: Array, place: int) -> Array:
+    return np.where(np.arange(len(x)) == place, x - 1.0, x)
+
+
+def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[float, float]:
+    """How long ago the next time of a clock was (s), and its period (s)."""
+    late, ahead = float(values(t, x)[event]), np.array(x)
+    ahead[place] += 1.0
+    return late, late - float(values(t, ahead)[event])
+
+
+def require_forward(module: BoundModel, start: float, end: float) -> None:
+    """Refuse a run backwards in time of a model with sampled states, or with constraints that close and open.
+
+    What they were before a sample, and the velocities before an impact, are not known.
+
+    Raises
+    ------
+    UsageError
+    """
+    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    if clocks and end < start:
+        raise cannot(
+            f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
+            f"to {end:.6g} s"
+        )
+    switched: list[str] = module.metadata.get("switched", [])
+    if switched and end < start:
+        raise cannot(
+            f"a run of constraints that close and open ({', '.join(switched)}) goes forward in time, not from "
+            f"{start:.6g} s to {end:.6g} s"
+        )
+
+
+def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> None:
+    """Refuse a start at which a constraint that the model declares closed does not hold.
+
+    A state from another run, and constraints that are closed by name in `initial`, are taken as they are: an error that
+    was there when a constraint closed dies away in the run.
+
+    Raises
+    ------
+    UsageError
+        Tells the equation, its error and how much of one is allowed.
+    """
+    layout = module.layout
+    require_switched(layout, x[layout.n_x - layout.n_states :])
+    rows: list[tuple[str, str, str]] = module.metadata.get("held_rows", [])
+    if (
+        not rows
+        or not (initial is None or isinstance(initial, Mapping))
+        or "held_errors" not in module.kernels.core.names
+    ):
+        return
+    found = module.kernels.timed("held_errors")(t, x)
+    fast = max(1.0, layout.scales.speed(x[layout.n_q :]))
+    for k, (label, state, kind) in enumerate(rows):
+        size, unit = (layout.length, "m") if kind == "length" else (1.0, "rad")
+        for value, limit, what, per in (
+            (found[2 * k], MEASURED * size, "is off by", ""),
+            (found[2 * k + 1], MEASURED * size * fast, "changes by", "/s"),
+        ):
+            if not abs(value) <= limit and state not in (initial or ()):
+                name = state.removesuffix("_closed")
+                raise untrue(
+                    f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
+                    f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or "
+                    "closed: false"
+                )

@@ -1,18 +1,20 @@
-"""Simulation: a run that stops at every closing gap, applies the impact and goes on -> a trajectory with impacts."""
+"""A run that stops at every closing gap, applies the impact and goes on -> a trajectory with impacts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.algebra import Array
-from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
+from ..base.limits.impacts import BEYOND, FOUND, MOMENT, RESTING, STARTED, STILL, TOUCHING
 from ..base.limits.runs import INSTANT
 from ..base.value_rules import read_count
 from ..errors import SimulationError, cannot, no_such, off_range
+from ..numeric.roots import carry_out, find_root, search_least
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.given_start import Span, Start
 from ..runtime.refusals import refuse_rigid
@@ -20,13 +22,206 @@ from ..runtime.run_parts import Residuals
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
-from .impact_trajectory import ImpactRun
-from .impact_watch import Watch, first_missed
 from .run_arguments import find_span, find_state
 from .simulate import simulate
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.protocols import Source
+
+
+# -- the trajectory ----------------------------------------------------------------------------------------------------
+
+
+class ImpactRun(Trajectory):
+    """A motion with impacts: a :class:`~..runtime.trajectory.Trajectory` that has two points at each impact.
+
+    Attributes
+    ----------
+    t : (n_t,) array
+        Times (s); each impact has two, the same one before and after.
+    x : (n_x, n_t) array
+    impacts : list of (float, Impact)
+    t_events, x_events : lists
+        Times and states before the impacts of each gap, also by name: ``run.t_events["gap"]``.
+    ended : {'end', 'impacts', 'rest', 'event'}
+        Why it ended: the span is over; as many impacts as allowed; a gap that is pressed together and no longer opens
+        (bodies that stay in contact need a joint or a contact force); an event of the model that ends runs.
+    """
+
+    impacts: list[tuple[float, Impact]]
+    breaks: list[int]
+    ended: str
+
+    @classmethod
+    def of(
+        cls, parts: tuple[Any, ...], impacts: Sequence[tuple[float, Impact]], breaks: Sequence[int], ended: str
+    ) -> ImpactRun:
+        """Make the run from the parts of a Trajectory and the impacts."""
+        run = cls(*parts)
+        run.impacts, run.breaks, run.ended = list(impacts), list(breaks), ended
+        return run
+
+    def __repr__(self) -> str:
+        return (
+            f"<ImpactRun of {self.name}: {len(self.t)} points, t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, {self.count}>"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        _, parts = super().__reduce__()
+        return type(self).of, (parts, self.impacts, self.breaks, self.ended)
+
+    @property
+    def count(self) -> str:
+        """The number of impacts and the reason for the end, as a text."""
+        reasons = {
+            "end": "",
+            "impacts": "; as many as allowed (most=)",
+            "rest": "; a gap stays closed",
+            "event": "; an event ended it",
+        }
+        return f"{len(self.impacts)} impact{'s' * (len(self.impacts) != 1)}{reasons[self.ended]}"
+
+    @property
+    def pieces(self) -> list[Trajectory]:
+        """The trajectories between impacts."""
+        ends = [0, *self.breaks, len(self.t)]
+        found = []
+        for a, b in pairwise(ends):
+            header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
+            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self.columns, a, b), header))
+        return found
+
+
+class TrajectoryPart:
+    """Columns from one point of a run to another."""
+
+    def __init__(self, whole: Source, first: int, last: int) -> None:
+        self.whole, self.names, self.range = whole, whole.names, slice(first, last)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.whole[name][self.range]
+
+    @property
+    def has_energies(self) -> bool:
+        return self.whole.has_energies
+
+    @property
+    def energies(self) -> Array:
+        return self.whole.energies[:, self.range]
+
+
+# -- gaps as events ----------------------------------------------------------------------------------------------------
+
+
+AT_REST = 0.1  #: the same for one that does not open
+SAMPLES = 8  #: places in each step of the solver at which gaps are looked at afterwards
+CHUNK = 4096  #: steps at a time
+
+
+class Watch:
+    """When gaps close that may be closed at the beginning.
+
+    A gap that begins at 0 and opens, g = r (t - t0), is watched from its first positive value on: what is watched is
+    g + d (1 - (t - t0) r / (2 d)) until the second term is 0, with d a rounding above -g.  It is positive from the
+    beginning, and g itself by the time g can be 0 again, unless it opens by less than d.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    t : float
+    x : (n_x,) array
+    rates : (n,) array
+        Of the gaps, at the beginning.
+    limits : (n,) array
+        Sizes at which gaps count as closed.
+    """
+
+    def __init__(self, gaps: Gaps, t: float, x: Array, rates: Array, limits: Array) -> None:
+        values = gaps.values(t, x)
+        self.gaps, self.start, self.limits = gaps, t, limits
+        still = rates <= 0.0
+        self.lift = np.where(values <= STARTED * limits, STARTED * limits - np.minimum(values, 0.0), 0.0)
+        resting = still & (values <= AT_REST * limits)
+        self.lift[resting] = (AT_REST * limits - np.minimum(values, 0.0))[resting]
+        self._key, self._last = (np.nan, b""), values
+        self.fall = np.where(resting, 0.0, np.maximum(0.5 * rates, 0.0))
+
+    def values(self, t: Any, x: Array) -> Array:
+        """What is watched, (n,) or (n, k)."""
+        lift, fall = (self.lift, self.fall) if x.ndim == 1 else (self.lift[:, None], self.fall[:, None])
+        return np.asarray(self.gaps.values(t, x) + np.maximum(lift - fall * (t - self.start), 0.0))
+
+    def events(self) -> list[Callable[[float, Array], float]]:
+        """Functions f(t, x) that end a run where they fall through 0, in the order of the gaps."""
+        found: list[Callable[[float, Array], float]] = []
+        for i, name in enumerate(self.gaps.names):
+
+            def closing(t: float, x: Array, i: int = i) -> float:
+                key = (t, x.tobytes())
+                if key != self._key:  # all gaps are asked for in turn
+                    self._key, self._last = key, self.values(t, x)
+                return float(self._last[i])
+
+            closing.terminal, closing.direction, closing.__name__ = True, -1.0, name  # type: ignore[attr-defined]
+            found.append(closing)
+        return found
+
+
+def first_missed(watch: Watch, piece: Trajectory) -> tuple[float, NDArray[np.bool_]] | None:
+    """The first closing of a gap before the end of a piece, and which gaps (n,) close there; None if there is none.
+
+    The solver looks at the ends of its steps; a gap may close and open again in between.
+
+    Parameters
+    ----------
+    watch : Watch
+    piece : Trajectory
+        With dense output.
+    """
+    if len(piece.t) < 2:
+        return None
+    for a in range(0, len(piece.t) - 1, CHUNK):
+        ends = piece.t[a : a + CHUNK + 2]  # one step more than is needed, for dips at its end
+        steps = np.diff(ends)
+        inner = ends[:-1, None] + steps[:, None] * np.arange(SAMPLES) / SAMPLES
+        times = np.append(inner.ravel(), ends[-1])
+        values = watch.values(times, piece.at(times).x)
+        found = [
+            (at, i) for i in range(len(values)) if (at := _first_zero(watch, piece, i, times, values[i])) is not None
+        ]
+        if found:
+            first = min(at for at, _ in found)
+            fired = np.zeros(len(values), dtype=bool)
+            for at, i in found:
+                fired[i] = at <= first + INSTANT * max(abs(first), 1.0)
+            return first, fired
+    return None
+
+
+def _first_zero(watch: Watch, piece: Trajectory, i: int, times: Array, values: Array) -> float | None:
+    def value(t: float) -> float:
+        return float(watch.values(t, piece.at(t).x[:, 0])[i])
+
+    bend = values[:-2] - 2.0 * values[1:-1] + values[2:]
+    dips = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]) & (values[1:-1] < bend)
+    below = np.flatnonzero(values < 0.0)
+    stop = int(below[0]) if below.size else len(values)
+    for k in np.flatnonzero(dips) + 1:
+        if k >= stop:
+            break
+        left, middle, right = times[k - 1 : k + 2].tolist()
+        search = search_least(left, middle, right, float(values[k]), FOUND * (right - left), below=True)
+        low, at = carry_out(search, value)
+        if low < 0.0:
+            return find_root(value, float(times[k - 1]), at, float(values[k - 1]), low)
+    if stop in (0, len(values)) or times[stop] == piece.t[-1]:  # at the end the solver has found it
+        return None
+    return find_root(value, float(times[stop - 1]), float(times[stop]), float(values[stop - 1]), float(values[stop]))
+
+
+# -- the run -----------------------------------------------------------------------------------------------------------
+
 
 IDLE = 50  #: closings in a row that bring neither an impact nor time
 

@@ -21,11 +21,9 @@ from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
 from .events import Events
 from .integrate import choose_solver
-from .run_arguments import check_method, declare, own_step
+from .run_arguments import check_method, check_tolerances, declare, own_step
 from .simulate import simulate
-from .stalled import Crawling
-from .stalling import StallCheck
-from .tolerances import check_tolerances
+from .stalling import Crawling, StallCheck
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

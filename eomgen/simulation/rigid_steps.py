@@ -1,4 +1,4 @@
-"""Simulation: one step of a mechanism with rigid contacts, forces, impacts and friction at once.
+"""One step of a mechanism with rigid contacts, forces, impacts and friction at once.
 
 The scheme is Moreau's midpoint rule (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in
 Nonsmooth Mechanics and Applications, 1988, 1-82; V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
@@ -28,11 +28,13 @@ are longer is done in two.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.contacts import (
     APART,
@@ -40,6 +42,7 @@ from ..base.limits.contacts import (
     GENTLER,
     GROWN,
     HALVINGS,
+    LINKED,
     REMOVED,
     RESTING,
     ROUGH,
@@ -47,17 +50,233 @@ from ..base.limits.contacts import (
     UNSOLVED,
     YIELDING,
 )
-from ..errors import SimulationError
+from ..errors import SimulationError, UsageError, cannot, off_range
 from ..numeric.contact_impulses import ContactImpulses, solve_contacts
 from ..numeric.contact_problem import ContactProblem
-from ..runtime.late import eager
-from .rigid_in_c import DONE, TOO_LONG, rigid_stepper
-from .rigid_meeting import HeldInertia, Meeting, Spot
-from .rigid_rows import RigidContacts, RigidRows
+from ..numeric.pair_sums import RECORD
+from ..runtime.late import LateCore, eager
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
+
+
+# -- rows of contacts --------------------------------------------------------------------------------------------------
+
+
+class RigidRows(NamedTuple):
+    """Contacts that may act, m of them."""
+
+    pairs: Array  #: (m, 2) numbers of both shapes
+    gaps: Array  #: (m,)
+    jacobian: Array  #: (m d, n_v): velocities along the normal and across it, of the second shape relative to the first
+    friction: Array  #: (m,)
+    restitution: Array  #: (m,)
+    places: Array  #: (m, 9): normal, first direction across, and point, in ground axes
+
+    def chosen(self, which: Any) -> RigidRows:
+        """Some of them."""
+        m = len(self.gaps)
+        rows = self.jacobian.reshape(m, -1, self.jacobian.shape[1])[which]
+        given = (self.pairs[which], self.gaps[which], rows.reshape(-1, self.jacobian.shape[1]))
+        return RigidRows(*given, self.friction[which], self.restitution[which], self.places[which])
+
+
+class RigidContacts:
+    """The contacts of a model.
+
+    Raises
+    ------
+    UsageError
+        It has none, or all of them are on soil.
+    """
+
+    def __init__(self, module: BoundModel) -> None:
+        known = module.metadata.get("rigid_contacts")
+        if not known:
+            raise cannot(
+                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
+                "can be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
+            )
+        self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
+        parents = known["parents"]
+        n = len(parents)
+        self.moves = np.zeros((len(known["moved_by"]), module.layout.n_v))
+        for shape, last in enumerate(known["moved_by"]):
+            while last >= 0:
+                self.moves[shape, last] = 1.0
+                last = parents[last]
+        assert n <= module.layout.n_v
+        self.near = module.kernels.state("near_pairs")
+        self.axes = module.kernels.state("motion_axes")
+
+    def records(self, t: float, q: Array, u: Any) -> Array:
+        """Pairs that are near (k, ``RECORD``), shapes numbered over all contacts."""
+        every = self.near(q, u=u, t=t)
+        found = []
+        start = shapes = 0
+        for name, numbers, count in self.lists:
+            listed = int(every[start])
+            room = (numbers - 1) // RECORD
+            if listed > room:
+                raise SimulationError(
+                    f"contacts {name!r}: {listed} pairs of shapes are near each other at t = {t:.6g} s, and there is "
+                    f"room for {room}; leave out shapes that overlap others of their body, or put shapes that "
+                    "never meet into contacts of their own",
+                    code="EG-TOO-LARGE",
+                )
+            rows = every[start + 1 : start + 1 + RECORD * listed].reshape(listed, RECORD).copy()
+            rows[:, :2] += shapes
+            found.append(rows)
+            start, shapes = start + numbers, shapes + count
+        return np.concatenate(found)
+
+    def rows(self, t: float, q: Array, u: Any) -> RigidRows:
+        """The contacts at one position.
+
+        Raises
+        ------
+        UsageError
+            A coefficient of friction is negative, or a restitution not within 0 and 1.
+        """
+        records = self.records(t, q, u)
+        pairs, normal, point, flat = records[:, :2].astype(int), records[:, 2:5], records[:, 6:9], records[:, 9:12]
+        self._require_law(records)
+        planar = (flat != 0.0).any(axis=1)
+        lone = np.zeros((len(records), 3))  # an axis far from the normal
+        lone[np.arange(len(records)), 2 - np.argmin(np.abs(normal[:, ::-1]), axis=1)] = 1.0
+        first = np.cross(np.where(planar[:, None], flat, lone), normal)
+        first /= np.maximum(np.sqrt((first * first).sum(axis=1)), np.finfo(float).tiny)[:, None]
+        ways = [normal, first]
+        if not planar.all():
+            ways.append(np.where(planar[:, None], 0.0, np.cross(normal, first)))
+        along = np.stack(ways, axis=1)  # (m, d, 3)
+        wrench = np.concatenate([np.cross(point[:, None], along), along], axis=2)
+        apart = self.moves[pairs[:, 1]] - self.moves[pairs[:, 0]]
+        jacobian = apart[:, None] * (wrench @ self.axes(q, u=u, t=t).T)
+        laws = records[:, 12], records[:, 13]
+        places = np.concatenate([normal, first, point], axis=1)
+        return RigidRows(pairs, -records[:, 5], jacobian.reshape(-1, apart.shape[1]), *laws, places)
+
+    def _require_law(self, records: Array) -> None:
+        friction, restitution = records[:, 12], records[:, 13]
+        bad = ~(friction >= 0.0) | ~((restitution >= 0.0) & (restitution <= 1.0))
+        if bad.any():
+            k = int(np.argmax(bad))
+            starts = np.cumsum([count for *_, count in self.lists])
+            name = self.lists[int(np.searchsorted(starts, records[k, 0], side="right"))][0]
+            raise off_range(
+                f"contacts {name!r}: friction is {friction[k]:.6g} and restitution {restitution[k]:.6g}; friction is "
+                "0 or greater, restitution from 0 to 1"
+            )
+
+
+# -- one position ------------------------------------------------------------------------------------------------------
+
+
+Spot = tuple[int, int, int]  #: two shapes, and the number of the place where they touch
+
+
+def _numbered(pairs: Sequence[Sequence[int]]) -> list[Spot]:
+    """Pairs of shapes, those that touch at several places numbered."""
+    found: list[Spot] = []
+    seen: dict[tuple[int, int], int] = {}
+    for a, b in pairs:
+        place = seen.get((a, b), 0)
+        seen[a, b] = place + 1
+        found.append((a, b, place))
+    return found
+
+
+class Meeting:
+    """The contacts of one position, which the two rounds of a step share.
+
+    Attributes
+    ----------
+    before, start : (m, d) array
+        Velocities before the impulses, and a guess of these: those of the same pairs of shapes in the last step.
+    spread : (n_v, m d) array
+        Velocities by impulses.
+    compliance : (m d, m d) array
+        Velocities of contacts by impulses.
+    scale : float
+        (m/s) What the tolerance of their impulses is relative to.
+    """
+
+    def __init__(self, held: HeldInertia, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
+        m = len(rows.gaps)
+        d = len(rows.jacobian) // m
+        self.rows, self.scale = rows, 0.0
+        self.before = (rows.jacobian @ v).reshape(m, d)
+        self.spread = held.inverse @ rows.jacobian.T
+        self.compliance = rows.jacobian @ self.spread
+        self.keys = _numbered(rows.pairs.tolist())
+        none = np.zeros(d)
+        self.start = np.array([last.get(key, none)[:d] for key in self.keys])
+
+    def shared(self, values: Array, acts: NDArray[np.bool_]) -> Array:
+        """Of each contact (m,) the greatest value of those that act on each other, by impulses (m, d) that are none."""
+        m, d = acts.shape
+        own = np.diag(self.compliance)
+        linked = (self.compliance**2 > LINKED * np.outer(own, own)).reshape(m, d, m, d).any(axis=(1, 3))
+        linked &= np.outer(acts.any(axis=1), acts.any(axis=1))
+        while not np.array_equal(values, more := np.maximum(values, (linked * values).max(axis=1))):
+            values = more
+        return values
+
+
+class HeldInertia:
+    """The inertia and the constraints at one position.
+
+    ``inverse`` is the matrix A with which velocities change by A f under impulses f, constraints held.
+    """
+
+    def __init__(self, module: BoundModel, t: float, q: Array, u: Any) -> None:
+        kernels = module.kernels
+        self.module = module
+        M = kernels.mass_matrix(q, u=u, t=t)
+        self.rows: Array | None = None
+        if not module.layout.n_c:
+            self.inverse = algebra.inv(M)
+            return
+        C = kernels.constraint_jacobian(q, u=u, t=t)
+        x = np.concatenate([q, np.zeros(module.layout.n_v)])
+        self.drift = kernels.velocity_constraints(x, u=u, t=t)
+        weight = np.trace(M) / max(float((C * C).sum()), np.finfo(float).tiny)
+        whole = algebra.inv(M + weight * (C.T @ C))  # regular where M is singular but constraints hold the rest
+        spread = whole @ C.T
+        self.back = spread @ algebra.pinv(C @ spread)
+        self.rows = C
+        self.inverse = whole - self.back @ spread.T
+        self.inverse = 0.5 * (self.inverse + self.inverse.T)
+
+    def turn_round(self, v: Array) -> None:
+        """Aim at velocities v+ with which the constraints hold for the mean of v and v+."""
+        if self.rows is not None:
+            self.wanted = -2.0 * self.drift - self.rows @ v
+
+    def aim(self, excess: Array) -> None:
+        """Aim at velocities smaller by an excess."""
+        if self.rows is not None:
+            self.wanted = self.wanted - self.rows @ excess
+
+    def free(self, v: Array) -> Array:
+        """Velocities as aimed at, from what forces alone would make of them."""
+        return v if self.rows is None else v - self.back @ (self.rows @ v - self.wanted)
+
+    def excess(self, q: Array, v: Array, t: float, u: Any) -> Array:
+        """What velocities v (n_v,) at a position have too much for the constraints there, in the metric of here."""
+        return np.asarray(self.back @ self.module.kernels.velocity_constraints(np.concatenate([q, v]), u=u, t=t))
+
+    def closing(self, q: Array, t: float, u: Any) -> Array:
+        """A displacement (n_v,) that closes the loops: a Newton step."""
+        if self.rows is None or not self.module.layout.n_h:
+            return np.zeros(self.inverse.shape[0])
+        found = self.module.kernels.constraints(q, u=u, t=t)
+        return np.asarray(-self.back[:, : len(found)] @ found)
+
+
+# -- the step ----------------------------------------------------------------------------------------------------------
 
 
 class RigidSteps:
@@ -338,3 +557,55 @@ class RigidSteps:
         found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], allowed)
         self._misses = self._misses or not found.residual <= allowed
         return np.asarray(spread @ found.impulses.ravel())
+
+
+# -- steps in compiled code --------------------------------------------------------------------------------------------
+
+
+DONE, TOO_LONG = 0, 1  #: what a step comes back with: eomgen/native/contacts/eomgen_contacts.h
+NEEDED = ("mass_matrix", "near_pairs", "motion_axes", "bias_apart")
+OF_CONSTRAINTS = ("constraint_jacobian", "velocity_constraints", "constraints")
+
+
+def rigid_stepper(
+    module: BoundModel, forcing: Forcing, contacts: RigidContacts, tolerance: float, iterations: int
+) -> Any | None:
+    """The compiled steps of one run; None where the module has none."""
+    make = getattr(eager(module.core), "rigid_stepper", None)
+    layout = module.layout
+    wanted = [*NEEDED, *(OF_CONSTRAINTS if layout.n_c else ())]
+    known = module.kernels.core.names
+    if make is None or not set(wanted) <= {*known} | ({"constraints"} if not layout.n_h else set()):
+        return None
+    wanted += ["meeting_time"]
+    bound = module.kernels.context
+    cores: list[Any] = []
+    sources: dict[str, Any] = {}
+    for name in wanted:
+        if name not in known:
+            continue
+        core: Any = module.kernels.core
+        core = core.having(name) if isinstance(core, LateCore) and name not in core.core.names else eager(core)
+        context = bound if core is eager(module.core) else core.context(bound.p, bound.u, UsageError)
+        cores.append(core)
+        sources[name] = core.address(name), context.c
+    space = layout.space
+    plain = [(k, k) for k in range(layout.n_q)] if space is None else [*zip(space.plain_q, space.plain_v, strict=True)]
+    tables = {
+        "rows": layout.rows,
+        "plain": np.ravel(plain),
+        "balls": np.ravel([] if space is None else space.quaternion_slots),
+        "lists": np.ravel([(numbers, count) for _, numbers, count in contacts.lists]),
+        "moved": contacts.moves,
+    }
+    facts = {
+        "n_rows": layout.n_c,
+        "n_c": len(layout.rows),
+        "n_h": int(np.count_nonzero(layout.rows < layout.n_h)),
+        "n_spots": sum(numbers for _, numbers, _ in contacts.lists),
+    }
+    n_work = max(core.sizes["n_work"] for core in cores)
+    outside = forcing if forcing.foreign else None
+    within = forcing.within or (-np.inf, np.inf)
+    signals = [] if outside is not None else forcing.encode()
+    return make(bound, sources, n_work, facts, tables, tolerance, iterations, signals, outside, within)

@@ -1,4 +1,12 @@
-"""Simulation: derivatives of a run on one side of an event -> those on the other (saltation), and those of its time.
+"""Derivatives of a run: between events by the variational equation, at events by their saltation.
+
+An impact of one gap with normal n (see :mod:`.impact`) solves
+
+    M (v+ - v-) + C_q^T l = n^T g        C_q v+ + C_t = 0        r+ + e r- = 0,  r = n v + gap_t
+
+with the rows of what is closed for a time among those of C_q, and velocities that a reset has set to v* go to the
+nearest on the constraints, (v+ - v*) / s^2 + C_q^T l = 0.  Both are differentiated implicitly; changes of l drop out
+along the free motions B, C_q B = 0.
 
 An event g(t, x, u, p) = 0 happens at a time T that moves with what a run is differentiated by:
 
@@ -13,18 +21,280 @@ essential tool for linearizing hybrid dynamical systems, Proc. IEEE 112 (2024), 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.impacts import ASIDE, CONTRADICTS, SIMULTANEOUS, SMOOTH, TOUCHING
+from ..base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..errors import NoDerivativeError, cannot
+from ..numeric.projection import minimum_norm
+from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
+from ..runtime.derivative_calls import output_derivatives
+from ..runtime.signals import Forcing
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
-from .impact_slopes import after_impact, after_reset
 from .sensitivity_result import EventSlopes
-from .sensitivity_start import keep_consistent
-from .variational import Move, Variational
+from .sensitivity_start import Differentiated, InputSlopes, assembly_rows, keep_consistent
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+
+
+# -- between events ----------------------------------------------------------------------------------------------------
+
+
+class Move(NamedTuple):
+    """Changes of all that a law may depend on, for unit changes of the k names."""
+
+    x: Array  #: (n_x, k)
+    t: Array  #: (k,)
+    u: Array  #: (n_u, k), NaN for an input whose rate is not known
+    p: Array  #: (n_p, k)
+
+    def along(self, slopes: Array, what: str, names: tuple[str, ...]) -> Array:
+        """The changes (m, k) of a law from its derivatives (m, ...) by x, t, u and p.
+
+        Raises
+        ------
+        UsageError
+            It depends on the rate of an input that is a Python function.
+        """
+        n_x, n_u = len(self.x), len(self.u)
+        by_u = slopes[:, n_x + 1 : n_x + 1 + n_u]
+        for j in np.flatnonzero(by_u.any(axis=0) & ~np.isfinite(self.u).all(axis=1)):
+            raise cannot(
+                f"{what} depends on input {names[j]}, a Python function, and its rate is not known; give it as an "
+                "expression in a text, or as a table"
+            )
+        known = np.isfinite(self.u).all(axis=1)
+        found = slopes[:, :n_x] @ self.x + np.multiply.outer(slopes[:, n_x], self.t)
+        return np.asarray(found + by_u[:, known] @ self.u[known] + slopes[:, n_x + 1 + n_u :] @ self.p)
+
+
+class Variational:
+    """x' = f and S' = J S + df/dp as one system z = [x; S * weights].
+
+    Parameters
+    ----------
+    module : BoundModel
+        With parameters and constant inputs bound.
+    forcing : Forcing
+        The inputs of the run.
+    columns : Differentiated
+        What is differentiated by.
+    """
+
+    def __init__(self, module: BoundModel, forcing: Forcing, columns: Differentiated) -> None:
+        self.module, self.forcing, self.columns = module, forcing, columns
+        self.inputs = InputSlopes(module.layout, forcing, module.p)
+        self.weights = _weights(module, columns)
+        kernels, layout = module.kernels, module.layout
+        self.rhs, self.tangent = kernels.timed("rhs", nan=True), kernels.timed("jacobian", nan=True)
+        self.by_p, self.by_u = kernels.timed("parameter_jacobian", nan=True), kernels.timed("input_jacobian", nan=True)
+        k = len(columns.names)
+        self.dp = columns.spread(np.eye(layout.n_p), np.zeros((layout.n_p, layout.n_u)))
+        self.du = columns.spread(np.zeros((layout.n_u, layout.n_p)), np.eye(layout.n_u))
+        self.still = Move(np.zeros((layout.n_x, k)), np.zeros(k), self.du, self.dp)
+
+    def slopes(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
+        """x' and S', S without weights."""
+        u = self.forcing(t, x)
+        S_dot = self.tangent(t, x, u=u) @ S
+        if self.columns.parameters:
+            S_dot = S_dot + self.by_p(t, x, u=u) @ self.dp
+        if self.columns.inputs or self.inputs.by_state_or_parameters:
+            S_dot = S_dot + self.by_u(t, x, u=u) @ self.move(t, x, S).u
+        return self.rhs(t, x, u=u), S_dot
+
+    def move(self, t: float, x: Array, dx: Array, dt: Array | None = None) -> Move:
+        """Everything that goes with changes of the state (n_x, k), and of the time (k,) at which it is looked at."""
+        moved = self.still._replace(x=dx)
+        if not self.forcing:
+            return moved if dt is None else moved._replace(t=dt)
+        by_t, by_x, by_p = self.inputs(t, x)
+        du = self.du + by_x @ dx + by_p @ self.dp
+        if dt is None:
+            return moved._replace(u=du)
+        return moved._replace(t=dt, u=du + np.multiply.outer(by_t, dt))
+
+    def __call__(self, t: float, z: Array) -> Array:
+        """z' of z."""
+        x, S = self.split(z)
+        x_dot, S_dot = self.slopes(t, x, S)
+        return self.joined(x_dot, S_dot)
+
+    def split(self, z: Array) -> tuple[Array, Array]:
+        """x (n_x,) and S (n_x, k) without weights."""
+        n = self.module.n_x
+        return z[:n], z[n:].reshape(n, -1) / self.weights
+
+    def joined(self, x: Array, S: Array) -> Array:
+        """z of x and S."""
+        return np.concatenate([x, (S * self.weights).ravel()])
+
+    def outputs(self, t: float, x: Array, S: Array) -> Array:
+        """Derivatives (n_y, k) of the outputs."""
+        layout, here = self.module.layout, self.module.bind(u=self.forcing(t, x))
+        n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
+        x_dot, S_dot = self.slopes(t, x, S)
+        Y, move = output_derivatives(here, t, x, x_dot[n_q:]), self.move(t, x, S)
+        by_u, by_p = Y[:, n_x + n_v : n_x + n_v + n_u], Y[:, n_x + n_v + n_u :]
+        return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
+
+
+def _weights(module: BoundModel, columns: Differentiated) -> Array:
+    """Sizes of what is differentiated by, so that one tolerance fits all columns."""
+    weights = np.ones(len(columns.names))
+    for column, index in columns.parameters:
+        weights[column] = abs(module.p[index]) or 1.0
+    for column, index in columns.inputs:
+        weights[column] = abs(module.u[index]) or 1.0
+    return weights
+
+
+# -- resets and impacts ------------------------------------------------------------------------------------------------
+
+
+class Strike:
+    """The laws that rule velocities at one instant.
+
+    Parameters
+    ----------
+    module : BoundModel
+        With the inputs at that instant bound.
+    t : float
+    x : (n_x,) array
+        The state right after.
+    closed : sequence of int
+        Equations of constraints that close and open that rule too.
+    """
+
+    def __init__(self, module: BoundModel, t: float, x: Array, closed: Sequence[int] = ()) -> None:
+        self.module, self.t, self.layout, self.closed = module, t, module.layout, closed
+        self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
+        self.C_q, self.scales = module.kernels.constraint_jacobian(self.q, t=t, rows="all"), self.layout.scales
+        if closed:
+            self.C_q, self.scales = with_closed_rows(module, t, x, self.C_q)
+        self.B = free_motions(self.C_q, self.scales)
+        self._slopes = module.kernels.timed("strike_derivatives")
+
+    def rows(self, v: Array, change: Array, l: Array, g: Array) -> tuple[Array, Array, Array, Array]:
+        """Derivatives by [q, v, t, u, p] of M a + C_q^T l - n^T g, of a / s^2 + C_q^T l, of C_q v + C_t and of the
+        events' rates."""
+        n_v, n_c = self.layout.n_v, self.layout.n_c
+        held = np.zeros(self.layout.n_held // 2)
+        held[[*self.closed]] = l[n_c:]
+        every = self._slopes(self.t, np.concatenate([self.q, v, change, l[:n_c], g, held]))
+        ends = np.cumsum([n_v, n_v, n_c, self.layout.n_events])
+        first, second, third, fourth, fifth = np.split(every, ends)
+        return first, second, np.vstack([third, fifth[[*self.closed]]]), fourth
+
+    def solve(self, metric: Array, dv: Array, force: Array, rate: Array, n: Array, gap: Array) -> Array:
+        """The changes (n_v, k) of v+: metric (dv+ - dv) + force = n^T dg along B, C_q dv+ = -rate, n dv+ = -gap."""
+        w = -minimum_norm(self.C_q, rate, self.scales) if len(rate) else np.zeros_like(dv)
+        B, free, closed = self.B, self.B.shape[1], n @ self.B
+        K = np.zeros((free + len(n), free + len(n)))
+        K[:free, :free], K[:free, free:], K[free:, :free] = B.T @ metric @ B, -closed.T, closed
+        right = np.vstack([B.T @ (metric @ (dv - w) - force), -gap - n @ w])
+        return np.asarray(w + B @ algebra.solve(K, right)[:free])
+
+
+def after_impact(
+    run: Variational, module: BoundModel, t: float, v: Array, move: Move, x: Array, event: int, e: float
+) -> Array:
+    """How the state after the impact of one gap changes, (n_x, k).
+
+    Parameters
+    ----------
+    run : Variational
+    module : BoundModel
+        With the inputs at that instant bound.
+    t : float
+    v : (n_v,) array
+        Velocities before.
+    move : Move
+        Changes of the state before, of time, inputs and parameters.
+    x : (n_x,) array
+        The state after.
+    event : int
+        The model's event whose expression is the gap.
+    e : float
+        Restitution.
+    """
+    layout, strike = module.layout, Strike(module, t, x, closed_rows(module, x))
+    n_q, n_x, names = layout.n_q, layout.n_x, layout.u
+    change, none, rest = strike.v - v, np.zeros(len(strike.C_q)), np.zeros(layout.n_events)
+    M = module.kernels.mass_matrix(strike.q, t=t)
+    n = strike.rows(v, change, none, rest)[3][event : event + 1, n_q:n_x]
+    g = np.array(rest)
+    g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]
+    force = M @ change - n[0] * g[event]
+    l = solve_multipliers(strike.C_q[None], force[:, None], strike.scales)[:, 0]
+    held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
+    balance, _, rate, after = strike.rows(strike.v, change, l, g)
+    before = strike.rows(v, change, l, g)[3]
+    what = f"event {layout.metadata['events'][event]['name']}"
+    gap = held.along(after[event : event + 1], what, names) + e * move.along(before[event : event + 1], what, names)
+    pushed, rates = held.along(balance, what, names), held.along(rate, what, names)
+    return np.vstack([move.x[:n_q], strike.solve(M, move.x[n_q:], pushed, rates, n, gap)])
+
+
+def after_reset(
+    run: Variational, module: BoundModel, t: float, before: Array, move: Move, x: Array, event: int, u: Array
+) -> Array:
+    """How the state after a reset changes, (n_x, k); arguments as for :func:`after_impact`, u (n_u,) before it."""
+    layout = module.layout
+    n_q, names, what = layout.n_q, layout.u, f"event {layout.metadata['events'][event]['name']}"
+    resets = layout.metadata["resets"]
+    chosen = [k for k, (owner, _) in enumerate(resets) if owner == event]
+    places = [resets[k][1] for k in chosen]
+    slopes = module.kernels.rows("event_derivatives", [layout.n_events + k for k in chosen], t, before, u)
+    star, moved = np.array(before), np.array(move.x)
+    star[places] = module.kernels.rows("resets", chosen, t, before, u)
+    moved[places] = move.along(slopes, what, names)
+    dq, dv = moved[:n_q], moved[n_q:]
+    if layout.space is not None:
+        for i, _ in layout.quaternion_slots:
+            dq[i : i + 4] /= np.linalg.norm(star[i : i + 4])
+        star[:n_q] = layout.space.normalised(star[:n_q])
+        dq = dq - layout.space.stretch(star[:n_q], dq)
+    if not layout.n_c:
+        return np.vstack([dq, dv])
+    off = float(np.abs(layout.scales.distance(x[:n_q], star[:n_q])).max())
+    if off > OFF:
+        raise NoDerivativeError(
+            f"{what} resets coordinates to values that do not close the loops (the projection moves them by {off:.2g}, "
+            "scaled), so the derivative is not known; reset all coordinates so that the loops stay closed"
+        )
+    strike, scales = Strike(module, t, x), layout.scales
+    dq = dq - _back(run, module, strike, dq, move)
+    star_v = star[n_q:]
+    m = solve_multipliers(strike.C_q[None], ((strike.v - star_v) / scales.q**2)[:, None], scales)[:, 0]
+    held = run.move(t, x, np.vstack([dq, np.zeros_like(dv)]), move.t)
+    _, least, rate, _ = strike.rows(strike.v, strike.v - star_v, m, np.zeros(layout.n_events))
+    pushed, rates = held.along(least, what, names), held.along(rate, what, names)
+    nothing = np.zeros((0, layout.n_v)), np.zeros((0, dv.shape[1]))
+    return np.vstack([dq, strike.solve(np.diag(scales.q**-2), dv, pushed, rates, *nothing)])
+
+
+def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move: Move) -> Array:
+    """What brings changes of coordinates (n_q, k) back onto the constraints."""
+    layout, t, q = module.layout, strike.t, strike.q
+    n_h, n_q, n_x = layout.n_h, layout.n_q, layout.n_x
+    if not n_h:
+        return np.zeros_like(dq)
+    x = np.concatenate([q, np.zeros(layout.n_v)])
+    E = assembly_rows(module, t, x, run.inputs(t, x) if run.forcing else None)[:n_h]
+    drift = module.velocity_constraints(x, t=t, rows="all")[:n_h]
+    off = E[:, :n_q] @ dq + np.multiply.outer(drift, move.t) + E[:, n_x + layout.n_u :] @ move.p
+    off = off + E[:, n_x : n_x + layout.n_u] @ run.du
+    N = layout.scales.rates(q, np.eye(layout.n_v))
+    return layout.scales.rates(q, minimum_norm(E[:, :n_q] @ N, off, layout.scales))
+
+
+# -- across an event ---------------------------------------------------------------------------------------------------
+
 
 GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
 

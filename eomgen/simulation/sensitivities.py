@@ -26,20 +26,22 @@ from ..runtime.room import read_number, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
 from .events import Events, told_by_the_caller, warn_of_unknown
-from .input_slopes import SlopesNow
 from .integrate import Solution, choose_solver, integrate, require_end
-from .lost_branch import refuse_lost_branches
 from .meetings import limited
 from .recording import record
-from .run_arguments import DEFAULTS, find_span, find_state, longest_step, ordered_times
-from .saltation import Saltation
+from .run_arguments import DEFAULTS, check_tolerances, find_span, find_state, longest_step, ordered_times
+from .saltation import Saltation, Variational
 from .sensitivity_result import Sensitivities
-from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
+from .sensitivity_start import (
+    SlopesNow,
+    held_names,
+    keep_consistent,
+    refuse_lost_branches,
+    split_columns,
+    start_sensitivity,
+)
 from .simulate import simulate
-from .stalled import Crawling
-from .stalling import StallCheck, describe_crawl
-from .tolerances import check_tolerances
-from .variational import Variational
+from .stalling import Crawling, StallCheck, describe_crawl
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,30 +1,131 @@
-"""Simulation: how an assembled initial state changes with parameters and with the values it was assembled from.
+"""How an assembled initial state changes with parameters and with the values it was assembled from.
 
 Values that are held stay (or change by one, for a sensitivity to an initial value); the constraints give the rest by
 implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
+
+At a change point two branches cross.  Let l be the direction in which the constraints lose rank there, l^T C_q = 0.  A
+change of p with l^T C_p not zero opens the crossing, and the mechanism turns back or changes over: the motion is no
+smooth function of p.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.constraints import CONTRADICTION, STATE
+from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
+from ..base.limits.impacts import OPENS
 from ..base.names import place_of_marker
-from ..errors import at_odds, ill_placed, incomplete, untrue
+from ..errors import NoDerivativeError, at_odds, cannot, ill_placed, incomplete, untrue
 from ..numeric.projection import minimum_norm
+from ..runtime.change_points import scaled_jacobians
 from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
+from ..runtime.input_kinds import Tabulated
+from ..runtime.layout import Layout
+from ..runtime.signal_rates import rate_places
+from ..runtime.signals import Forcing
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.layout import Layout
-    from .input_slopes import SlopesNow
+    from ..runtime.trajectory import Trajectory
+
+
+# -- inputs ------------------------------------------------------------------------------------------------------------
+
+
+class SlopesNow(NamedTuple):
+    """Derivatives of all inputs at a time and state."""
+
+    by_t: Array  #: (n_u,)
+    by_x: Array  #: (n_u, n_x)
+    by_p: Array  #: (n_u, n_p)
+
+
+class InputSlopes:
+    """Derivatives of the inputs of one run.
+
+    An expression is differentiated on the graph, a table piece by piece.  A Python function is called without the
+    state from here on: one that reads it has derivatives that nobody knows.
+
+    Parameters
+    ----------
+    layout : Layout
+    forcing : Forcing
+        Attached to the module of the run.
+    p : (n_p,) array
+    """
+
+    def __init__(self, layout: Layout, forcing: Forcing, p: Array) -> None:
+        self.layout = layout
+        self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
+        self.forcing = forcing
+        self.rates = rate_places(layout)
+        self.tables: dict[int, Tabulated] = {}
+        self.functions: set[int] = set()
+        for i, signal in forcing.varying.items():
+            if i in self.formulas:
+                continue
+            if isinstance(signal, Tabulated):
+                self.tables[i] = signal.derivative()
+            else:
+                self.functions.add(i)
+                forcing.varying[i] = AtOneState(layout.u[i], signal)
+
+    @property
+    def by_state_or_parameters(self) -> bool:
+        """Whether an input may depend on more than time."""
+        return bool(self.formulas)
+
+    def __call__(self, t: float, x: Array) -> SlopesNow:
+        """The derivatives; NaN by time for a Python function, unless its rate is an input too."""
+        n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
+        every = np.zeros((n_u, 1 + n_x + n_p))
+        for i, slopes in self.formulas.items():
+            every[i] = slopes(t, x)
+        within = self.forcing.within
+        for i, table in self.tables.items():
+            every[i, 0] = table.beside(t, t if within is None else min(max(t, within[0]), within[1]))
+        for i in self.functions:
+            rate = self.rates.get(i)
+            every[i, 0] = np.nan if rate is None else self.forcing(t, x)[rate]
+        return SlopesNow(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
+
+
+class AtOneState:
+    """A user's function f(t, x) as one of time alone.
+
+    Parameters
+    ----------
+    name : str
+        Of the input.
+    function : callable f(t, x)
+    """
+
+    def __init__(self, name: str, function: Callable[[float, Any], float]) -> None:
+        self.name, self.function = name, function
+
+    def __call__(self, t: float, x: Array) -> float:
+        """The value, without the state.
+
+        Raises
+        ------
+        UsageError
+            The function reads the state.
+        """
+        try:
+            return self.function(t, None)
+        except Exception:
+            self.function(t, x)  # a fault of its own comes out as it is
+        raise cannot(
+            f"input {self.name} is a Python function of the state, and its derivatives are not known; give it as an "
+            'expression in a text, such as "-k*theta", or as a function of time alone'
+        )
 
 
 class Differentiated(NamedTuple):
@@ -236,3 +337,39 @@ def keep_consistent(
     lines = slice(n_h, n_h + n_c)
     gap = E[lines, :n_q] @ dq + E[lines, n_q:n_x] @ dv + other[lines]
     return np.vstack([dq, dv - minimum_norm(E[lines, n_q:n_x], gap, scales)])
+
+
+# -- branches that a change leaves -------------------------------------------------------------------------------------
+
+
+def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, columns: Differentiated) -> None:
+    """Refuse parameters and inputs whose change opens a crossing that the run passes.
+
+    Raises
+    ------
+    NoDerivativeError
+        Names the parameter or input, and the time.
+    """
+    layout = module.layout
+    by = [(name, layout.n_x + layout.n_u + i) for name, i in _named(columns, columns.parameters)]
+    by += [(name, layout.n_x + i) for name, i in _named(columns, columns.inputs)]
+    if not by or not layout.n_h or not layout.rank:
+        return
+    for point in run.change_points:
+        x = np.concatenate([[point.coordinates[name] for name in layout.q], np.zeros(layout.n_v)])
+        u = forcing(point.time, x)
+        J = scaled_jacobians(module, np.array([point.time]), x[:, None], u[:, None] if len(u) else None)[0]
+        U, sizes, _ = algebra.svd(J[: layout.n_h])
+        lost = U[:, np.count_nonzero(sizes > 10.0 * PASSED * sizes.max(initial=0.0)) :]
+        C = assembly_jacobian(module.bind(u=u), point.time, x)[: layout.n_h] / layout.scales.c[: layout.n_h, None]
+        for name, k in by:
+            length = float(np.linalg.norm(C[:, k]))
+            if length > 0.0 and float(np.linalg.norm(lost.T @ C[:, k])) > OPENS * length:
+                raise NoDerivativeError(
+                    f"the run passes a change point at t = {point.time:.6g} s, and a change of {name} separates the "
+                    f"branches that meet there, so there is no derivative by {name}; end the run before it"
+                )
+
+
+def _named(columns: Differentiated, pairs: tuple[tuple[int, int], ...]) -> list[tuple[str, int]]:
+    return [(columns.names[column], index) for column, index in pairs]

@@ -11,8 +11,7 @@ from ..errors import UsageError
 from ..runtime.signals import Forcing
 from .compiled import can_run
 from .events import Events
-from .run_arguments import declare, longest_step, own_step
-from .tolerances import check_tolerances
+from .run_arguments import check_tolerances, declare, longest_step, own_step
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -29,12 +29,20 @@ from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, told_by_the_caller, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .passed_limits import warn_of_limits
-from .recording import record
-from .run_arguments import check_method, declare, find_span, find_state, longest_step, ordered_times, own_step
+from .recording import record, warn_of_limits
+from .run_arguments import (
+    IMPLICIT,
+    check_method,
+    check_tolerances,
+    declare,
+    find_span,
+    find_state,
+    longest_step,
+    ordered_times,
+    own_step,
+)
 from .settled import settle
-from .stalled import Crawling
-from .tolerances import IMPLICIT, check_tolerances
+from .stalling import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Simulation: times and states of an integrator's steps -> the end of a run whose steps lead nowhere.
+"""Times and states of an integrator's steps -> the end of a run whose steps lead nowhere.
 
 Next to a singular position, or where a force jumps, an integrator may go on for days in steps just above rounding.
 """
@@ -15,7 +15,6 @@ from ..base.limits.numbers import TINY
 from ..base.limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, MOST_STEPS, NOTICED, SHORT, STEEP, STILL
 from ..errors import SimulationError
 from ..runtime.failure import place
-from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
@@ -186,3 +185,22 @@ def describe_crawl(crawl: Crawling, names: tuple[str, ...], end: float, method: 
         f"{method} stopped at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: with steps "
         f"of {crawl.step:.1e} s on average it makes no progress{why}; {REMEDY}"
     )
+
+
+# -- the end of such a run ---------------------------------------------------------------------------------------------
+
+
+class Crawling(Exception):
+    """Raised inside an integration whose steps lead nowhere.
+
+    Parameters
+    ----------
+    t : float
+    x : (n_x,) array
+    step : float
+        Mean length of the last steps (s).
+    """
+
+    def __init__(self, t: float, x: Array, step: float) -> None:
+        super().__init__(t, x, step)
+        self.t, self.x, self.step = t, x, step

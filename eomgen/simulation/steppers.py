@@ -17,7 +17,7 @@ from ..runtime.refusals import refuse_rigid
 from ..runtime.room import fitting, read_plain, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
-from .tolerances import IMPLICIT
+from .run_arguments import IMPLICIT
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
