@@ -109,7 +109,7 @@ def _find_or_build(
     entry = cache.find(key)
     found = entry is not None
     if entry is None:
-        flags |= {SOLVER: _solver_flags(words, options)} if SOLVER in flags else {}
+        flags |= {SOLVER: _solver_flags(words, options, compiler)} if SOLVER in flags else {}
         shared = partial(_shared_objects, cache, sources, flags, compiler, progress)
         entry = _build(cache, key, kind, name, sources, flags, shared, options, compiler, progress)
     seconds = time.perf_counter() - start
@@ -156,10 +156,17 @@ def _build(
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
-def _solver_flags(words: Sequence[str], options: Options) -> list[str]:
-    """Flags of the solvers, of no model's own: loops of unknown length gain by -O2 what straight-line code loses."""
-    fast = options.optimize is None
-    return ["-O2" if fast and re.fullmatch(r"-O\d", w) else w for w in words if not w.startswith("-DEOMGEN_")]
+def _solver_flags(words: Sequence[str], options: Options, compiler: CompilerInfo) -> list[str]:
+    """Flags of the solvers, none of a model's own: their loops gain by -O2 what straight-line code loses.
+
+    Rows are short: with vectors of gcc 12 a Stewart platform takes 1.2 of the time to project, a slider-crank 1.05 for
+    its Jacobian.
+    """
+    words = [word for word in words if not word.startswith("-DEOMGEN_")]
+    if options.optimize is not None:
+        return words
+    words = ["-O2" if re.fullmatch(r"-O\d", word) else word for word in words]
+    return [*words, "-fno-tree-vectorize"] if compiler.kind == "gcc" else words
 
 
 def _shared_objects(
