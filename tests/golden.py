@@ -58,7 +58,7 @@ IN_C = (
     "coordinate_slopes", "velocity_constraints", "project", "poses", "outputs", "events", "resets", "held_errors",
     "kinematics", "loop_coordinates", "loop_coordinate_jacobian", "alignment", "finite_forces", "meeting_time",
     "scales", "centroidal", "needed_wrenches", "wrench_geometry", "inverse_dynamics",
-    "near_pairs", "bias_apart", "motion_axes",
+    "near_pairs", "bias_apart", "motion_axes", "motion_outputs",
 )  # fmt: skip
 
 
