@@ -12,7 +12,6 @@ from pathlib import Path
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
-from .base.files import load_source
 from .errors import UnavailableError, ill_typed
 from .runtime.argument_names import both_names, plain_names
 from .runtime.bound_model import BoundModel
@@ -222,6 +221,8 @@ class Module(BoundModel):
             raise ill_typed(f"{package!r} is no package that eomgen generated")
         core, file = module.core, str(module.core.__file__)
         if file.endswith(".py"):  # what it raises would be errors of the package, which nothing here knows
+            from .base.files import load_source
+
             core = load_source(f"{__package__}._{module.name}", file, Path(file).read_bytes())
         return cls(core, module.p, module.u)
 

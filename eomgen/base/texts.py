@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from collections.abc import Iterable, Sequence
 from math import isfinite, tau
-from textwrap import wrap
 from typing import Any
 
 from .limits.numbers import SHOWN, SHOWN_COMPLEX
@@ -175,11 +173,15 @@ def terminal_width() -> int | None:
     said = os.environ.get("COLUMNS", "")
     if not sys.stdout.isatty() and not (said.isdecimal() and int(said) > 0):
         return None
+    import shutil  # slow to import, as textwrap is
+
     return max(shutil.get_terminal_size().columns, NARROWEST)  # which looks at COLUMNS first
 
 
 def fold(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     """The text in lines of at most so many characters, broken between words; each begins with ``first`` or ``rest``."""
+    from textwrap import wrap
+
     return wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )
