@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from children import HANGS
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 DRIVER = Path(__file__).with_name("c_driver.c")
 WARNINGS = (
     *("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Wvla", "-Werror"),
@@ -139,15 +140,21 @@ print("done")
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_runs_of_modules_under_the_sanitizers(tmp_path: Path) -> None:
-    """Steppers, events and ensembles too: all that a module is built of, compiled with gcc's sanitizers."""
-    compiler = tmp_path / "cc"
-    compiler.write_text('#!/bin/sh\nexec gcc "$@" -fsanitize=address,undefined -fno-sanitize-recover=all\n')
+    """Steppers, events and ensembles too: in a clone whose extension module is built with gcc's sanitizers."""
+    clone, compiler = tmp_path / "clone", tmp_path / "cc"
+    for folder in ("eomgen", "templates", "examples"):
+        shutil.copytree(ROOT / folder, clone / folder, ignore=shutil.ignore_patterns("__pycache__", "_native*.so"))
+    shutil.copy(ROOT / "pyproject.toml", clone)
+    compiler.write_text('#!/bin/sh\nexec gcc "$@" -Og -fsanitize=address,undefined -fno-sanitize-recover=all\n')
     compiler.chmod(0o755)
     library = run("gcc", "-print-file-name=libasan.so", cwd=tmp_path).stdout.strip()
     told = {"CC": str(compiler), "EOMGEN_CACHE_DIR": str(tmp_path / "cache"), "EOMGEN_COMPILER_SECONDS": "900"}
     told |= {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0"}
     done = subprocess.run(
-        [sys.executable, "-c", RUNS], env=os.environ | told, capture_output=True, text=True, check=False, timeout=3000
-    )
+        [sys.executable, "-c", RUNS],
+        cwd=clone, env=os.environ | told, capture_output=True, text=True, check=False, timeout=3000,
+    )  # fmt: skip
     assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-3000:]
+    (native,) = (clone / "eomgen").glob("_native*.so")
+    assert b"__asan_" in native.read_bytes()
     assert done.stdout.endswith("done\n")
