@@ -361,13 +361,6 @@ def _centroidal(kinematics: Kinematics) -> list[Expr]:
     return [*total.centre, *(x for row in rows for x in row)]
 
 
-def _mass_parameters(kinematics: Kinematics) -> list[tuple[str, str]]:
-    """Parameters that are the mass of a body by themselves, with the name of that body, which must not be negative."""
-    symbols = {kinematics.graph.symbol(name): name for name in kinematics.parameter_names}
-    bodies = kinematics.mechanism.bodies
-    return [(symbols[body.mass], body.name) for body in bodies if body.checked and body.mass in symbols]
-
-
 def _poses(kinematics: Kinematics) -> list[Expr]:
     """Body frames in ground axes as 4 x 4 matrices, row by row, in the order the bodies were declared."""
     graph = kinematics.graph
@@ -435,7 +428,6 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "y_names": [o.name for o in m.outputs],
         **({"velocity_outputs": moved} if (moved := [o.name for o in m.outputs if o.of_velocities]) else {}),
         "body_names": [b.name for b in m.bodies],
-        "masses": dict(_mass_parameters(kinematics)),
         **keep_rules(m.requirements, kinematics.parameter_names),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),

@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from ..errors import ToolchainError
+from ..errors import ToolchainError, off_range
 
 #: Seconds: to say a version; to compile or link, and per byte of source: twenty times what gcc takes for large models.
 ANSWER, COMPILE, PER_BYTE = 15.0, 120.0, 1.5e-3
@@ -145,7 +145,7 @@ def _given() -> float | None:
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds < float("inf"):
-        raise ToolchainError(f"{SECONDS} must be a positive number of seconds, not {text!r}", code="EG-NUMBER")
+        raise off_range(f"{SECONDS} must be a positive number of seconds, not {text!r}")
     return seconds
 
 

@@ -177,9 +177,9 @@ class _Walker:
         self.words = function_words()
         self.size = 0
 
-    def fault(self, node: ast.AST, message: str, remedy: str | None = None) -> ExpressionError:
+    def fault(self, node: ast.AST, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:
         column = getattr(node, "col_offset", 0) + self.start + 1
-        return ExpressionError(message, column, allowed() if remedy is None else remedy, self.text)
+        return ExpressionError(message, column, allowed() if remedy is None else remedy, self.text, code)
 
     def walk(self, node: ast.expr, depth: int) -> Expr:
         self.size += 1
@@ -229,7 +229,7 @@ class _Walker:
         try:
             return self.resolve(node.id)
         except ExpressionError as error:
-            raise self.fault(node, error.message, error.remedy) from None
+            raise self.fault(node, error.message, error.remedy, error.code) from None
 
     def binary(self, node: ast.BinOp, depth: int) -> Expr:
         chain = [node]  # a long sum leans to the left; walking its spine keeps that from counting as depth
@@ -335,7 +335,7 @@ class _Walker:
         try:
             return self.locate(MarkerQuantity.of(name, ", ".join(parts)))
         except ExpressionError as error:
-            raise self.fault(node.args[0] if node.args else node, error.message, error.remedy) from None
+            raise self.fault(node.args[0] if node.args else node, error.message, error.remedy, error.code) from None
 
     def element(self, node: ast.Call, name: str) -> Expr:
         """What a force element does."""
@@ -348,7 +348,7 @@ class _Walker:
         try:
             return self.locate(ElementQuantity(name, argument.id))
         except ExpressionError as error:
-            raise self.fault(argument, error.message, error.remedy) from None
+            raise self.fault(argument, error.message, error.remedy, error.code) from None
 
     def carried(self, node: ast.expr, call: ast.Call) -> Expr:
         """``reaction(A).x``, ``multiplier(mesh.ratio)``, ``force(track, on=wheel).x``."""
@@ -360,7 +360,7 @@ class _Walker:
         try:
             return self.locate(_WRENCHES[call.func.id](node))
         except ExpressionError as error:
-            raise self.fault(node, error.message, error.remedy) from None
+            raise self.fault(node, error.message, error.remedy, error.code) from None
 
     def marker(self, argument: ast.expr, quantity: str) -> str:
         """The label of a marker, ``rod`` or ``rod.tip``."""

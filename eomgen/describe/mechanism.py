@@ -369,6 +369,7 @@ class Mechanism:
                 f"give it one where it is declared: parameters: {{{p.name}: VALUE}} in a file, "
                 f'm.parameter("{p.name}", VALUE) or parameters= in Python; or by --set {p.name}=VALUE, of verbs that '
                 "have --set",
+                "EG-MISSING",
             )
             for p in self.parameters
             if p.value is None

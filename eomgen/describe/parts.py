@@ -135,9 +135,8 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
     try:
         found = measure_mesh(_locate(reader, file))
     except UsageError as error:
-        reader.faults.add(
-            place, str(error), "a mesh must be a closed surface of triangles that face outwards", "EG-FILE-DAMAGED"
-        )
+        needed = "a mesh must be a closed surface of triangles that face outwards"
+        reader.faults.add(place, str(error), needed * (error.code == "EG-FILE-DAMAGED"), error.code)
         return None
     one = graph.one if scale is None else scale
     x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)

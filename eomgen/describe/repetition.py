@@ -35,8 +35,9 @@ def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
             fault(place, f"{values!r} is not a list of values", _REMEDY, "EG-TYPE")
             return None
         if not 1 <= len(listed) <= ROUNDS:
-            wrong_count = f"has more than {ROUNDS} values" if listed else "has no values"
-            fault(place, wrong_count, f"1 to {ROUNDS}", "EG-SHAPE")
+            many, none = ("has more than {} values", "EG-TOO-LARGE"), ("has no values", "EG-SHAPE")
+            wrong_count, code = many if listed else none
+            fault(place, wrong_count.format(ROUNDS), f"1 to {ROUNDS}", code)
             return None
         columns[name] = listed
     counts = {name: len(values) for name, values in columns.items()}

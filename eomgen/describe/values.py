@@ -105,12 +105,12 @@ class Reader:
         found = self.requirements.known([expression])
         return None if found is None else float(found[0])
 
-    def wrong(self, path: str, value: object, kind: str) -> None:
+    def wrong(self, path: str, value: object, kind: str, code: str = "EG-TYPE") -> None:
         """Note that a value is not of a kind."""
         if value is None:
             self.faults.add(path, "has no value", f"give {KINDS[kind]}", "EG-MISSING")
         else:
-            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}", code="EG-TYPE")
+            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}", code=code)
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -162,7 +162,7 @@ class Reader:
             finite = False
         if not finite or (positive and result <= 0):
             if not self.faults.under(path):
-                self.wrong(path, value, kind)
+                self.wrong(path, value, kind, "EG-RANGE" if finite else "EG-TYPE")
             return None
         return float(result)
 

@@ -51,7 +51,7 @@ cdef object one_of(object error, str name, object given, str other, object same)
     if same is None:
         return given
     if given is not None:
-        raise error(f"{name} and {other} are the same argument; give one of them")
+        raise fault(error, "EG-CONFLICT", f"{name} and {other} are the same argument; give one of them")
     return same
 
 

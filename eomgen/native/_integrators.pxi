@@ -27,7 +27,7 @@ cdef class Integrator(Journey):
         if context.model.projects:
             self.project = context.model.kernel("project").call
 
-    def advance(self, double t, x, double h, p=None, u=None, out=None):
+    def advance(self, double t, x, double h, p=None, u=None, out=None, error=ValueError):
         """From x (n_x,) at time t over a time h, both checked: (state, None), or (state reached, what happened): the
         status, the time, the last failure of an evaluation, and what a signal or the watch raised."""
         cdef eomgen_run *run = &self.run
@@ -35,15 +35,15 @@ cdef class Integrator(Journey):
         cdef int n = run.n, status = 1
         cdef cnp.npy_intp length = n
         cdef Model model = self.context.model
-        cdef cnp.ndarray state = vector(x, n, "x", ValueError)
-        cdef cnp.ndarray inputs = self.context.u if u is None else vector(u, model.table.n_u, "u", ValueError)
+        cdef cnp.ndarray state = vector(x, n, "x", error)
+        cdef cnp.ndarray inputs = self.context.u if u is None else vector(u, model.table.n_u, "u", error)
         cdef cnp.ndarray constants = self.context.c
         cdef cnp.ndarray result
         if p is not None:
-            constants = model.constants(vector(p, model.table.n_p, "p", ValueError), ValueError)
-        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, ValueError)
+            constants = model.constants(vector(p, model.table.n_p, "p", error), error)
+        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, error)
         if not self.turn.acquire(False):
-            raise ValueError("it is already working in another thread; make one integrator for each thread")
+            raise fault(error, "EG-USAGE", "it is already working in another thread; make one integrator for each thread")
         try:
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
             memcpy(run.u, cnp.PyArray_DATA(inputs), model.table.n_u * sizeof(double))

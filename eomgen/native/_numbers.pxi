@@ -6,6 +6,11 @@ cdef enum:
     DEEPEST = 64  # lists in lists, as in NumPy
 
 
+cdef object fault(object error, str code, str text):
+    """The error for a caller, of this code where it is one of eomgen's."""
+    return error(text) if error is ValueError else error(text, code=code)
+
+
 cdef cnp.ndarray doubles(object value, str label, object error, str name=None, int n=-1):
     """The value as an aligned float64 array: itself if it is one, whatever its strides; else a converted copy.
 
@@ -102,7 +107,7 @@ cdef inline double moment(object t, str label, object error, str name=None) exce
     array = doubles(t, label, error, name, SCALAR)
     if cnp.PyArray_NDIM(array):
         if name is None:
-            raise error(f"{label} must be a number, not {shown(t)}")
+            raise fault(error, "EG-NUMBER", f"{label} must be a number, not {shown(t)}")
         raise error(f"{label} of {name} must be a number or have shape (k,), not {(<object>array).shape}")
     return (<double *>cnp.PyArray_DATA(array))[0]
 
@@ -111,7 +116,7 @@ cdef double finite(object given, str label, object error) except? -7.0:
     """A number that is neither NaN nor infinite."""
     cdef double number = moment(given, label, error)
     if not isfinite(number):
-        raise error(f"{label} must be finite, not {number}")
+        raise fault(error, "EG-NUMBER", f"{label} must be finite, not {number}")
     return number
 
 

@@ -47,10 +47,7 @@ class Kernels:
     def __init__(self, core: Core, layout: Layout, p: Array | None = None, u: Array | None = None) -> None:
         self.core = core
         self.layout = layout
-        try:
-            self.context = core.context(p, u, ill_shaped)
-        except UsageError as error:
-            raise UsageError(layout.explain_constants(str(error), p), code=error.code) from None
+        self.context = core.context(p, u, ill_shaped)
         if p is not None and "scales" in core.names:
             scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, ill_shaped)
             self.layout = layout = layout.sized(scales(np.empty(0)))

@@ -226,23 +226,6 @@ class Layout:
             self.require_allowed(result)
         return result
 
-    def explain_constants(self, message: str, p: Any) -> str:
-        """The message that constants cannot be computed, with the names of the parameters; any other as it is."""
-        if "constants that follow" not in message:
-            return message
-        declared = self.metadata["p_values"]
-        given = declared if p is None else list(p)
-        named = list(zip(self.p, given, declared, strict=True))
-        changed = [f"{name} = {x:.6g}" for name, x, value in named if x != value]
-        shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
-        head = "the constants computed from the parameters are not finite"
-        which = " (changed from their declared values)" if changed else ""
-        masses = self.metadata.get("masses", {})
-        nought = [f"{name} is the mass of body {masses[name]!r}" for name, x, _ in named if name in masses and x == 0.0]
-        cause = f": {', '.join(nought)}" if nought else ""
-        remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
-        return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
-
     def require_allowed(self, p: Array) -> None:
         """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost.
 

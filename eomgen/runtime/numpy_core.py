@@ -76,26 +76,20 @@ class NumpyCore:
         Raises
         ------
         error
-            For a wrong shape, or constants that are not finite.
+            For a wrong shape.
         """
         data = self.layout.metadata
         p = _declared(data["p_values"]) if p is None else p
         p = _vector(p, self.layout.n_p, "p", error)
         u = _vector(_declared(data["u_values"]) if u is None else u, self.layout.n_u, "u", error)
-        return Context(p, u, self.constants(p, error))
+        return Context(p, u, self.constants(p))
 
-    def constants(self, p: Array, error: Callable[[str], Exception]) -> Array:
-        """The constants handed to the blocks."""
+    def constants(self, p: Array) -> Array:
+        """The constants handed to the blocks; what uses one that is not finite tells the cause."""
         if self.precompute is None:
             return p
-        try:
-            with np.errstate(all="ignore"):
-                c = np.asarray(self.precompute(p), dtype=float)
-        except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
-            c = np.array(np.nan)
-        if not np.isfinite(c).all() and np.isfinite(p).all():
-            raise error(f"the constants that follow from the parameters cannot be computed; p = {p}")
-        return c
+        with np.errstate(all="ignore"):
+            return np.asarray(self.precompute(p), dtype=float)
 
     def timed(
         self, name: str, context: Context, shape: Any, fail: Any, nan: bool = False, error: Any = ValueError
@@ -185,7 +179,7 @@ class NumpyKernel:
         p, u = self.by_name("p", p, self.context.p), self.by_name("u", u, self.context.u)
         c = self.context.c
         if p is not None:
-            c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
+            c = self.core.constants(_vector(p, layout.n_p, "p", self.error))
         given = () if p is None and u is None else (p,)
         force = self.context.u if u is None else self.read(u, "u", layout.n_u)
         if force.shape not in ((layout.n_u,), (layout.n_u, *x.shape[1:])):

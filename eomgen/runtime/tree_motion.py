@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 from ..base.limits.analyses import FOLLOWED
 from ..errors import EvaluationError, ProjectionError, ill_shaped, no_number, too_large
-from ..numeric.continuation import Continuation
+from ..numeric.continuation import LONG, STEPS, Continuation
 from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
+from ..numeric.projection import largest
 from .failure import place
 from .kernels import Kernels
 from .room import read_numbers
 
 STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration is asked for
+EARLY = 1000  #: steps after which a way is refused that is too long at the present rate of the dependent coordinates
 JUMP = 0.6  #: largest scaled change of any coordinate in one iteration; more may be another branch
 
 
@@ -113,6 +115,7 @@ class DependentMotion:
         path = IndependentPath(self, start, target, t)
         self._require_near(target, path.length)
         continuation = Continuation(path, start, fewest=1)
+        self._go_on(continuation, target, path.length)
         found = continuation.reach(path.length)
         if found is None:
             raise self._too_far(target, self._blocked(path.at(continuation.points[-1].s), path.failed))
@@ -139,7 +142,7 @@ class DependentMotion:
             way = Continuation(path, start, fewest=1)
             farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
             while not way.blocked and way.points[-1].s <= farthest:
-                way.to(np.floor(way.points[-1].s) + 1.0)
+                self._go_on(way, targets[:, chosen[0]], np.floor(way.points[-1].s) + 1.0)
             guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
             x = np.concatenate([targets[:, chosen], np.zeros((2 * self.layout.n_dof, len(chosen))), guesses])
             found = self.kernel(x, t=0.0)[:n_q]
@@ -148,11 +151,21 @@ class DependentMotion:
                 result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
         return list(result.T)
 
-    def _require_near(self, target: Array, length: float) -> None:
-        if not length <= FOLLOWED:
+    def _go_on(self, way: Continuation, target: Array, end: float) -> None:
+        """Follow a way to s = end; refuse one on which the dependent coordinates move farther than can be followed."""
+        if way.to(end, steps=EARLY) or way.blocked:
+            return
+        here = way.points[-1]
+        rate = largest(here.tangent.rate / self.layout.scales.q)
+        self._require_near(target, (end - here.s) * rate, LONG * STEPS)
+        if not way.to(end) and not way.blocked:
+            self._require_near(target, np.inf)
+
+    def _require_near(self, target: Array, length: float, most: float = FOLLOWED) -> None:
+        if not length <= most:
             raise too_large(
                 f"the path to {self._place(target)} is {length:.3g} rad or length scales long, and at most "
-                f"{FOLLOWED:g} "
+                f"{most:g} "
                 "are allowed, in small steps that stay on the branch; give a nearer position (without whole turns), "
                 "or guess=, a position to start from"
             )

@@ -261,7 +261,11 @@ class _Journey:
         if callable(jac := options.get("jac")):
             # both the function and the solver may change the state that they are given
             options["jac"] = lambda t, x: jac(t, x.copy())
-        return self.solver(self.rhs, self.t, self.x.copy(), end, **options)
+        solver = self.solver(self.rhs, self.t, self.x.copy(), end, **options)
+        if np.isnan(getattr(solver, "h_abs", 0.0)):  # with atol = 0 and a state of 0; SciPy would divide it for ever
+            options["first_step"] = min(abs(end - self.t), options.get("max_step", np.inf))
+            solver = self.solver(self.rhs, self.t, self.x.copy(), end, **options)
+        return solver
 
     def _length(self, solver: Any) -> float:
         size = getattr(solver, "h_abs", None)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..errors import EvaluationError, SimulationError, UsageError, cannot
+from ..errors import EvaluationError, SimulationError, UsageError, cannot, ill_shaped, no_number, off_range
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
@@ -128,17 +128,17 @@ class Integrator:
                 t, h = read_plain("t", t), read_plain("h", h)
             end = t + h
             if not isfinite(end):
-                raise ValueError(f"t + h must be finite, not {t} + {h}")
+                raise no_number(f"t + h must be finite, not {t} + {h}")
             if end == t and h != 0.0:
-                raise ValueError(f"h = {h} is too small at t = {t}: t + h equals t in double precision")
+                raise off_range(f"h = {h} is too small at t = {t}: t + h equals t in double precision")
             if "max_step" in self._options:
                 require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
             read, bound = self.module.kernels.fail.vector, self.module
             p, u = read("p", p, bound.p), read("u", u, bound.u)
             advance = self._plainly if self._compiled is None else self._compiled.advance
-            result, trouble = advance(t, x, h, p, u, out)
-        except ValueError as error:
-            raise UsageError(f"integrator of {self.module.name}: {error}") from None
+            result, trouble = advance(t, x, h, p, u, out, ill_shaped)
+        except UsageError as error:
+            raise UsageError(f"integrator of {self.module.name}: {error}", code=error.code) from None
         if trouble is not None:
             self._explain(trouble, result, end, p, u)
         return np.asarray(result)
@@ -169,7 +169,7 @@ class Integrator:
         off = "The state cannot be brought onto the constraints."
         raise run.ended(t, end, self.method, off if status == RESET_FAILED else TOO_SMALL, x) from run.cause()
 
-    def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None) -> tuple[Array, None]:
+    def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None, _: object) -> tuple[Array, None]:
         """The same by SciPy, for a module without compiled steppers."""
         layout = self.module.layout
         state, p, u = _vector("x", x, layout.n_x), _vector("p", p, layout.n_p), _vector("u", u, layout.n_u)
@@ -177,7 +177,7 @@ class Integrator:
         if out is not None and not (
             isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and out.flags.carray
         ):
-            raise ValueError(f"out must be a contiguous writeable float64 array of shape {shape}")
+            raise ill_shaped(f"out must be a contiguous writeable float64 array of shape {shape}")
         bound = self.module if p is None and u is None else self.module.bind(p, u)
         options = {k: min(v, abs(h)) if k == "first_step" else v for k, v in self._options.items()}
         if h == 0.0:

@@ -20,6 +20,7 @@ WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
 IN_PLACE = 1_000_000  #: steps left that it may take where nothing of it gets on, held between two sides of a jump
 HALVED = 10  #: times that an interval is halved in which a rate jumps: a change that is not one shrinks to 1/1024
+LEAST = 10.0  #: spacings of numbers at a time that a step has at least, in all methods of SciPy but LSODA
 HINDERED = 0.1  #: part of what its rate says up to which a state that moves is held
 REMEDY = (
     "look for a force that jumps (smooth it), a singular position, or very fast motions in a long run (try an "
@@ -82,7 +83,8 @@ class StallCheck:
             return
         still = np.concatenate([moved[part] <= STILL * self.largest[part].max(initial=0.0) for part in self.parts])
         crawl = Crawling(t, self.x, step)
-        if step <= self.limit and (still.all() or self.troubled(t, self.x)):
+        lost = step <= LEAST * np.spacing(abs(t))  # SciPy's LSODA goes on where the time does not
+        if lost or (step <= self.limit and (still.all() or self.troubled(t, self.x))):
             raise crawl
         if abs(self.end - t) > IN_PLACE * step:
             self.slow += 1  # sliding is looked for in the 1st, 2nd, 4th, 8th ...: it takes 12 n_x + 1 evaluations

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
-from ..errors import UnavailableError, UsageError, cannot
+from ..errors import UnavailableError, cannot, ill_shaped
 from ..runtime.late import eager
 from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid
@@ -174,7 +174,7 @@ def step(
         )
     core, u = eager(module.core), module.kernels.fail.vector("u", u, module.u)
     if hasattr(core, "march"):
-        status, result = core.march(module.kernels.context, t, h, x, u, out, UsageError)
+        status, result = core.march(module.kernels.context, t, h, x, u, out, ill_shaped)
         if status == 0:
             return np.asarray(result)
     # in Python, or once more in Python to tell which of the four evaluations failed

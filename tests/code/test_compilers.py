@@ -12,8 +12,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
-
-import eomgen as eg
+from refusals import refused, refuses
 
 
 @pytest.fixture(autouse=True)
@@ -57,8 +56,7 @@ def test_a_compiler_that_hangs_is_killed_with_its_children(
         "CC", shell(VERSION + f"(sleep 100; touch {tmp_path}/lived) & echo $! > {tmp_path}/child; echo said; wait")
     )
     monkeypatch.setenv("EOMGEN_COMPILER_SECONDS", "2")
-    with pytest.raises(eg.ToolchainError, match=r"did not finish.* 2\.?0? s \(EOMGEN_COMPILER_SECONDS sets"):
-        write_unit(tmp_path)
+    refuses("EG-COMPILER-FAILED 2 EOMGEN_COMPILER_SECONDS", write_unit, tmp_path)
     children = (tmp_path / "child").read_text().split()
     while any(alive(int(pid)) for pid in children):
         time.sleep(0.01)
@@ -69,14 +67,13 @@ def test_a_compiler_that_hangs_is_killed_with_its_children(
 @pytest.mark.parametrize("nonsense", ["soon", "-1", "0", "nan", "inf"])
 def test_seconds_are_a_positive_number(nonsense: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EOMGEN_COMPILER_SECONDS", nonsense)
-    with pytest.raises(eg.ToolchainError, match="positive number of seconds"):
-        write_unit(tmp_path)
+    refuses(f"EG-RANGE EOMGEN_COMPILER_SECONDS '{nonsense}'", write_unit, tmp_path)
 
 
 @pytest.mark.thorough
 def test_output_has_a_bound(shell: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", shell(VERSION + "exec yes"))
-    with pytest.raises(eg.ToolchainError, match=r"stopped after .* MB of output") as raised:
+    with refused("EG-COMPILER-FAILED MB") as raised:
         write_unit(tmp_path)
     assert len(str(raised.value)) < 10_000
 
@@ -96,11 +93,11 @@ def test_a_wished_compiler_is_not_replaced(
     (tmp_path / "elf").write_bytes(b"\x7fELF nonsense")
     (tmp_path / "elf").chmod(0o755)
     monkeypatch.setenv("CC", command.format(folder=tmp_path))
-    with pytest.raises(eg.ToolchainError, match="environment variable CC") as raised:
+    with refused("EG-COMPILER-MISSING CC") as raised:
         write_unit(tmp_path)
     assert words in str(raised.value)
-    with pytest.raises(eg.ToolchainError, match="option compiler does not work"):
-        models.build("pendulum").compile(compiler="nothing-like-it")
+    call = models.build("pendulum").compile
+    refuses("EG-COMPILER-MISSING compiler nothing-like-it:", call, compiler="nothing-like-it")
 
 
 def test_a_compiler_may_have_a_relative_name_and_a_blank_one_is_none(
@@ -134,9 +131,8 @@ def test_what_fails_is_quoted_and_kept_to_be_looked_at(
     shell: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CC", shell(VERSION + 'case "$*" in *" -c "*) echo not today >&2; exit 1;; esac\nexec gcc "$@"'))
-    with pytest.raises(eg.ToolchainError, match="not today") as raised:
+    with refused("EG-COMPILER-FAILED today -ffp-contract=off") as raised:
         write_unit(tmp_path)
-    assert "-ffp-contract=off" in str(raised.value)
     attempt = next(path for path in (tmp_path / "cache" / "attempts").iterdir() if str(path) in str(raised.value))
     assert list(attempt.rglob("*.c"))
     assert list((tmp_path / "cache" / "entries").iterdir()) == []
@@ -156,8 +152,9 @@ def test_products_are_looked_at(
 ) -> None:
     """Of a compiler that reports success."""
     monkeypatch.setenv("CC", shell(f'{VERSION}{lines}\nexec gcc "$@"'))
-    with pytest.raises(eg.ToolchainError, match=f"reports success, but .*{words}"):
+    with refused("EG-COMPILER-FAILED success") as raised:
         write_unit(tmp_path)
+    assert words in str(raised.value)
 
 
 def test_a_model_needs_no_headers_of_python_and_no_cython(shell: Callable[[str], str], tmp_path: Path) -> None:
@@ -175,17 +172,17 @@ def test_a_model_needs_no_headers_of_python_and_no_cython(shell: Callable[[str],
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "demand"),
     [
-        ({"optimize": 7}, "optimize must be None, 0, 1, 2 or 3"), ({"extra": "-g"}, "extra must be a sequence"),
-        ({"lanes": 3}, "lanes must be"), ({"compiler": 3}, "compiler must be a text"), ({"jobs": 0}, "jobs"),
-        ({"extra": ["-fno-such-flag"]}, "no-such-flag"), ({"kernels": ["motion"]}, "no kernel"),
-        ({"optimise": 1}, "optimize"),
+        ({"optimize": 7}, "EG-CHOICE optimize 0 3 7"), ({"extra": "-g"}, "EG-TYPE extra '-g'"),
+        ({"lanes": 3}, "EG-CHOICE lanes 8 3"), ({"compiler": 3}, "EG-TYPE compiler 3"),
+        ({"extra": ["-fno-such-flag"]}, "EG-COMPILER-FAILED -fno-such-flag"), ({"jobs": 0}, "EG-RANGE jobs 0"),
+        ({"kernels": ["motion"]}, "EG-NAME-UNKNOWN 'motion' 'motion_axes'?"),
+        ({"optimise": 1}, "EG-NAME-UNKNOWN optimise"),
     ],
 )  # fmt: skip
-def test_wrong_options_are_named(options: dict[str, Any], words: str) -> None:
-    with pytest.raises((eg.UsageError, eg.ToolchainError, TypeError), match=words):
-        models.build("pendulum").compile(**options)
+def test_wrong_options_are_named(options: dict[str, Any], demand: str) -> None:
+    refuses(demand, models.build("pendulum").compile, **options)
 
 
 @pytest.mark.quick
@@ -193,5 +190,4 @@ def test_kernels_that_were_not_requested_are_named() -> None:
     module = models.build("slider_crank").compile(target="numpy", kernels=["rhs", "project"])
     x = np.array([0.3, -0.4, 0.4, 1.0, -1.2, 0.0])
     assert module.rhs(0.0, x).shape == (6,)
-    with pytest.raises(eg.UsageError, match="was generated without the kernel 'energy'"):
-        module.energy(x)
+    refuses("EG-UNSUPPORTED 'energy' kernels", module.energy, x)

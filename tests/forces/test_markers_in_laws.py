@@ -182,7 +182,7 @@ def test_the_same_in_python_and_in_a_file(tmp_path: Any) -> None:
         ({}, "ax(b.tip)", "EG-REFERENCE forces.M.value ax(b.tip)"),
         ({}, "angle(a, b.tip)", "EG-UNDEFINED forces.M b.tip"),
         ({}, "distance(a)", "EG-EXPRESSION forces.M.value"),
-        ({}, "x(a, in=c)", "EG-EXPRESSION forces.M.value c"),
+        ({}, "x(a, in=c)", "EG-NAME-UNKNOWN forces.M.value c"),
         ({}, "x(a, at=b)", "EG-EXPRESSION forces.M.value at="),
         ({}, "x(a, from=com)", "EG-EXPRESSION forces.M.value"),
     ],
@@ -295,7 +295,7 @@ def test_a_law_may_use_the_force_of_another_element() -> None:
 @pytest.mark.parametrize(
     ("law", "message"),
     [
-        ("force(spring2)", "EG-EXPRESSION forces.extra.value spring2"),
+        ("force(spring2)", "EG-NAME-UNKNOWN forces.extra.value spring2"),
         ("force(load)", "EG-UNSUPPORTED forces.extra.value load"),
         ("force(extra)", "EG-CIRCLE forces.extra"),
         ("force(1 + k)", "EG-EXPRESSION forces.extra.value"),

@@ -183,11 +183,11 @@ def test_file_components_and_states(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("reaction(B).x", "EG-EXPRESSION outputs.N.expression B A"),
+        ("reaction(B).x", "EG-NAME-UNKNOWN outputs.N.expression B A"),
         ("reaction(A)", "EG-EXPRESSION outputs.N.expression reaction(joint).part"),
         ("reaction(A).q", "EG-EXPRESSION outputs.N.expression q part"),
         ("reaction(A, in=rod).size", "EG-EXPRESSION outputs.N.expression size"),
-        ("multiplier(C)", "EG-EXPRESSION outputs.N.expression C"),
+        ("multiplier(C)", "EG-NAME-UNKNOWN outputs.N.expression C"),
         ("multiplier(A)", "EG-NAME-UNKNOWN outputs.N.expression A"),
     ],
 )

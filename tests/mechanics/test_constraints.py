@@ -187,10 +187,10 @@ def laws() -> eg.Model:
 
 
 REFUSED = [
-    ("x - s", "EG-EXPRESSION 's'"),
-    ("x_dot - s", "EG-EXPRESSION 's'"),
-    ("slow - 1", "EG-EXPRESSION 's'"),
-    ("x - held", "EG-EXPRESSION 'held'"),
+    ("x - s", "EG-REFERENCE 's'"),
+    ("x_dot - s", "EG-REFERENCE 's'"),
+    ("slow - 1", "EG-REFERENCE 's'"),
+    ("x - held", "EG-REFERENCE 'held'"),
     ("x - s_dot", "EG-REFERENCE 's_dot'"),
     ("power(D) - 1", "EG-EXPRESSION power(D)"),
     ("wx(a) - 1", "EG-CONTRADICTION c.equation -1"),

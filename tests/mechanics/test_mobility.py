@@ -95,7 +95,7 @@ def test_rank_needs_no_parameter_values() -> None:
     assert equations.report.assumed
     assert equations.report.degrees_of_freedom == 1
     assert equations.mass_matrix.shape == (1, 1)
-    with refused("EG-MODEL parameters.l") as caught:
+    with refused("EG-MISSING parameters.l") as caught:
         equations.compile()
     assert [p.path for p in caught.value.problems] == ["parameters.r", "parameters.l"]
 

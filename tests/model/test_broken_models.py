@@ -18,7 +18,7 @@ import eomgen as eg
 BROKEN = [
     ("tip, slider]", "tip, slidr]", 18, "joints.C.between[1]", "EG-NAME-UNKNOWN slidr 'slider'?"),
     ("body: ground", "body: groun", 22, "forces.k1.between[0].body", "EG-NAME-UNKNOWN groun 'ground'?"),
-    ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "EG-EXPRESSION tap 'tip'?"),
+    ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "EG-NAME-UNKNOWN tap 'tip'?"),
     ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "EG-NAME-FORM '2r'"),
     ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "EG-NAME-FORM lambda_"),
     ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "EG-NAME-FORM 't' time"),
@@ -72,7 +72,7 @@ BROKEN = [
     ("independent: [theta]", "independent: [theta, theta]", 24, "independent[1]", "EG-CONFLICT 'theta'"),
     ("theta_dot: 10", "thetadot: 10", 25, "initial.thetadot", "EG-NAME-UNKNOWN 'theta_dot'?"),
     ("theta_dot: 10", "theta_dot: q", 25, "initial.theta_dot", "EG-NAME-UNKNOWN q"),
-    ("end: 5", "end: -5", 26, "simulation.end", "EG-TYPE -5"),
+    ("end: 5", "end: -5", 26, "simulation.end", "EG-RANGE -5"),
     ("method: DOP853", "method: DOP85", 26, "simulation.method", "EG-CHOICE DOP85 'DOP853'?"),
     ("value: 0.1, unit", "value: m_c/2, unit", 4, "parameters.r.value", "EG-REFERENCE m_c"),
     ("unit: m, doc", "unit: 3, doc", 4, "parameters.r.unit", "EG-TYPE 3"),
@@ -334,7 +334,7 @@ WRONG = [  # the text, and the code, the place and the values that the fault tel
     (arm("q: 0, tip_vx: 1"), "EG-CONTRADICTION initial.tip_vx: 1"),  # it moves across x there
     (arm("tip_ax: 1"), "EG-UNSUPPORTED initial.tip_ax: accelerations"),
     (arm("square: 1"), "EG-UNSUPPORTED initial.square: velocities"),
-    (arm("q: k", value=""), "EG-MODEL parameters.k:"),
+    (arm("q: k", value=""), "EG-MISSING parameters.k:"),
     (arm("A_e0: 0.5, A_e1: 0.5", BALL), "EG-CONTRADICTION A_e0 0.707107"),
     (four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"), "EG-CONTRADICTION initial.theta_dot: psi_dot 100"),
     (four_bar("theta: 1.0, psi: 0.1"), "EG-LOOP-OPEN joints.C: theta psi 0.1"),

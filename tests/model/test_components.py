@@ -248,7 +248,7 @@ ADDING = [
     ("parts/link.yaml", "parts/lnik.yaml", "EG-FILE :9: components.link.file: parts/lnik.yaml"),
     ("  right:", "  left:", "EG-FILE-DAMAGED :19: add.left:"),
     ("limb, at: cart.top", "limb, for: {k: [1, 2], j: [1]}, at: cart.top", "EG-SHAPE :18: add.left.for:"),
-    ("limb, at: cart.top", "limb, for: {k: 2000}, at: cart.top", "EG-SHAPE :18: add.left.for.k: 1000"),
+    ("limb, at: cart.top", "limb, for: {k: 2000}, at: cart.top", "EG-TOO-LARGE :18: add.left.for.k: 1000"),
     ("  limb:\n", "  limb:\n    gravity: [0, 0, 0]\n", "EG-NAME-UNKNOWN :11: components.limb.gravity:"),
     ("  left:", "  cart:", "EG-NAME-TAKEN :18: add.cart: 'cart'"),
 ]
@@ -264,7 +264,7 @@ def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:
 
 INSIDE = [
     ("type: revolute", "type: revolut", "EG-CHOICE joints.hinge.type: left.upper left.lower 'revolute'?"),
-    ("x(rod.end)", "x(rod.ned)", "EG-EXPRESSION outputs.end_x.expression: 'left_upper_rod' 'ned'"),
+    ("x(rod.end)", "x(rod.ned)", "EG-NAME-UNKNOWN outputs.end_x.expression: 'left_upper_rod' 'ned'"),
     ("m*l**2/12", "m*l**2/12*s", "EG-NAME-UNKNOWN bodies.rod.inertia: 's'"),
     ("[base, rod]", "[base, cart]", "EG-NAME-UNKNOWN joints.hinge.between: 'cart'"),
     ("bodies:", "lagrangian: {coordinates: [q], expression: q_dot**2}\nbodies:", "EG-UNSUPPORTED file: lagrangian"),

@@ -101,8 +101,8 @@ def test_it_is_written_again_and_verified(tmp_path: Path) -> None:
     ("text", "told"),
     [
         ("force(touch, on=a)", "EG-EXPRESSION parts"),
-        ("force(touch, on=nobody).x", "EG-EXPRESSION nobody"),
-        ("force(tuch, on=a).x", "EG-EXPRESSION tuch"),
+        ("force(touch, on=nobody).x", "EG-NAME-UNKNOWN nobody"),
+        ("force(tuch, on=a).x", "EG-NAME-UNKNOWN tuch"),
         ("force(touch, on=a).q", "EG-EXPRESSION q part"),
         ("force(touch, on=a, in=b).size", "EG-EXPRESSION axes"),
         ("force(touch, by=a).x", "EG-EXPRESSION on=marker).part"),

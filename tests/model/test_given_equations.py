@@ -294,7 +294,7 @@ def test_functions_of_time() -> None:
         )
 
     assert list(make().parameters) == ["m", "l", "g"]
-    refuses("EG-MODEL parameters.g", lambda: make().compile(target="numpy"))
+    refuses("EG-MISSING parameters.g", lambda: make().compile(target="numpy"))
     mod = make(g=9.81).compile(target="numpy")
     wanted = (0.3 - 2 * 9.81 * 0.5 * np.sin(0.7) - 0.2 / 10) / (2 * 0.25)
     np.testing.assert_allclose(mod.rhs(0, [0.7, 0.2]), [0.2, wanted], rtol=1e-13)

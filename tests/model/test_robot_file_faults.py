@@ -13,6 +13,7 @@ import command
 import numpy as np
 import pytest
 from model_files import described, load
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -35,27 +36,27 @@ BOMB = """<?xml version="1.0"?>
 ]>
 """
 SECRET = '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file://{secret}">]>\n'
-#: What is changed in the arm, and what the error must say.
+#: What is changed in the arm, and what the error must tell.
 BROKEN = [
-    ('<link name="base"/>', '<link name="base"/>\n<link name="lost"/>', "arm.urdf:3: link.lost: has no parent"),
-    ('<child link="tip"/>', '<child link="tp"/>', "urdf:8: joint.slide.child: no link 'tp'; did you mean 'tip'"),
-    ('<child link="tip"/>', "", "urdf:8: joint.slide.child: is missing"),
-    ("prismatic", "sliding", "urdf:8: joint.slide.type: no joint of type 'sliding'; types: rev"),
-    ('mass value="0.5"', 'mass value="0"', "urdf:8: joint.slide: the joint moves no mass: link 'tip'"),
-    ('value="2"', 'value="-2"', "urdf:3: link.upper.inertial.mass: is -2"),
-    ('value="2"', 'value="nan"', "urdf:3: link.upper.inertial.mass.value: 'nan' is not finite"),
-    ('ixx="0.1"', 'ixx="a lot"', "urdf:4: link.upper.inertial.inertia.ixx: 'a lot' is not a number"),
-    ('ixx="0.1"', 'ixx="-9"', "urdf:3: bodies.upper.inertia: has a negative principal moment"),
-    ('xyz="0 0 0.4"', 'xyz="0 0.4"', "urdf:8: joint.slide.origin.xyz: '0 0.4' is not three numbers"),
-    ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "urdf:6: joint.shoulder.axis: the axis has no length"),
-    ('name="tip"', 'name="upper"', "urdf:5: link.upper: the name is given twice, first in line 3"),
-    ('<parent link="base"/>', '<parent link="tip"/>', "'base'|ring"),
-    ('<link name="base"/>', "", "urdf:6: joint.shoulder.parent: no link 'base'; links: upper, tip$"),
-    ('upper"/><child link="tip"/>', 'base"/><child link="upper"/>', "also the child of .*<loop_joint"),
-    ("</robot>", "", "urdf:11: file: not XML: no element found"),
-    ('<link name="base"/>', '<xacro:include filename="a"/>', "is a xacro file; expand it first"),
-    ('<robot name="arm">', BOMB + '<robot name="&c;">', "urdf:2: file: declares a document type or an entity"),
-    ("robot", "machine", "urdf:1: machine: is not a robot"),
+    ('<link name="base"/>', '<link name="base"/>\n<link name="lost"/>', "EG-TOPOLOGY arm.urdf:3: link.lost:"),
+    ('<child link="tip"/>', '<child link="tp"/>', "EG-NAME-UNKNOWN arm.urdf:8: joint.slide.child: 'tp' 'tip'?"),
+    ('<child link="tip"/>', "", "EG-MISSING arm.urdf:8: joint.slide.child:"),
+    ("prismatic", "sliding", "EG-CHOICE arm.urdf:8: joint.slide.type: 'sliding' revolute"),
+    ('mass value="0.5"', 'mass value="0"', "EG-NO-INERTIA arm.urdf:8: joint.slide: 'tip'"),
+    ('value="2"', 'value="-2"', "EG-RANGE arm.urdf:3: link.upper.inertial.mass: -2"),
+    ('value="2"', 'value="nan"', "EG-NUMBER arm.urdf:3: link.upper.inertial.mass.value: 'nan'"),
+    ('ixx="0.1"', 'ixx="a lot"', "EG-NUMBER arm.urdf:4: link.upper.inertial.inertia.ixx: lot"),
+    ('ixx="0.1"', 'ixx="-9"', "EG-INERTIA arm.urdf:3: bodies.upper.inertia: -9"),
+    ('xyz="0 0 0.4"', 'xyz="0 0.4"', "EG-NUMBER arm.urdf:8: joint.slide.origin.xyz: 0.4"),
+    ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "EG-RANGE arm.urdf:6: joint.shoulder.axis:"),
+    ('name="tip"', 'name="upper"', "EG-NAME-TAKEN arm.urdf:5: link.upper: 3"),
+    ('<parent link="base"/>', '<parent link="tip"/>', "EG-TOPOLOGY arm.urdf:3: link.upper: 'base'"),
+    ('<link name="base"/>', "", "EG-NAME-UNKNOWN arm.urdf:6: joint.shoulder.parent: 'base' upper tip"),
+    ('upper"/><child link="tip"/>', 'base"/><child link="upper"/>', "EG-TOPOLOGY <loop_joint"),
+    ("</robot>", "", "EG-FILE-DAMAGED arm.urdf:11: file:"),
+    ('<link name="base"/>', '<xacro:include filename="a"/>', "EG-FILE arm.urdf:2: robot: xacro"),
+    ('<robot name="arm">', BOMB + '<robot name="&c;">', "EG-REFUSED arm.urdf:2: file: <!DOCTYPE"),
+    ("robot", "machine", "EG-FILE-DAMAGED arm.urdf:1: machine: <robot>"),
 ]
 
 
@@ -71,7 +72,7 @@ def arm(folder: Path, *changes: tuple[str, str], name: str = "arm.urdf") -> Path
 @pytest.mark.parametrize(("old", "new", "said"), BROKEN, ids=lambda text: text[:24])
 def test_a_fault_is_reported_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:
     path = arm(tmp_path, (old, new))
-    with pytest.raises(eg.ModelError, match=said):
+    with refused(said, eg.ModelError):
         eg.load(path).check()
 
 
@@ -94,25 +95,23 @@ def test_all_faults_are_reported_at_once(tmp_path: Path) -> None:
 def test_options_are_checked(tmp_path: Path) -> None:
     path = arm(tmp_path)
     for given, said in (
-        ({"floting": True}, "no option 'floting' for a robot file; did you mean 'floating'"),
-        ({"mimic": "x"}, "mimic must be one of coupling, independent, not 'x'"),
-        ({"lock": 5}, "lock must be names of joints, or a mapping of names to values, not 5"),
-        ({"lock": {"shoulder": float("nan")}}, "lock.*number"),
-        ({"actuate": 5}, "actuate must be names of joints, or True, not 5"),
-        ({"snap": -1.0}, "an angle"),
-        ({"assets": 5}, "assets must be the name of a file or folder"),
-        ({"floating": "yes"}, "floating must be True or False, not 'yes'"),
-        ({"friction": -1}, "friction must be True, or the velocity"),
-        ({"check_inertia": "maybe"}, "check_inertia must be one of error, note, off"),
-        ({"limits": "hard"}, "limits must be one of note, stop, off, not 'hard'"),
+        ({"floting": True}, "EG-NAME-UNKNOWN 'floting' 'floating'?"),
+        ({"mimic": "x"}, "EG-CHOICE mimic coupling independent 'x'"),
+        ({"lock": 5}, "EG-TYPE lock 5"),
+        ({"lock": {"shoulder": float("nan")}}, "EG-TYPE lock 'shoulder' nan"),
+        ({"actuate": 5}, "EG-TYPE actuate True 5"),
+        ({"snap": -1.0}, "EG-TYPE snap -1.0"),
+        ({"assets": 5}, "EG-TYPE assets 5"),
+        ({"floating": "yes"}, "EG-TYPE floating True False 'yes'"),
+        ({"friction": -1}, "EG-TYPE friction True -1"),
+        ({"check_inertia": "maybe"}, "EG-CHOICE check_inertia error note off 'maybe'"),
+        ({"limits": "hard"}, "EG-CHOICE limits note stop off 'hard'"),
     ):
-        with pytest.raises(eg.UsageError, match=said):
+        with refused(said, eg.UsageError):
             eg.load(path, **given)
-    with pytest.raises(eg.ModelError, match="lock.shulder: no such joint; did you mean 'shoulder'"):
-        eg.load(path, lock=["shulder"])
+    refuses("EG-NAME-UNKNOWN lock.shulder: 'shoulder'?", eg.load, path, lock=["shulder"])
     eg.load(path).save(tmp_path / "model.yaml")
-    with pytest.raises(eg.UsageError, match="only robot files take the options floating"):
-        eg.load(tmp_path / "model.yaml", floating=True)
+    refuses("EG-CONFLICT model.yaml floating", eg.load, tmp_path / "model.yaml", floating=True)
 
 
 # -- nothing outside is read ------------------------------------------------------------------------------------------
@@ -133,7 +132,7 @@ def test_no_entity_reads_a_file(suffix: str, tmp_path: Path, monkeypatch: pytest
 
     for module in (builtins, os):
         monkeypatch.setattr(module, "open", noting(module.open))
-    with pytest.raises(eg.ModelError, match="expands no entities") as caught:
+    with refused(f"EG-REFUSED {path.name}:1: <!DOCTYPE") as caught:
         eg.load(path)
     assert "hidden" not in str(caught.value)
     assert str(secret) not in opened
@@ -211,15 +210,14 @@ def test_no_spelling_of_a_path_leads_out_of_the_folder(text: str, model: Any, mo
         raise AssertionError("MuJoCo was asked")
 
     monkeypatch.setattr("subprocess.Popen", never)
-    with pytest.raises(eg.ModelError, match=r"model.xml:2: .*is outside the folder") as caught:
+    with refused("EG-FILE model.xml:2: outside assets=") as caught:
         eg.load(model(text))
     assert "hidden" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["pipe.stl", "none.stl", ".", "%2e%2e/out/x.stl", "~/x.stl", "A.STL", "a" * 2000])
 def test_what_is_no_file_of_the_folder_is_reported(name: str, model: Any) -> None:
-    with pytest.raises(eg.ModelError, match=r"model.xml:2: mesh.file: .*(no plain file|names no file|too long)"):
-        eg.load(model(mesh(name)))
+    refuses(f"EG-FILE model.xml:2: mesh.file: '{name[:20]}'", eg.load, model(mesh(name)))
 
 
 def mass_of(path: Path) -> float:
@@ -242,18 +240,18 @@ def test_names_with_backslashes_are_read_inside(name: str, compiler: str, size: 
 
 # -- sizes and cycles -------------------------------------------------------------------------------------------------
 CYCLES = {
-    "itself": ({}, '<include file="model.xml"/>', "'model.xml' includes itself"),
+    "itself": ({}, '<include file="model.xml"/>', "EG-CIRCLE model.xml:2: include.file: 'model.xml'"),
     "each other": (
         {"a.xml": '<include file="b.xml"/>', "b.xml": '<include file="a.xml"/>'},
         '<include file="a.xml"/>',
-        "'a.xml' includes itself",
+        "EG-CIRCLE b.xml:2: include.file: 'a.xml'",
     ),
-    "twice": ({"a.xml": "<option/>"}, '<include file="a.xml"/><include file="./a.xml"/>', "part of the model already"),
-    "attached": ({}, '<asset><model name="p" file="model.xml"/></asset>', "'model.xml' attaches itself"),
+    "twice": ({"a.xml": "<option/>"}, '<include file="a.xml"/><include file="./a.xml"/>', "EG-CIRCLE './a.xml'"),
+    "attached": ({}, '<asset><model name="p" file="model.xml"/></asset>', "EG-CIRCLE model.file: 'model.xml'"),
     "attached in turn": (
         {"a.xml": '<asset><model name="p" file="b.xml"/></asset>', "b.xml": '<include file="model.xml"/>'},
         '<asset><model name="p" file="a.xml"/></asset>',
-        "'a.xml' attaches itself",
+        "EG-CIRCLE model.xml:2: model.file: 'a.xml'",
     ),
 }  # fmt: skip
 
@@ -263,28 +261,26 @@ def test_no_file_is_part_of_itself(cycle: str, model: Any) -> None:
     others, start, said = CYCLES[cycle]
     for name, text in others.items():
         model(text, name)
-    with pytest.raises(eg.ModelError, match=said):
-        eg.load(model(start + BALL))
+    refuses(said, eg.load, model(start + BALL))
 
 
 SIZES = {
-    '<size nkey="100000000"/>': "size.nkey: 100000000 is too large; at most 1,000,000",
-    '<size nuser_body="1000000000"/>': "size.nuser_body: 1000000000 is too large",
-    '<asset><hfield name="h" nrow="16385" ncol="2" size="1 1 1 1"/></asset>': "hfield.nrow: 16385 is too large",
-    '<worldbody><replicate count="99999999999999999999999"><body/></replicate></worldbody>': "makes too many bodies",
-    '<worldbody><body name="a"><flexcomp name="f" count="1e3 1e3 1e3"/></body></worldbody>': "makes too many bodies",
-    '<worldbody><body pos="1e308 0 0"><joint/><geom size="1"/></body></worldbody>': "places of bodies .* most 1e\\+100",
-    '<worldbody><body><joint stiffness="nan"/><geom size="1"/></body></worldbody>': "stiffnesses of joints|nan",
+    '<size nkey="100000000"/>': "EG-TOO-LARGE size.nkey: 100000000 1,000,000",
+    '<size nuser_body="1000000000"/>': "EG-TOO-LARGE size.nuser_body: 1000000000",
+    '<asset><hfield name="h" nrow="16385" ncol="2" size="1 1 1 1"/></asset>': "EG-TOO-LARGE hfield.nrow: 16385",
+    '<worldbody><replicate count="99999999999999999999999"><body/></replicate></worldbody>': "EG-TOO-LARGE replicate:",
+    '<worldbody><body name="a"><flexcomp name="f" count="1e3 1e3 1e3"/></body></worldbody>': "EG-TOO-LARGE flexcomp:",
+    '<worldbody><body pos="1e308 0 0"><joint/><geom size="1"/></body></worldbody>': "EG-RANGE mujoco: body_pos 1e+100",
+    '<worldbody><body><joint stiffness="nan"/><geom size="1"/></body></worldbody>': "EG-RANGE mujoco: jnt_stiffness",
     '<worldbody><replicate count="900" offset="3 0 0"><body><joint/><geom size="1"/></body></replicate></worldbody>': (
-        "has 901 coordinates of joints; at most 800"
+        "EG-TOO-LARGE robot: 901 800"
     ),
 }
 
 
 @pytest.mark.parametrize("text", SIZES)
 def test_sizes_of_mjcf_are_bounded(text: str, model: Any) -> None:
-    with pytest.raises(eg.ModelError, match=SIZES[text]):
-        eg.load(model(text + BALL))
+    refuses(SIZES[text], eg.load, model(text + BALL))
 
 
 def test_what_is_no_part_of_the_motion_costs_nothing(model: Any) -> None:
@@ -307,8 +303,7 @@ def test_copies_are_counted_by_siblings_nesting_and_includes(model: Any) -> None
     twice = '<worldbody><replicate count="2000"><replicate count="2000"/></replicate></worldbody>'
     inside = '<worldbody><replicate count="150"><include file="part.xml"/></replicate></worldbody>'
     for path in (model("").parent / "m5.xml", model(twice), model(inside)):
-        with pytest.raises(eg.ModelError, match="makes too many bodies"):
-            eg.load(path)
+        refuses("EG-TOO-LARGE 10,000", eg.load, path)
     row = '<replicate count="30" offset="0 0 1"><geom size="0.1"/></replicate>'
     path = model(f'<worldbody><body name="b"><joint/>{3 * row}</body></worldbody>')
     assert mass_of(path) == pytest.approx(90 * 1000 * 4 / 3 * np.pi * 0.1**3)
@@ -320,8 +315,7 @@ def test_a_model_that_never_compiles_is_given_up(model: Any) -> None:
         '<compiler><lengthrange mode="all" inttotal="1e9" interval="1e8" timestep="1e-6"/></compiler>'
         f'{BALL}<actuator><muscle joint="j"/></actuator>'
     )
-    with pytest.raises(eg.ModelError, match=r"model.xml:1: mujoco: MuJoCo needs more time for it than the .* s"):
-        eg.load(model(text))
+    refuses("EG-TOO-LARGE model.xml:1: mujoco: time", eg.load, model(text))
 
 
 @pytest.mark.parametrize(
@@ -329,19 +323,18 @@ def test_a_model_that_never_compiles_is_given_up(model: Any) -> None:
     [
         (
             '<asset><texture name="a" builtin="flat" width="999999" height="9"/></asset>',
-            "texture.width: 999999 is too large",
+            "EG-TOO-LARGE model.xml:2: texture.width: 999999",
         ),
-        ('<worldbody><body><joint type="screw"/></body></worldbody>', r"xml:2: mujoco: MuJoCo refuses it: .*'screw'"),
-        ("<worldbody><body><joint/></body></worldbody>", r"xml:2: mujoco: MuJoCo refuses it: .*mass and inertia"),
-        ('<worldbody><body name="a"/>', r"xml:3: file: not XML: mismatched tag"),
-        ('<worldbody><geom size="1"/></worldbody>', "no link can move"),
+        ('<worldbody><body><joint type="screw"/></body></worldbody>', "EG-FILE-DAMAGED model.xml:2: mujoco: 'screw'"),
+        ("<worldbody><body><joint/></body></worldbody>", "EG-FILE-DAMAGED model.xml:2: mujoco: mass inertia"),
+        ('<worldbody><body name="a"/>', "EG-FILE-DAMAGED model.xml:3: file:"),
+        ('<worldbody><geom size="1"/></worldbody>', "EG-TOPOLOGY model.xml:1: robot: floating=True"),
     ],
 )
 def test_mjcf_faults(line: str, said: str, tmp_path: Path) -> None:
     path = tmp_path / "model.xml"
     path.write_text(f"<mujoco>\n{line}\n</mujoco>")
-    with pytest.raises(eg.ModelError, match=said):
-        eg.load(path)
+    refuses(said, eg.load, path)
 
 
 URDF = """<robot name="r"><link name="base"/><link name="l"><inertial>{origin}<mass value="{mass}"/>
@@ -352,31 +345,32 @@ URDF = """<robot name="r"><link name="base"/><link name="l"><inertial>{origin}<m
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"xx": "1e308"}, r"urdf:2: link.l.inertial.inertia.ixx: 1e\+308 is too large; at most 1e\+100"),
-        ({"xx": "1e308", "more": '<link name="lost"/>'}, "1e\\+308 is too large"),
-        ({"xy": "1e100"}, "negative principal moment"),
-        ({"origin": '<origin xyz="1e308 1e308 0"/>'}, "too large"),
-        ({"mass": "1e308"}, "too large"),
-        ({"xx": "nan"}, "not finite"),
-        ({"more": "<a " + "x" * 2_100_000 + "/>"}, "has a tag, a comment or a text of 2,100,"),
-        ({"more": "<a>" * 100_000}, "nested too deeply"),
+        ({"xx": "1e308"}, "EG-RANGE r.urdf:2: link.l.inertial.inertia.ixx: 1e+308 1e+100"),
+        ({"xx": "1e308", "more": '<link name="lost"/>'}, "EG-RANGE link.l.inertial.inertia.ixx: 1e+308"),
+        ({"xy": "1e100"}, "EG-INERTIA inertia"),
+        ({"origin": '<origin xyz="1e308 1e308 0"/>'}, "EG-RANGE xyz: 1e+308"),
+        ({"mass": "1e308"}, "EG-RANGE link.l.inertial.mass.value: 1e+308"),
+        ({"xx": "nan"}, "EG-NUMBER link.l.inertial.inertia.ixx: 'nan'"),
+        ({"more": "<a " + "x" * 2_100_000 + "/>"}, "EG-TOO-LARGE r.urdf:1: file: 2,100,004 2,000,000"),
+        ({"more": "<a>" * 100_000}, "EG-TOO-LARGE r.urdf:3: file: 200"),
     ],
 )
 def test_numbers_of_urdf_are_bounded(given: dict[str, str], said: str, tmp_path: Path) -> None:
     path = tmp_path / "r.urdf"
     path.write_text(URDF.format(**({"xx": "1", "xy": "0", "mass": "1", "origin": "", "more": ""} | given)))
-    with pytest.raises(eg.ModelError, match=said):
+    with refused(said, eg.ModelError):
         eg.load(path).check()
 
 
 def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.stl")
     for name, said in {
-        "a\\0.stl": "contains a character that file names cannot have",
-        "\\ud800.stl": "character|surrogate",
-        "pipe.stl": "is not a plain file",
-        "../a.stl": "outside the folder",
+        "a\\0.stl": "EG-FILE solids[0].file: character",
+        "\\ud800.stl": "EG-FILE-DAMAGED solids[0].file: U+D800",
+        "none.stl": "EG-FILE solids[0].file: none.stl",
+        "pipe.stl": "EG-FILE solids[0].file: pipe.stl",
+        "../a.stl": "EG-FILE solids[0].file: ../a.stl",
     }.items():
         text = f'name: m\nbodies: {{b: {{solids: [{{type: mesh, file: "{name}", density: 1}}]}}}}\n'
-        with pytest.raises(eg.ModelError, match=said):
+        with refused(said, eg.ModelError):
             load(tmp_path, text).check()

@@ -226,7 +226,7 @@ def test_calls_of_a_module_with_the_wrong_shape_of_values_are_reported() -> None
     m.torque("law", "q", 1 / length)
     module = m.compile(target="numpy")
     refuses("EG-TYPE mapping 1", module.x0, 1)
-    refuses("EG-SHAPE l 0", module.bind, p={"l": 0.0})
+    refuses("EG-SINGULAR q inertia", module.bind(p={"l": 0.0}).rhs, 0, [0.1, 0.0])
     assert module.rhs(0, [0.1, 0.0], p={"l": 2}).tolist() == module.rhs(0, [0.1, 0.0], p=[2.0]).tolist()
     refuses("EG-NAME-UNKNOWN ll", module.rhs, 0, [0.0, 0.0], p={"ll": 1})
 

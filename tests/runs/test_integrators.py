@@ -13,6 +13,7 @@ import command
 import numpy as np
 import pytest
 from analysed import compiled
+from refusals import refused, refuses
 
 import eomgen as eg
 
@@ -91,8 +92,7 @@ def test_steps_of_one_size(in_c: Any) -> None:
     pushed = {"parameters": {"k": 0.0}, "inputs": {"F": "t**3"}}
     run = in_c.simulate(1.0, [0.0, 0.0], **pushed, method="RK4", step=0.25)
     assert run["x_dot"][-1] == pytest.approx(1 / 8, rel=1e-14)  # Simpson's rule, exact for cubics
-    with pytest.raises(eg.UsageError, match="would not end"):
-        go(0.0, x, 1e12)
+    refuses("EG-ENDLESS spring step 0.01 1e+12", go, 0.0, x, 1e12)
 
 
 def test_calls_of_loops_have_the_bits_of_whole_runs(four_bar: Any) -> None:
@@ -110,25 +110,24 @@ def test_states_off_the_constraints_are_brought_onto_them_first(four_bar: Any) -
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "demand"),
     [
-        (((0.0, [1.0], 1.0), {}), r"x must have shape \(2,\), not \(1,\)"),
-        (((0.0, [1.0, 2.0], 1.0), {"p": [1.0, 2.0]}), r"p.* shape \(1,\)"),
-        (((0.0, [1.0, 2.0], float("nan")), {}), "finite"),
-        (((0.0, {"x": 1.0}, 1.0), {}), "integrator of spring"),
-        (((0.0, [1j, 2.0], 1.0), {}), "real numbers"),
-        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(3)}), r"out.* shape \(2,\)"),
-        (((0.0, [1.0, 2.0], 1.0), {"out": np.broadcast_to(0.0, (2,))}), "out must be a contiguous writeable"),
-        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(2, dtype=np.float32)}), "float64"),
-        (((0.0, [1.0, 2.0], 1.0), {"p": {"kk": 1.0}}), "kk"),
-        (((1e16, [1.0, 2.0], 1.0), {}), "too small at t"),
-        (((1e308, [1.0, 2.0], 1e308), {}), "finite"),
+        (((0.0, [1.0], 1.0), {}), "EG-SHAPE x (2,) (1,)"),
+        (((0.0, [1.0, 2.0], 1.0), {"p": [1.0, 2.0]}), "EG-SHAPE p (1,) (2,)"),
+        (((0.0, [1.0, 2.0], float("nan")), {}), "EG-NUMBER h nan"),
+        (((0.0, {"x": 1.0}, 1.0), {}), "EG-SHAPE x {'x':"),
+        (((0.0, [1j, 2.0], 1.0), {}), "EG-SHAPE x [1j,"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(3)}), "EG-SHAPE out (2,)"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.broadcast_to(0.0, (2,))}), "EG-SHAPE out (2,)"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(2, dtype=np.float32)}), "EG-SHAPE out float64"),
+        (((0.0, [1.0, 2.0], 1.0), {"p": {"kk": 1.0}}), "EG-NAME-UNKNOWN 'kk' k?"),
+        (((1e16, [1.0, 2.0], 1.0), {}), "EG-RANGE h t 1e+16"),
+        (((1e308, [1.0, 2.0], 1e308), {}), "EG-NUMBER t 1e+308"),
     ],
 )
-def test_wrong_calls_are_reported(cart: Any, call: Any, words: str) -> None:
+def test_wrong_calls_are_reported(cart: Any, call: Any, demand: str) -> None:
     positional, named = call
-    with pytest.raises(eg.UsageError, match=words):
-        cart.integrator()(*positional, **named)
+    refuses(f"{demand} integrator spring", cart.integrator(), *positional, **named)
 
 
 def test_a_state_that_is_reset_needs_a_run() -> None:
@@ -136,8 +135,7 @@ def test_a_state_that_is_reset_needs_a_run() -> None:
     m.prismatic("J", m.ground, m.body("ball", mass=1), axis="y", coordinate="y")
     m.initial = {"y": 1.0}
     m.event("bounce", "y", direction=-1, reset={"y_dot": -m.coordinate("y_dot")})
-    with pytest.raises(eg.UsageError, match=r"events of ball reset its state.*simulate"):
-        m.compile(target="numpy").integrator()
+    refuses("EG-UNSUPPORTED ball simulate", m.compile(target="numpy").integrator)
 
 
 @pytest.mark.parametrize("method", ["DOP853", "Radau"])
@@ -148,13 +146,12 @@ def test_what_stops_a_call_is_named(method: str) -> None:
     m.initial = {"x": 1.0}
     mod = m.compile()
     go = mod.integrator(method=method)
-    with pytest.raises(eg.SimulationError, match=rf"{method} stopped at t = 2\.1781 s of 11 s"):
-        go(1.0, mod.x0(), 10.0)
+    refuses(f"EG-STALLED {method} 2.1781 11", go, 1.0, mod.x0(), 10.0)
     m = eg.Model("root")  # a force that is no number where x < 0
     m.prismatic("J", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
     m.torque("pull", "J", -(m.coordinate("x") ** 0.5))
     root = m.compile(target="numpy").integrator(method=method)
-    with pytest.raises(eg.SimulationError, match=r"stopped near t = .* of 10 s. Last failure: rhs at .*x = ") as caught:
+    with refused(f"EG-STALLED {method} 10 rhs x") as caught:
         root(0.0, [1.0, -1.0], 10.0)
     assert isinstance(caught.value.__cause__, eg.EvaluationError)
     x = np.array([1.0, -1.0])
@@ -272,5 +269,4 @@ def test_steps_are_of_order_four() -> None:
     np.testing.assert_allclose(
         between, mod.simulate((0, 1), x0, t_eval=[0.12345, 0.9], rtol=1e-10, atol=1e-12).x, atol=1e-7
     )
-    with pytest.raises(eg.UsageError, match="no other method takes it"):
-        mod.simulate((0, 1), step=0.1)
+    refuses("EG-MISSING RK4 step", mod.simulate, (0, 1), step=0.1)

@@ -202,8 +202,7 @@ def test_what_is_given_twice_or_not_known_is_refused(turning: eg.Module, name: s
         ({"parameters": {"m_r": 1.0}}, (*second, turning.p)),
         ({"u": [0.0], "inputs": {"tau": 0.0}}, ()),
     ):
-        with pytest.raises(eg.UsageError, match="argument; give one"):  # the code of a compiled call is EG-SHAPE
-            call(*given, *places, **keys)
+        refuses("EG-CONFLICT argument", call, *given, *places, **keys)
     refuses("EG-NAME-UNKNOWN m_x", call, *given, p={"m_x": 1.0})
     refuses("EG-NUMBER tau", call, *given, inputs={"tau": "fast"})
 
