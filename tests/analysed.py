@@ -133,4 +133,4 @@ BUILT: dict[str, Callable[[], eg.Model]] = {
 def compiled(name: str, target: str = "numpy") -> Any:
     """A module of a model of this file, of tests/models.py or of the examples; C without optimization."""
     model = BUILT[name]() if name in BUILT else models.build(name)
-    return model.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return model.compile(target=target, **(models.IN_C if target == "cython" else {}))

@@ -52,16 +52,6 @@ FAULTS: dict[str, Any] = {
 }  # fmt: skip
 
 
-#: What recordings and runs of rigid contacts need, in one build.
-IN_C = (
-    "rhs", "jacobian", "mass_matrix", "embedded_mass_matrix", "bias", "energy", "constraints", "constraint_jacobian",
-    "coordinate_slopes", "velocity_constraints", "project", "poses", "outputs", "events", "resets", "held_errors",
-    "kinematics", "loop_coordinates", "loop_coordinate_jacobian", "alignment", "finite_forces", "meeting_time",
-    "scales", "centroidal", "needed_wrenches", "wrench_geometry", "inverse_dynamics",
-    "near_pairs", "bias_apart", "motion_axes", "motion_outputs",
-)  # fmt: skip
-
-
 def states(module: Any, x0: np.ndarray) -> list[np.ndarray]:
     """Return the declared start and two consistent states beside it."""
     random = np.random.default_rng(zlib.crc32(module.name.encode()))
@@ -81,7 +71,7 @@ def recording(name: str, target: str = "numpy", at: list[list[float]] | None = N
     known = models.MODELS[name]
     model = known.build()
     equations = model.derive()
-    module = equations.compile(target=target, **({"optimize": 0, "kernels": IN_C} if target == "cython" else {}))
+    module = equations.compile(target=target, **(models.IN_C if target == "cython" else {}))
     out: dict[str, Any] = {
         "names": {k: list(getattr(module, k)) for k in ("x_names", "u_names", "p_names", "y_names", "body_names")},
         "independent": list(equations.independent),

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from golden import IN_C
+from models import IN_C
 
 import eomgen as eg
 
@@ -46,7 +46,7 @@ def floor_of(shape: tuple[tuple[str, Any], ...], target: str) -> Any:
     m.planar("j", m.ground, body)
     law = rigid(friction="friction", restitution="restitution")
     m.contacts("c", {**dict(shape), "on": body}, {"shape": "half_plane", "on": m.ground}, law)
-    return m.compile(target=target, **({"optimize": 0, "kernels": IN_C} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 def pile(kinds: Sequence[str]) -> eg.Model:

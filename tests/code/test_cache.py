@@ -1,6 +1,6 @@
 """The cache of compiled models: what is found again, damaged, killed, built twice at once, owned by others.
 
-Tests with caches or compilers of their own build units of target fmu.
+Tests with caches or compilers of their own build units of target fmu, or take a copy of a cache that was filled once.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import models
 import numpy as np
@@ -61,9 +61,9 @@ def entries(kind: str = "library") -> list[dict[str, Any]]:
     return [entry for entry in found.json["entries"] if entry["kind"] == kind]
 
 
-def product() -> Path:
-    """The one library in the cache."""
-    (entry,) = entries()
+def product(name: str) -> Path:
+    """The library of a unit in the cache."""
+    (entry,) = (entry for entry in entries() if entry["name"] == name)
     (file,) = Path(entry["directory"]).glob("*.so")
     return file
 
@@ -74,11 +74,11 @@ def write_unit(folder: Path, model: eg.Model | None = None) -> bytes:
     return (model or models.build("pendulum")).derive().write_fmu(path).read_bytes()
 
 
-def renamed(name: str, folder: Path, gravity: str = "9.81") -> eg.Model:
-    """A pendulum whose code no other test has."""
-    file = folder / f"{name}.yaml"
-    file.write_text(PENDULUM.read_text().replace("name: pendulum", f"name: {name}").replace("9.81", gravity))
-    return eg.load(file)
+def heavier(folder: Path) -> Path:
+    """The file of the pendulum where g is 9.82."""
+    file = folder / "pendulum.yaml"
+    file.write_text(PENDULUM.read_text().replace("9.81", "9.82"))
+    return file
 
 
 def compiler(folder: Path, lines: str = "") -> tuple[Path, Path]:
@@ -96,21 +96,53 @@ def attempts(cache: Path) -> list[Path]:
     return list((cache / "attempts").iterdir())
 
 
-def test_a_second_build_compiles_nothing(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, noted = compiler(tmp_path)
-    monkeypatch.setenv("CC", str(path))
-    first = write_unit(tmp_path)
-    commands = noted.read_text()
-    assert commands.count("\n") >= 2
-    assert write_unit(tmp_path) == first
-    assert noted.read_text() == commands
-    (entry,) = entries()
-    sources = Path(entry["directory"]) / "sources"
+class Filled(NamedTuple):
+    """A cache with units of two pendulums and a module of one; what its compiler noted of each, and the first unit."""
+
+    folder: Path
+    compiler: Path
+    noted: Path
+    notes: list[str]
+    unit: bytes
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    """It is filled by a process whose files everybody may write."""
+    folder = tmp_path_factory.mktemp("filled")
+    path, noted = compiler(folder)
+    notes, units, before = [], [], os.umask(0)
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("CC", str(path))
+            patch.setenv("EOMGEN_CACHE_DIR", str(folder / "cache"))
+            for name in ("pendulum", "double_pendulum"):
+                units.append(write_unit(folder, models.build(name)))
+                notes.append(noted.read_text())
+                noted.write_text("")
+            eg.load(PENDULUM).compile(optimize=0)
+    finally:
+        os.umask(before)
+    return Filled(folder / "cache", path, noted, notes, units[0])
+
+
+@pytest.fixture
+def copied(filled: Filled, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of the test's own, filled, and the compiler that filled it."""
+    shutil.copytree(filled.folder, cache)
+    monkeypatch.setenv("CC", str(filled.compiler))
+    return cache
+
+
+def test_a_second_build_compiles_nothing(filled: Filled, copied: Path, tmp_path: Path) -> None:
+    first, second = filled.notes
+    assert first.count("\n") >= 2
+    assert 0 < second.count("\n") < first.count("\n")  # another model takes the object of the integrators
+    before = filled.noted.read_text()
+    assert write_unit(tmp_path) == filled.unit
+    assert filled.noted.read_text() == before
+    sources = product("pendulum").parent / "sources"
     assert any("pendulum" in file.name for file in sources.iterdir())
-    # another model takes the object of the integrators that the first one made
-    noted.write_text("")
-    write_unit(tmp_path, models.build("double_pendulum"))
-    assert 0 < noted.read_text().count("\n") < commands.count("\n")
 
 
 def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,12 +157,10 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
         m.revolute("A", m.ground, m.body("b", mass=1.0, com=(0, -length, 0)), coordinate="theta")
         return m
 
-    options: list[dict[str, Any]] = [
-        {}, {"optimize": 0}, {"extra": ["-DEXTRA"]}, {"lanes": 0}, {"kernels": ["rhs"]},
-    ]  # fmt: skip
+    options: list[dict[str, Any]] = [{}, {"extra": ["-DEXTRA"]}, {"lanes": 0}]
     modules = []
     for k, given in enumerate(options):
-        modules.append(model().compile(**({"kernels": ["rhs", "jacobian"]} | given)))
+        modules.append(model().compile(kernels=["rhs", "jacobian"], **given))
         assert len(keys()) == k + 1
     for module in modules:
         np.testing.assert_allclose(module.rhs(0.0, [0.3, 0.0])[1], -9.81 * np.sin(0.3), rtol=1e-14)
@@ -143,80 +173,85 @@ def test_what_changes_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) 
     assert modules[0].rhs(0.0, [0.3, 0.0])[1] == pytest.approx(-9.81 * np.sin(0.3))
 
 
-def test_damaged_entries_are_built_again(cache: Path, tmp_path: Path) -> None:
-    """A library cut short, another source, half a manifest, an empty folder."""
-    unit = write_unit(tmp_path)
-    file = product()
-    folder, content = file.parent, file.read_bytes()
+def test_damaged_entries_are_built_again(filled: Filled, copied: Path, tmp_path: Path) -> None:
+    """A library cut short with another source; of code in NumPy that, half a manifest, an empty folder."""
+    file = product("pendulum")
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    next((file.parent / "sources").glob("*.c")).write_text("something else")
+    assert write_unit(tmp_path) == filled.unit
+    assert product("pendulum").read_bytes() == content
+    code = "import eomgen as eg; print(eg.load_example('pendulum').compile(target='numpy').rhs(0.0, [0.5, 0.0])[1])"
+
+    def computed() -> str:
+        return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+
+    assert run("cache", "clear").code == 0
+    value = computed()
+    (entry,) = entries("numpy")
+    folder = Path(entry["directory"])
+    (core,) = folder.glob("*.py")
+    text = core.read_text()
     damages: list[Callable[[], Any]] = [
-        lambda: file.write_bytes(content[: len(content) // 2]),
-        lambda: next((folder / "sources").glob("*.c")).write_text("something else"),
+        lambda: core.write_text(text[: len(text) // 2]),
+        lambda: core.write_text(text + "raise SystemExit\n"),
         lambda: (folder / "manifest.json").write_text('{"key": '),
         lambda: (shutil.rmtree(folder), folder.mkdir()),
     ]
     for damage in damages:
         damage()
-        assert write_unit(tmp_path) == unit
-        assert product() == file
-        assert file.read_bytes() == content
-    assert attempts(cache) == []
+        assert computed() == value
+        assert core.read_text() == text
+    assert attempts(copied) == []
 
 
-def test_a_second_process_writes_no_sources_again(tmp_path: Path) -> None:
-    """It takes the module of the first, by a note of what that was made of; another model has another."""
+def test_a_second_process_writes_no_sources_again(copied: Path, tmp_path: Path) -> None:
+    """It takes the module of the first, by a note of what that was made of; what is damaged is built again."""
     code = (
         "import sys, eomgen as eg\nm = eg.load(sys.argv[1]).compile(optimize=0)\n"
         "print(m.rhs(0.0, [0.5, 0.0])[1], 'jinja2' in sys.modules, 'Cython' in sys.modules)"
     )
 
-    def started(gravity: str) -> list[str]:
-        renamed("noted", tmp_path, gravity)
-        command = [sys.executable, "-c", code, str(tmp_path / "noted.yaml")]
+    def started(file: Path) -> list[str]:
+        command = [sys.executable, "-c", code, str(file)]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
 
-    first = started("9.81")
-    assert first[1] == "True"
-    assert started("9.81") == [first[0], "False", "False"]
-    other = started("9.82")
+    first = started(PENDULUM)
+    assert first[1:] == ["False", "False"]
+    other = started(heavier(tmp_path))
     assert (other[0] != first[0], other[1]) == (True, "True")
-    for one in entries("model"):
-        if one["name"] == "noted":
-            next(Path(one["directory"]).glob("*.so")).write_bytes(b"damaged")
-    assert started("9.81") == [first[0], "True", first[2]]
+    assert started(PENDULUM) == first
+    kept = [Path(entry["directory"]) for entry in entries("model")]
+    assert len(kept) == 2
+    for folder in kept:
+        next(folder.glob("*.so")).write_bytes(b"damaged")
+    assert started(PENDULUM) == [first[0], "True", "False"]
 
 
-def test_list_prune_clear(cache: Path, tmp_path: Path) -> None:
-    assert entries() == []
-    assert run("cache", "clear").code == 0
+def test_list_prune_clear(copied: Path, tmp_path: Path) -> None:
     for age, name in zip((300, 200), ("pendulum", "double_pendulum"), strict=True):
-        write_unit(tmp_path, models.build(name))
-        listed = {entry["name"]: entry for entry in entries()}
-        file = Path(listed[name]["directory"]) / "manifest.json"
-        os.utime(file, (time.time() - age * 86400.0,) * 2)
+        os.utime(product(name).parent / "manifest.json", (time.time() - age * 86400.0,) * 2)
     assert [entry["name"] for entry in entries()] == ["double_pendulum", "pendulum"]
     total = run("cache", "list", "--json").json
-    assert total["size"] == sum(entry["size"] for kind in ("library", "object") for entry in entries(kind))
+    assert {"library", "object", "model"} <= {entry["kind"] for entry in total["entries"]}
+    assert total["size"] == sum(entry["size"] for entry in total["entries"])
     write_unit(tmp_path)  # used again
     assert [entry["name"] for entry in entries()] == ["pendulum", "double_pendulum"]
     assert run("cache", "prune", "--older-than", "150").code == 0
     assert [entry["name"] for entry in entries()] == ["pendulum"]
-    assert run("cache", "clear").code == 0
-    assert run("cache", "list", "--json").json["entries"] == []
-    assert write_unit(tmp_path)
+    for _ in range(2):  # of nothing, too
+        assert run("cache", "clear").code == 0
+        assert run("cache", "list", "--json").json["entries"] == []
 
 
-def test_the_cache_is_private(cache: Path, tmp_path: Path) -> None:
-    before = os.umask(0)
-    try:
-        write_unit(tmp_path)
-    finally:
-        os.umask(before)
-    paths = [cache, *cache.rglob("*")]
+def test_the_cache_is_private(copied: Path, tmp_path: Path) -> None:
+    paths = [copied, *copied.rglob("*")]
     assert len(paths) > 10
     assert [path for path in paths if path.stat().st_mode & 0o022] == []
-    for folder in (cache, product().parent.parent, product().parent):
+    file = product("pendulum")
+    for folder in (copied, file.parent.parent, file.parent):
         assert folder.stat().st_mode & 0o777 == 0o700
-    cache.chmod(0o777)
+    copied.chmod(0o777)
     refuses("EG-CACHE written", write_unit, tmp_path)
 
 
@@ -321,30 +356,27 @@ def test_a_build_that_is_ended_leaves_no_compiler_and_no_attempt(
 # Whatever loads code, lists or clears a cache takes nothing that another user could have put there.
 
 
-def test_a_foreign_entry_is_not_taken(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_unit(tmp_path)
-    file = product()
+def test_a_foreign_entry_is_not_taken(copied: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = product("pendulum")
     with monkeypatch.context() as patch:
         give_away(file, patch)
         refuses(FOREIGN, write_unit, tmp_path)
     assert file.is_file()  # nothing of another user is removed
 
 
-def test_a_pickle_names_code_that_is_looked_at(tmp_path: Path) -> None:
+def test_a_pickle_names_code_that_is_looked_at(copied: Path, tmp_path: Path) -> None:
     """A module that is loaded in another process is the file that was built, or nothing."""
     code = "import pickle, sys, numpy as np\nprint(pickle.load(open(sys.argv[1], 'rb')).rhs(0.0, np.ones(2)).shape)"
-    module = renamed("pickled", tmp_path).compile(optimize=0)
-    (tmp_path / "module").write_bytes(pickle.dumps(module))
+    (tmp_path / "module").write_bytes(pickle.dumps(eg.load(PENDULUM).compile(optimize=0)))
     command = [sys.executable, "-c", code, str(tmp_path / "module")]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "(2,)\n"
-    (entry,) = (entry for entry in entries("model") if entry["name"] == "pickled")
+    (entry,) = entries("model")
     file = next(Path(entry["directory"]).glob("*.so"))
     aside = file.with_name("aside")
     file.rename(aside)  # it is mapped into this process
     file.write_bytes(aside.read_bytes()[:-1] + b"?")
     file.chmod(0o700)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    aside.rename(file)
     assert done.returncode != 0
     assert "damaged" in done.stderr
     assert "compile the model again" in done.stderr

@@ -29,7 +29,7 @@ ABUSE = Path(__file__).with_name("fmu_abuse.c")
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
 POINTS = 21
 #: Which run always: a loop in both versions, a rolling disc, a loop in space with a redundant description.
-ALWAYS = {("slider_crank", "2.0"), ("slider_crank", "3.0"), ("rolling_disc", "3.0")}
+ALWAYS = {("slider_crank", "2.0"), ("slider_crank", "3.0"), ("rolling_disc", "2.0")}
 
 
 def ball() -> eg.Model:
@@ -237,10 +237,10 @@ def test_random_calls_neither_crash_nor_leak(model: Any, version: str, tmp_path:
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_functions_are_those_of_the_headers_of_the_standard(version: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("model", "version"), [(ball, "2.0"), (between_walls, "3.0")])
+def test_functions_are_those_of_the_headers_of_the_standard(model: Any, version: str, tmp_path: Path) -> None:
     """A compiler compares the declarations of the standard, as FMPy has them; every function of a unit is exported."""
-    with zipfile.ZipFile(ball().derive().write_fmu(tmp_path / "m.fmu", version)) as archive:
+    with zipfile.ZipFile(model().derive().write_fmu(tmp_path / "m.fmu", version)) as archive:
         archive.extractall(tmp_path)
     headers, source = Path(fmpy.__file__).parent / "c-code", tmp_path / "sources" / f"fmi{version[0]}.c"
     flags = ["-std=c99", "-pedantic-errors", "-DFMI_HEADERS", f"-I{headers}", "-fsyntax-only"]
@@ -301,7 +301,7 @@ def test_impacts_are_refused_by_name(tmp_path: Path) -> None:
 def test_the_command_replaces_its_own_file_alone(tmp_path: Path) -> None:
     words = (
         "generate",
-        models.EXAMPLES / "pendulum.yaml",
+        models.EXAMPLES / "slider_crank.yaml",
         "--out",
         tmp_path,
         "--target",
@@ -312,12 +312,12 @@ def test_the_command_replaces_its_own_file_alone(tmp_path: Path) -> None:
     )
     assert run(*words).code == 0
     told = run(*words).json
-    assert (told["name"], Path(told["folder"])) == ("pendulum", tmp_path / "pendulum.fmu")
-    (tmp_path / "pendulum.fmu").write_text("mine")
+    assert (told["name"], Path(told["folder"])) == ("slider_crank", tmp_path / "slider_crank.fmu")
+    (tmp_path / "slider_crank.fmu").write_text("mine")
     refused = run(*words)
     assert refused.code == 2
     assert "was not written by eomgen" in refused.err
-    assert (tmp_path / "pendulum.fmu").read_text() == "mine"
+    assert (tmp_path / "slider_crank.fmu").read_text() == "mine"
 
 
 def test_wrong_names_and_versions(tmp_path: Path) -> None:
@@ -442,7 +442,7 @@ def test_states_of_pairs_are_states_of_a_unit(tmp_path: Path) -> None:
     path = m.derive().write_fmu(tmp_path / "sled.fmu")
     names = ["j_x", "sand_shear_1", "sand_sinkage_2"]
     run = simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=0.2, output_interval=0.01, output=names)
-    traj = m.compile(optimize=0).simulate(0.2)
+    traj = m.compile(target="numpy").simulate(0.2)
     for name in names:
         assert run[name][-1] == pytest.approx(traj[name][-1], rel=1e-4)
     assert traj["sand_sinkage_2"][-1] > 1e-3

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -71,7 +72,7 @@ def test_taylors_method_keeps_its_tolerance() -> None:
     m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
     m.state("x", "x*x", initial=0.5)
     m.state("y", "-y", initial=1.0)
-    mod = m.compile(optimize=0)
+    mod = m.compile(**IN_C)
     run = mod.simulate(1.5, method="Taylor", rtol=1e-10, atol=1e-10)
     assert len(run.t) <= STEPS + 1
     inside = (run.t[:-1, None] + np.diff(run.t)[:, None] * [0.25, 0.5, 0.75, 1.0]).ravel()

@@ -15,6 +15,7 @@ import jax
 import models
 import numpy as np
 import pytest
+from analysed import compiled
 from host_device import HostDevice
 from refusals import refuses
 from sweeps import OF_ALL_KINDS, part_of
@@ -29,7 +30,7 @@ CHOSEN = (
 )  # fmt: skip
 #: Of these CasADi and JAX are tried always, whose functions take longer to make.
 TRACED = ("double_pendulum", "slider_crank", "rolling_disc", "hydraulic_boom", "satellite")
-IN_C = ("slider_crank", "gait_leg")  #: others as recorded, in test_golden
+COMPILED = ("slider_crank", "gait_leg")  #: others as recorded, in test_golden
 ON_DEVICE = ("double_pendulum", "slider_crank", "hydraulic_boom")
 NAMES = sorted({*EXAMPLES, *CHOSEN})
 EARLY = 1e-4  #: a time (s) that driven mechanisms reach from their start
@@ -91,12 +92,12 @@ def case(name: str) -> tuple[np.ndarray, np.ndarray]:
     return state_of(module), np.random.default_rng(4).normal(size=module.n_v)
 
 
-@pytest.mark.parametrize("name", part_of(NAMES, IN_C.__contains__))
+@pytest.mark.parametrize("name", part_of(NAMES, COMPILED.__contains__))
 def test_c_equals_numpy(name: str) -> None:
     """All functions and the Jacobian, of one state and of several."""
     x, a = case(name)
     wanted = expected(name, x, a)
-    in_c = derived(name).compile(optimize=0, kernels=[*wanted, "jacobian"])
+    in_c = compiled(name, "cython")
     for call, numbers in wanted.items():
         assert_close(called(in_c, call, x, a), numbers, call, 1e-10)
     closed = judge(name).project(x, t=EARLY)

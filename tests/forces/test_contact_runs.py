@@ -11,6 +11,7 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
+from models import IN_C
 from scipy.integrate import solve_ivp
 from sweeps import part_of
 
@@ -29,7 +30,7 @@ def wall(target: str) -> Any:
     m.planar("j", m.ground, ball)
     thin = {"shape": "segment", "on": m.ground.at(2, 0, 0, rpy=(0, 0, np.pi / 2)), "length": 3.0}
     m.contacts("wall", {"shape": "circle", "on": ball, "radius": 0.05}, thin, {"stiffness": 1e6})
-    return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,7 @@ def thrown(name: str, target: str) -> Any:
     m.free("j", m.ground, a)
     m.contacts("c", {**shape, "on": a}, {**other, "on": m.ground}, {"stiffness": 1e7})
     m.output("energy", "total_energy")
-    return m.compile(target=target)
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 SOLIDS = {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flying_bodies import ELASTIC, STIFF, check_slopes, depth_of, flying, state
 from force_judges import differences
-from golden import IN_C
+from models import IN_C
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 
@@ -293,7 +293,7 @@ def test_rigid_stacks_stand_or_fall_as_in_mujoco(shift: float) -> None:
     data = mujoco.MjData(model)
     for _ in range(600):
         mujoco.mj_step(model, data)
-    mod = pile([(0.2, 0.2, 0.2)] * 2, {"normal_law": "rigid", "friction": 1.0}).compile(optimize=0, kernels=IN_C)
+    mod = pile([(0.2, 0.2, 0.2)] * 2, {"normal_law": "rigid", "friction": 1.0}).compile(**IN_C)
     start = {"j0_z": 0.1, "j1_z": 0.3, "j1_x": shift}
     traj = mod.simulate(0.6, initial=start, method="moreau", step=2e-3)
     falls = data.qpos[9] < 0.29

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from force_judges import differences, read_back
+from models import IN_C
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 
@@ -390,7 +391,7 @@ def test_what_has_no_derivative_is_refused_by_the_call_that_takes_it(force: tupl
 @pytest.mark.parametrize("law", ["hypot", *(pytest.param(x, marks=THOROUGH) for x in ("sqrt", "a power of squares"))])
 def test_compiled_runs_from_rest(law: str) -> None:
     """v' = -g + v^2 has v = -sqrt(g) tanh(sqrt(g) t); other powers against DOP853."""
-    mod = falling(DIFFERENTIABLE[law]).compile(optimize=0)
+    mod = falling(DIFFERENTIABLE[law]).compile(**IN_C)
     assert (mod.jacobian(0.0, np.zeros(6))[3:] == 0.0).all()
     exact = -np.sqrt(G) * np.tanh(5 * np.sqrt(G))
     expected = mod.simulate(5.0, rtol=1e-12, atol=1e-14)["t_z_dot"][-1] if law == "a power of squares" else exact

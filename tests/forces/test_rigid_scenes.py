@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golden import IN_C
+from models import IN_C
 from refusals import refuses
 from sweeps import part_of
 
@@ -49,7 +49,7 @@ def test_impulses_keep_momenta_and_give_no_energy(number: int) -> None:
     m, bodies = free_bodies(masses)
     shapes = [shape_of(number + k * (number > 1), body) for k, body in enumerate(bodies)]
     m.contacts("c", shapes, law={**RIGID, "friction": friction, "restitution": restitution})
-    mod = m.compile(optimize=0, kernels=IN_C)
+    mod = m.compile(**IN_C)
     x = np.zeros(18)
     for k, place in enumerate([(0.0, 0.0), (0.4, 0.02), (-0.4, -0.02)]):
         x[3 * k : 3 * k + 2], x[3 * k + 2] = place, random.uniform(-1, 1)

@@ -8,7 +8,7 @@ import judges
 import numpy as np
 import pytest
 import rotations
-from models import reference
+from models import IN_C, reference
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS
@@ -119,7 +119,7 @@ def stone(rotation: str = "euler_parameters", **keys: Any) -> eg.Model:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_no_rotation_and_no_number_are_named(target: str) -> None:
-    module = stone().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    module = stone().compile(target=target, **(IN_C if target == "cython" else {}))
     start = module.x0(f_wx=1.0)
     first = module.q_names.index("f_e0")
     for size in (0.0, 1e-170):

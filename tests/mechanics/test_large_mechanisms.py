@@ -30,7 +30,7 @@ def tip(module: Any, q: np.ndarray, body: str, at: Any = (0.0, 0.0, 0.0)) -> np.
     return np.asarray(pose[:3, :3] @ at + pose[:3, 3])
 
 
-@pytest.mark.parametrize("name", part_of(FREE_MOTIONS, "spatial_four_bar".__eq__))
+@pytest.mark.parametrize("name", part_of(FREE_MOTIONS, "spatial_slider_crank".__eq__))
 def test_loops_stay_closed_and_energy_is_kept(name: str, module: Any) -> None:
     mod = module(name, target="cython")
     options = dict(FREE_MOTIONS[name])

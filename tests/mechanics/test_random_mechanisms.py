@@ -14,9 +14,9 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
-from golden import IN_C
 from hypothesis import Phase, given, reject, seed, settings
 from hypothesis import strategies as st
+from models import IN_C
 from random_models import (
     ANCHOR,
     AXES,
@@ -382,9 +382,7 @@ def test_methods_agree(batch: int) -> None:
 
 
 def test_targets_agree() -> None:
-    for_each(
-        1, lambda recipe: judge_alike(recipe, Made(recipe).compile(target="cython", optimize=0, kernels=IN_C)), count=3
-    )
+    for_each(1, lambda recipe: judge_alike(recipe, Made(recipe).compile(target="cython", **IN_C)), count=3)
 
 
 # -- the same physics, described otherwise -----------------------------------------------------------------------------

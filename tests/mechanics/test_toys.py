@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golden import IN_C
+from models import IN_C
 
 import eomgen as eg
 
@@ -72,7 +72,7 @@ def woodpecker() -> Any:
             {"normal_law": "rigid", "friction": MU, "restitution": E_BEAK if k == 0 else 0.0},
         )
     m.independent(*coordinates)
-    return m.compile(optimize=0, kernels=IN_C)
+    return m.compile(**IN_C)
 
 
 def by_hand(end: float, h: float) -> Any:

@@ -171,7 +171,7 @@ FAULTS = (
         "-0.00019841269836722437 + z * (2.755731608382574e-06",
         "-0.00019841629836722437 + z * (2.755731608382574e-06",
         "a coefficient of the sine: two digits swapped",
-        "tests/code/test_operations.py::test_sine_and_cosine_are_within_two_units_in_the_last_place[plain]",
+        "tests/code/test_printed_operations.py::test_sine_and_cosine_are_within_two_units_in_the_last_place[plain]",
     ),
     Fault(
         "wide-steps", "C wide.measure",

@@ -10,6 +10,7 @@ import analysed
 import models
 import numpy as np
 import pytest
+from models import IN_C
 from refusals import refuses
 from scipy.integrate import solve_ivp
 
@@ -217,7 +218,7 @@ def test_inputs_given_win_over_declared_signals_and_reach_the_outputs() -> None:
     m.torque("drive", "s", m.input("push", signal="5*sin(3*t)"))
     m.input("other")
     m.output("force", "push")
-    module = m.compile(optimize=0)
+    module = m.compile(**IN_C)
     declared = module.simulate_many(2, {"s_dot": [0.0, 1.0]}, t_eval=[1.0, 2.0], **TIGHT)
     np.testing.assert_allclose(declared["s_dot"][-1] - [0.0, 1.0], 5 / 3 * (1 - np.cos(6.0)) / 2, rtol=0, atol=1e-9)
     np.testing.assert_allclose(declared["force"], 5 * np.sin([[3.0, 3.0], [6.0, 6.0]]), rtol=1e-12)
@@ -241,7 +242,7 @@ def test_outputs_of_a_run_that_an_event_ended_are_those_at_the_event() -> None:
     m = eg.Model("falling", gravity=(0, -10, 0))
     m.prismatic("h", m.ground, m.body("a", mass=1.0), axis="y")
     m.output("when", "t")
-    module = m.compile(optimize=0)
+    module = m.compile(**IN_C)
     floor = {"floor": {"expression": "h", "terminal": 1}}
     ensemble = module.simulate_many(5, {"h": [1.25, 5.0, 1000.0]}, events=floor, **TIGHT)
     np.testing.assert_allclose(ensemble["when"], [0.5, 1.0, 5.0], rtol=1e-9)

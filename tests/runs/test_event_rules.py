@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from refusals import refused, refuses
 from scipy.integrate import DOP853
 from sweeps import TARGETS, part_of
@@ -113,7 +114,7 @@ def test_an_event_that_is_no_number_leaves_the_others_alone(modules: dict[str, A
     m.event("above", "sqrt(h - 0.5) - sqrt(0.1)")  # no number below 0.5, a zero at 0.6
     m.event("pole", "(h - 0.2)/max(h - 0.1, 0)")  # infinite or no number below 0.1, a zero at 0.2
     m.event("other", "h - 50", reset={"h_dot": "sqrt(h - 50)"})  # its new value is one there only
-    own = modules | {target: m.compile(target=target) for target in ("cython", "numpy")}
+    own = modules | {"cython": m.compile(**IN_C), "numpy": m.compile(target="numpy")}
     for name, run in loops(own).items():
         error = ERROR.get(name.split()[1], 1e-8)
         with pytest.warns(UserWarning, match="never"):

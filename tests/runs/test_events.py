@@ -9,6 +9,7 @@ import models
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from refusals import refused, refuses
 from scipy.integrate import DOP853, solve_ivp
 from sweeps import TARGETS
@@ -272,7 +273,7 @@ def spring() -> eg.Model:
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_functions_that_change_what_they_are_given_change_no_run(target: str) -> None:
-    mod = spring().compile(target=target)
+    mod = spring().compile(target=target, **(IN_C if target == "cython" else {}))
     truth = mod.simulate((0, 1), **TIGHT).x
 
     def changing(t: float, x: Any) -> float:
@@ -303,7 +304,7 @@ def test_functions_that_change_what_they_are_given_change_no_run(target: str) ->
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None:
     """As an input is; one that is no number only beyond the end of the run, where rates are taken, is not."""
-    mod = spring().compile(target=target)
+    mod = spring().compile(target=target, **(IN_C if target == "cython" else {}))
 
     def broken(t: float, x: Any) -> float:
         return np.nan if x[0] < 0.5 else x[0] - 0.4

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from analysed import compiled
+from models import IN_C
 from refusals import refuses
 from scipy.optimize import curve_fit
 from scipy.stats import chi2
@@ -42,7 +43,7 @@ DRIVE = {"tau": "4*sin(5*t) + 3*sin(2.3*t)"}
 
 @pytest.fixture(scope="module")
 def module() -> eg.Module:
-    return arm().compile(optimize=0)
+    return arm().compile(**IN_C)
 
 
 def measured(module: eg.Module, seed: int, noise: float = 0.002, **changed: Any) -> dict[str, np.ndarray]:

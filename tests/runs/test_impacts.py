@@ -12,6 +12,7 @@ import judges
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from refusals import refused, refuses
 from sweeps import TARGETS
 
@@ -180,7 +181,7 @@ def box(gravity: float = 0.0, target: str = "numpy") -> Any:
     m.force("push", b, (0, m.input("F", 0.0), 0))
     m.output("lo", "y")
     m.output("hi", "1 - y")
-    return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -321,7 +322,7 @@ def ball_on_input(target: str, bounces: bool = True) -> Any:
     m.output("over", "s - u")
     if bounces:
         m.event("floor", "s - u", restitution=1.0)
-    return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.fixture(scope="module", params=TARGETS)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from models import IN_C
 from refusals import refused, refuses
 
 import eomgen as eg
@@ -48,7 +49,7 @@ def build(name: str, target: str) -> Any:
     else:
         row = x**2 + y**2 - l**2
         m = eg.Model.from_lagrangian("ring", (x_dot**2 + y_dot**2) / 2, [x, y], constraints=[row], inputs={l: 1.0})
-    return m.compile(target=target)
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.fixture(params=["cython", "numpy"])

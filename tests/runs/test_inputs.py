@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from models import IN_C
 from refusals import refused, refuses
 from scipy.interpolate import CubicSpline
 from sweeps import TARGETS
@@ -27,7 +28,7 @@ def pushed(target: str) -> Any:
     m.output("y", k * u)
     m.output("wall", "50 + k*u")  # a gap that moves with the input and stays open
     m.output("power_in", push.power)
-    return m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.fixture(scope="module")

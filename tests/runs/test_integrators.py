@@ -13,6 +13,7 @@ import command
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from refusals import refused, refuses
 
 import eomgen as eg
@@ -20,24 +21,24 @@ import eomgen as eg
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
 
-def spring(**options: Any) -> Any:
+def spring(target: str) -> Any:
     """x'' = (F - k x) / m, which has a closed form."""
     m = eg.Model("spring")
     k, force = m.parameter("k", 9.0), m.input("F", 0.0)
     m.prismatic("J", m.ground, m.body("cart", mass=2), axis="x", coordinate="x")
     m.torque("push", "J", force - k * m.coordinate("x"))
     m.initial = {"x": 0.3}
-    return m.compile(**options)
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 @pytest.fixture(scope="module", params=["cython", "numpy"])
 def cart(request: pytest.FixtureRequest) -> Any:
-    return spring(target=request.param)
+    return spring(request.param)
 
 
 @pytest.fixture(scope="module")
 def in_c() -> Any:
-    return spring()
+    return spring("cython")
 
 
 @pytest.fixture(scope="module")
@@ -216,7 +217,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_run_takes_the_declared_steps(path: Path) -> None:
-    swing, h = eg.load(path).compile(), 0.01
+    swing, h = eg.load(path).compile(**IN_C), 0.01
     run, x = swing.simulate(), swing.x0()
     for _ in range(100):  # Kutta's classical formula
         a = swing.rhs(0.0, x)

@@ -10,7 +10,7 @@ from sweeps import TARGETS
 import eomgen as eg
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_a_welded_tree_simulates(target: str) -> None:
     m = eg.Model("welded", gravity=(0, -9.81, 0))
     m.weld("A", m.ground.at(1, 2, 0), m.body("b", mass=2))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from models import IN_C
 from refusals import refused, refuses
 from sweeps import TARGETS
 
@@ -40,7 +41,7 @@ def kicked() -> Any:
     """Two sliders that an event brings to the speed k, in C."""
     m = sliders({"s_dot": "k"}, False)
     m.parameter("k", 2.0)
-    return m.compile(optimize=0)
+    return m.compile(**IN_C)
 
 
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "RK4", "LSODA"])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golden import IN_C
+from models import IN_C
 from refusals import refuses
 from rigid_scenes import SHAPES, G, on_floor, rigid
 from sweeps import TARGETS
@@ -236,7 +236,7 @@ def heap() -> Any:
         )
     m.contacts("heap", shapes, law=rigid(friction=0.4, restitution=0.3))
     m.contacts("floor", shapes, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.6))
-    return m.compile(optimize=0, kernels=IN_C)
+    return m.compile(**IN_C)
 
 
 @pytest.mark.parametrize("h", [1e-3, 4e-3])

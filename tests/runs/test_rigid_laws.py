@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golden import IN_C
+from models import IN_C
 from rigid_scenes import G, pile, rigid, thrown
 from sweeps import TARGETS
 
@@ -18,7 +18,7 @@ KINDS = ("circle", "box", "triangle", "segment")
 
 def test_energy_never_grows_in_random_scenes() -> None:
     """12 piles, with friction and restitution of any size: no more energy than before, and no shape in another."""
-    mod = pile(KINDS).compile(optimize=0, kernels=IN_C)
+    mod = pile(KINDS).compile(**IN_C)
     rng = np.random.default_rng(7)
     missed = 0
     for k in range(12):
@@ -92,7 +92,7 @@ def linkage(target: str) -> Any:
     ends = [{"shape": "circle", "radius": 0.05, "on": rod.at(x, 0.0, 0)} for x in (0.0, 0.25, 0.5)]
     floor = {"shape": "half_plane", "on": m.ground.at(0, 0.1, 0)}
     m.contacts("floor", ends, floor, rigid(friction=0.3, restitution=0.2))
-    return m.compile(target=target, **({"optimize": 0, "kernels": IN_C} if target == "cython" else {}))
+    return m.compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 def run_both(build: Any, **options: Any) -> tuple[Any, Any]:

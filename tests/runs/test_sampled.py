@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from models import IN_C
 from refusals import refused, refuses
 from sweeps import TARGETS
 
@@ -70,7 +71,7 @@ def by_hand(
 @pytest.fixture(scope="module")
 def module() -> Any:
     """The servo in C."""
-    return servo().compile(optimize=0)
+    return servo().compile(**IN_C)
 
 
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
@@ -175,7 +176,7 @@ def test_clocks_whose_times_differ_by_rounding_keep_their_order(method: str, tar
     m.sampled("a", "1 - s - 2*s_dot", 0.1)
     m.sampled("b", "a", 0.3)
     m.actuator("motor", "s", value="b")
-    module = m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    module = m.compile(target=target, **(IN_C if target == "cython" else {}))
     s = v = force = 0.0
     for k in range(41):
         force = 1 - s - 2 * v if k % 3 == 0 else force
@@ -245,7 +246,7 @@ def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, met
         called.append(t)
         return 8.0 * (TARGET - x[0]) + 5.0 * x[2] - 4.0 * x[1]  # x[2] is z, renewed before u
 
-    module = outside().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    module = outside().compile(target=target, **(IN_C if target == "cython" else {}))
     run = module.simulate(1.05, method=method, controllers={"u": drive})
     assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-12
     assert np.abs(called - 0.1 * np.arange(11)).max() < 1e-15

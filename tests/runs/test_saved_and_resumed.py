@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from analysed import compiled
 from children import HANGS
+from models import IN_C
 from refusals import refused, refuses
 
 import eomgen as eg
@@ -144,7 +145,7 @@ def test_kill_9(pendulum: Any, tmp_path: Path) -> None:
     run = {"span": 2000.0, "rtol": 1e-12, "atol": 1e-14, "max_step": 0.002, "t_eval": np.linspace(0, 2000, 1001)}
     code = (
         "import sys, numpy as np, eomgen as eg\n"
-        "module = eg.load_example('double_pendulum').compile(optimize=0)\n"
+        f"module = eg.load_example('double_pendulum').compile(**{IN_C})\n"
         "module.simulate(2000.0, rtol=1e-12, atol=1e-14, max_step=0.002, t_eval=np.linspace(0, 2000, 1001),"
         "checkpoint=sys.argv[1], checkpoint_every=0.05)\n"
     )

@@ -355,7 +355,6 @@ def test_mechanisms_against_differences(case: str, tmp_path: Path) -> None:
     make, names, held, end, count = STRUCK[case]
     equations, h = make(tmp_path).derive(), 2e-5
     mod = equations.compile(target="numpy")
-    quick = equations.compile(optimize=0) if mod.n_c else mod  # many runs of loops: by the functions in C
     times = np.array([0.5 * end, end])
     s = mod.sensitivities(names, end, held, t_eval=times, rtol=1e-10, atol=1e-12)
     assert len(s.events) == count
@@ -368,7 +367,7 @@ def test_mechanisms_against_differences(case: str, tmp_path: Path) -> None:
                 start[name] += shift
             else:
                 p = {name: mod.p[mod.p_names.index(name)] + shift}
-            made = quick.simulate(end, start, p, t_eval=times, rtol=1e-12, atol=1e-14)
+            made = mod.simulate(end, start, p, t_eval=times, rtol=1e-12, atol=1e-14)
             return np.vstack([made.x, *(made[y] for y in mod.y_names)]), np.concatenate(made.t_events)
 
         right, left = run(h), run(-h)

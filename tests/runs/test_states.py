@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from models import IN_C
 from refusals import refuses
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -206,7 +207,7 @@ def crank(states: bool = True) -> eg.Model:
 
 @cache
 def crank_module(target: str, states: bool = True) -> Any:
-    return crank(states).compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return crank(states).compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 def extended(mod: Any, x: np.ndarray) -> np.ndarray:
@@ -307,7 +308,7 @@ def lag(events: bool = False, tau: float = 0.5) -> eg.Model:
 
 @cache
 def lag_module(target: str = "cython", events: bool = False) -> Any:
-    return lag(events).compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    return lag(events).compile(target=target, **(IN_C if target == "cython" else {}))
 
 
 def matrix(k: float = K, tau: float = 0.5) -> np.ndarray:

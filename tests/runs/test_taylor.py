@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from analysed import compiled
+from models import IN_C
 from refusals import refused, refuses
 from scipy.integrate import solve_ivp
 from sweeps import part_of
@@ -72,7 +73,7 @@ def masses() -> Any:
         m.prismatic(f"J{k}", m.ground, body, axis="x", coordinate=f"x{k}")
         own = re.sub(r"\bx\b", f"x{k}", re.sub(r"\bv\b", f"x{k}_dot", text))
         m.torque(f"F{k}", f"J{k}", own)
-    return m.compile(optimize=0)
+    return m.compile(**IN_C)
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +185,7 @@ def test_steps_are_judged_by_their_ends(name: str) -> None:
     body = m.body("body", mass=1.0)
     m.prismatic("J", m.ground, body, axis="x", coordinate="x")
     m.torque("F", "J", re.sub(r"\bv\b", "x_dot", force))
-    mod = m.compile(optimize=0)
+    mod = m.compile(**IN_C)
     judge = solve_ivp(
         lambda t, y: [y[1], own(t, y[0], y[1])], (0, 2), [x0, v0], method="Radau", rtol=1e-10, atol=1e-12, max_step=0.01
     )

@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from models import IN_C
 from mpmath import mp, mpf
 from scipy.integrate import quad
 
@@ -127,7 +128,7 @@ def by_series() -> Any:
     for k, (text, _) in enumerate(FORCES.values()):
         m.prismatic(f"J{k}", m.ground, m.body(f"body{k}", mass=1.0), axis="x", coordinate=f"q{k}")
         m.torque(f"F{k}", f"J{k}", text)
-    module = m.compile(optimize=0, kernels=["rhs", "project"])
+    module = m.compile(**IN_C | {"kernels": ["rhs", "project"]})
     solver = module.Taylor(module.rhs, 0.0, np.zeros(module.n_x), END, rtol=1e-12, atol=1e-13)
     for _ in range(FEW):  # with a wrong coefficient they become ever shorter
         if solver.status == "running":
