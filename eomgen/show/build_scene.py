@@ -71,7 +71,7 @@ def build_scene(
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
     known = {name: q[k] for k, name in enumerate(layout.q)}
-    items = link_items(data, points, symbol, extent, getattr(module, "description", None), quiet)
+    items = link_items(data, points, symbol, extent, _model_file(module), quiet)
     items += joint_items(data, view, up, symbol, frames, known)
     items += wall_items(data, view, symbol, frames[0])
     items += element_items(data, view, symbol, frames)
@@ -95,6 +95,12 @@ def _tracked(data: PictureData, name: str) -> PlacedFrame:
     known = [*data.markers, *data.bodies]
     near = hint(name, known, quoted=False) or f"there are {', '.join(known)}"
     raise no_such(f"no marker or body {name!r} to trace; {near}")
+
+
+def _model_file(module: Any) -> str | None:
+    """The file that the model was read from, empty for one that was built in Python; None if that is not known."""
+    equations = getattr(module, "equations", None)
+    return None if equations is None else equations.kinematics.mechanism.lines.get("", ("", 0))[0]
 
 
 def _with_ground(poses: Array) -> Array:

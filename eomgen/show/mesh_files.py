@@ -28,7 +28,7 @@ _UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([-+0-9.eE]+)")
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
-def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool = False) -> Mesh | None:
+def mesh_of(shape: Mapping[str, Any], body: str, model_file: str | None, quiet: bool = False) -> Mesh | None:
     """The mesh of a shape in metres, axes of its frame; None, with a warning unless ``quiet``, if it cannot be drawn.
 
     Parameters
@@ -36,11 +36,11 @@ def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool =
     shape : mapping
         With ``file`` and ``sizes``, the scale along each axis.
     body : str
-    description : Description or None
-        Of the model: a file is looked up from the folder of the model file, and lies in it or below.
+    model_file : str or None
+        A mesh lies in the folder of this file or below; empty for a model that was built in Python, None if not known.
     """
     try:
-        vertices, faces = read_mesh(_located(as_name("file", shape["file"]), description))
+        vertices, faces = read_mesh(_located(as_name("file", shape["file"]), model_file))
     except (UsageError, OSError) as error:
         why = visible(str(error.strerror if isinstance(error, OSError) else error), lines=False)
         if not quiet:
@@ -50,13 +50,12 @@ def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool =
     return vertices * scale, faces if scale.prod() > 0.0 else faces[:, ::-1]
 
 
-def _located(file: str, description: Any) -> str:
-    if description is None:
+def _located(file: str, model_file: str | None) -> str:
+    if model_file is None:
         raise bad_file("the module was not made from a model here, so the folder of the file is not known")
-    model = description.place("")[0]
     if file.startswith(PACKAGE):  # of a robot: the folder of the package is that of its file
         file = file.removeprefix(PACKAGE).partition("/")[2]
-    return beside(model, file) if model else file
+    return beside(model_file, file) if model_file else file
 
 
 def read_mesh(path: str) -> Mesh:

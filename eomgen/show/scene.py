@@ -6,7 +6,7 @@ Nothing here knows how it is drawn: the backends ask every :class:`Item` where i
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -266,12 +266,12 @@ def link_items(
     points: list[Array],
     symbol: float,
     extent: float,
-    description: Any = None,
+    model_file: str | None = None,
     quiet: bool = False,
 ) -> list[Item]:
     """Bodies: the shapes that they were given, else bars and plates between what is attached to them.
 
-    ``description`` of the model tells where files of meshes lie; ``quiet``: without warnings about them.
+    ``model_file``: beside which files of meshes lie; ``quiet``: without warnings about them.
     """
     items: list[Item] = []
     shaped = set()
@@ -279,7 +279,7 @@ def link_items(
         body = shape["body"]
         name = "ground" if body == GROUND else data.bodies[body]
         if shape["kind"] == "mesh":
-            mesh = mesh_of(shape, name, description, quiet)
+            mesh = mesh_of(shape, name, model_file, quiet)
         else:
             mesh = solid(shape["kind"], shape["sizes"], BAR * symbol, ROUND)
         if mesh is not None:

@@ -394,7 +394,7 @@ def test_nothing_is_removed_through_a_foreign_cache(
         give_away(cache / name, monkeypatch)
     refused = run("cache", verb)
     assert refused.code == 3
-    assert FOREIGN in refused.err
+    assert "belongs" in refused.err
     assert (victim / "precious").is_dir()
     assert run("cache", "list").code == 0
 

@@ -356,7 +356,7 @@ def test_a_ring_has_its_hole_and_a_fine_mesh_is_thinned_out(tmp_path: Path) -> N
         ("part.ply", b"ply", "STL, OBJ and DAE files can be drawn"),
         ("part.stl", None, "No such file"),
         ("part.stl", b"no mesh at all", "it holds no triangles"),
-        ("part.stl", b"solid a\n" + b"vertex 0 0 nan\n" * 3, "EG-NUMBER finite"),
+        ("part.stl", b"solid a\n" + b"vertex 0 0 nan\n" * 3, "vertices that are not finite"),
         ("part.obj", b"v 0 0 0\nf 1 2 3\n", "name vertices that it does not have"),
         ("part.dae", b'<!DOCTYPE x [<!ENTITY e "e">]>', "declares a document type"),
         ("../part.stl", b"", "outside the folder of the model file"),
