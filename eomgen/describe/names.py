@@ -141,8 +141,11 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     if isinstance(name, str) and (name in _NEEDED or name in sys.stdlib_module_names):
         whose = "a module that eomgen needs" if name in _NEEDED else "a module of Python's library"
         return f"a package {name!r} would hide {whose}", f"choose another name, e.g. {name}_model"
-    if isinstance(name, str) and (name.lower() in _HEADERS or name.lower().startswith("eomgen")):
-        return f"{name[:LONGEST]!r} is the name of a file that every package has", "choose another name, e.g. my_model"
+    if isinstance(name, str) and (name.lower() in _HEADERS or re.match("eom(gen|_|$)", name.lower())):
+        return (
+            f"{name[:LONGEST]!r} is a name of files and functions that every package has",
+            "choose another name, e.g. my_model",
+        )
     return fault_of_name(name, symbol=True)
 
 

@@ -49,7 +49,7 @@ static inline double damping(const double *restrict step, int length)
 
 /* The part of a long step that close_position takes, so that far states come to the same place; 0 where only rounding
    is left of the constraints, whose weak rows need a term that is not known here. */
-static double limit_step(const eom_at *at, const double *restrict q)
+static double step_fraction(const eom_at *at, const double *restrict q)
 {
     const double *const closing = AT(CLOSING), *const s = AT(SCALES);
     double *const dz = AT(STEP);
@@ -108,7 +108,7 @@ static int close_directly(const eom_at *at, double *restrict q, int *restrict re
         *regular = step_directly(at, q);
         const double left = closing[1], length = closing[2];
         if (!(length <= 0.25)) { /* or not a number */
-            const double part = limit_step(at, q);
+            const double part = step_fraction(at, q);
             if (part == 0.0) {
                 break;
             }

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, argument
 from ..base.texts import shown
-from ..errors import STATUS, EvaluationError, NonFiniteError
+from ..errors import STATUS, TO_BE_FINITE, EvaluationError, NonFiniteError, not_finite
 from .argument_names import both_names
 from .layout import Layout
 from .numpy_drivers import Drivers
@@ -88,8 +88,11 @@ class NumpyCore:
         """The constants handed to the blocks; what uses one that is not finite tells the cause."""
         if self.precompute is None:
             return p
-        with np.errstate(all="ignore"):
-            return np.asarray(self.precompute(p), dtype=float)
+        try:
+            with np.errstate(all="ignore"):
+                return np.asarray(self.precompute(p), dtype=float)
+        except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
+            raise not_finite(f"the constants of the model cannot be computed; {TO_BE_FINITE}") from None
 
     def timed(
         self, name: str, context: Context, shape: Any, fail: Any, nan: bool = False, error: Any = ValueError

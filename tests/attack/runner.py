@@ -25,7 +25,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-from attack.guard import PACKAGE, TEMPLATES, Escape, Guard
+from attack.guard import PACKAGE, Escape, Guard
 
 import eomgen as eg
 
@@ -35,7 +35,7 @@ MEMORY = 2 << 30  #: bytes that a process may hold
 #: Outcomes that are findings; fine, named error and refused are not.
 FINDINGS = ("escape", "traceback", "hang", "memory", "crash", "warning", "wrong")
 #: Files of the generated modules, as tracebacks name those of machine code.
-GENERATED = frozenset(path.name for path in Path(TEMPLATES, "cython").iterdir())
+GENERATED = frozenset(path.name for path in Path(PACKAGE, "native").glob("*.px*"))
 #: What is said of arguments that do not fit a signature.
 MISFIT = re.compile(
     r"takes (no|exactly|at least|at most) |unexpected keyword|multiple values|needs keyword|missing \d+ req"

@@ -32,7 +32,8 @@ SANITIZERS = ("-g", "-O0", "-ffp-contract=off", "-fsanitize=address,undefined", 
 #: What objects may call besides one another: mathematics, and what compilers make of copied structures.
 CALLED = set(
     "sin cos tan asin acos atan atan2 hypot sinh cosh tanh asinh acosh atanh sincos exp log sqrt pow fabs ldexp floor ceil "
-    "fmod fmin fmax nextafter fma copysign trunc round memcpy memset memmove memcmp _GLOBAL_OFFSET_TABLE_".split()
+    "fmod fmin fmax nextafter fma copysign trunc round memcpy memset memmove memcmp _GLOBAL_OFFSET_TABLE_ "
+    "__cpu_model __cpu_indicator_init".split()  # by gcc, for functions that are compiled for several processors
 )
 METHODS = ("lagrange", "recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell", "hamilton")
 #: One loop always; by make thorough all examples, and a few by all methods.

@@ -171,11 +171,10 @@ def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Pa
     files = [file for file in (tmp_path / WORD).rglob("*") if file.is_file()]
     there = {file.name.lower() for file in files if file.parent.name == WORD}
     for file in files:
-        if target == "c" and file.suffix in (
-            ".c",
-            ".h",
-        ):  # in a module what lies in several files is not linked by name
+        # in a module what lies in several files is not linked by name, nor are static functions of the solvers
+        if target == "c" and file.suffix in (".c", ".h") and file.name != "eomgen_solvers.c":
             bare = re.sub(r'/\*.*?\*/|"(\\.|[^"\\\n])*"', " ", file.read_text(), flags=re.DOTALL)
+            bare = re.sub(r"typedef struct \{.*?\}", " ", bare, flags=re.DOTALL)  # members are no names by themselves
             there |= set(re.findall(r"[A-Za-z_]\w*", bare))
     own = {word for word in there if WORD in word.lower()}
     assert len(own) > 2
@@ -185,7 +184,9 @@ def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Pa
         for other in there - own:
             if len(other) > len(start + end) and other.startswith(start) and other.endswith(end):
                 names.add(other[len(start) : len(other) - len(end)].lower())
-    for name in sorted(names | {"eomgen", "eomgen_real", "EOMGEN_x", "Python", "python", "structmember", "errors"}):
+    for name in sorted(
+        names | {"eomgen", "eomgen_real", "eom", "eom_x", "EOMGEN_x", "Python", "python", "structmember", "errors"}
+    ):
         with pytest.raises(eg.ModelError) as caught:
             eg.Model(name).mechanism()
         assert "name" in {problem.path for problem in caught.value.problems}, (

@@ -33,7 +33,7 @@ def named(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., eg.Mo
     """A model whose code no other test has."""
 
     def make(name: str = "two_link_manipulator") -> eg.Model:
-        own = re.sub(r"\W", "_", request.node.name.removesuffix("-batch]").removesuffix("-ensemble]"))
+        own = re.sub(r"\W", "_", request.node.name)
         text = (models.EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
         (tmp_path / "named.yaml").write_text(re.sub("^name: .*", f"name: {own}", text, flags=re.MULTILINE))
         return eg.load(tmp_path / "named.yaml")

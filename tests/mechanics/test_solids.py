@@ -175,7 +175,7 @@ joints: {J: {type: free, between: [ground, b]}}
     outside = written(tmp_path.parent / "outside.stl", trimesh.creation.box((1, 1, 1)))
     for file in ("../outside.stl", outside):
         model.write_text(text.replace("FILE", str(file)))
-        with refused("EG-FILE-DAMAGED bodies.b.solids[0].file ball.yaml 5"):
+        with refused("EG-FILE bodies.b.solids[0].file ball.yaml 5"):
             eg.load(model).check()
 
 
@@ -204,7 +204,7 @@ def broken(tmp_path: Path, what: str) -> Path:
         ("inwards", "EG-FILE-DAMAGED bodies.b.solids[0].file inside"),
         ("mixed", "EG-FILE-DAMAGED bodies.b.solids[0].file opposite"),
         ("text", "EG-FILE-DAMAGED bodies.b.solids[0].file"),
-        ("missing", "EG-FILE-DAMAGED bodies.b.solids[0].file"),
+        ("missing", "EG-FILE bodies.b.solids[0].file"),
     ],
 )
 def test_meshes_that_bound_no_solid_are_refused(tmp_path: Path, what: str, message: str) -> None:

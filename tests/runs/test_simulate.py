@@ -194,7 +194,7 @@ def test_a_passing_failure_only_shortens_the_step(rooted: eg.Module) -> None:
 
 
 def test_a_failure_at_the_start_is_no_simulation_error(swing: eg.Module, rooted: eg.Module) -> None:
-    refuses("EG-SHAPE bob m", swing.simulate, 1.0, parameters={"m": 0.0})
+    refuses("EG-SINGULAR theta", swing.simulate, 1.0, parameters={"m": 0.0})
     with pytest.raises(eg.NonFiniteError):
         rooted.simulate(1.0, {"x": 2.0})
 
