@@ -189,7 +189,7 @@ def definite_factor(M: Array, what: str) -> Array:
 def indefinite_factor(matrix: Array, sizes: Array) -> tuple[Array, Array]:
     """L (n, n), 1 on its diagonal, and d (n,) with matrix = L diag(d) L^T, of a matrix that need not be definite.
 
-    Without pivoting, as in C (templates/c/drivers/ldl.c): what a pivot loses is told by the terms it is the sum of.
+    Without pivoting, as in C: what a pivot loses shows in the terms it is the sum of.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from ...base.algebra import diagonal_blocks
-from ...base.limits.constraints import KEPT, LEFT
+from ...base.limits.constraints import KEPT, LEFT, TIKHONOV
 from ...base.limits.crossings import NEAR_SQUARE
 from ...equations.articulated import ConstraintRow, TreeMotion
 from ...graph.core import Expr
@@ -28,14 +28,14 @@ class BodyLoops(LoopBlocks):
         if terms.constrained is None:
             return None
         rows = [ConstraintRow(row, x * i) for row, x, i in zip(self.rows, terms.gamma, self.inverse, strict=True)]
-        solved = terms.constrained(rows, self.term if self.redundant else 0.0)
+        solved = terms.constrained(rows, TIKHONOV if self.redundant else 0.0)
         if any(d.is_zero for d in solved.pivots):
             return None
         self.multipliers = list(solved.multipliers)
         for _ in range(self.solutions - 1 if self.redundant else 0):  # with what the term in G has left of the rows
             left = times(self.rows, solved.accelerations)
             again = [ConstraintRow(row.entries, row.rest + x) for row, x in zip(rows, left, strict=True)]
-            more = terms.constrained(again, self.term, loaded=False)
+            more = terms.constrained(again, TIKHONOV, loaded=False)
             total = tuple(a + b for a, b in zip(solved.accelerations, more.accelerations, strict=True))
             self.multipliers = [a + b for a, b in zip(self.multipliers, more.multipliers, strict=True)]
             solved = solved._replace(accelerations=total)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...base.algebra import DiagonalBlock, diagonal_blocks
-from ...base.limits.constraints import ROUNDED, TIKHONOV
+from ...base.limits.constraints import ROUNDED
 from ...base.limits.crossings import NEAR_SQUARE
 from ...base.limits.numbers import STILL
 from ...graph.core import Expr
@@ -47,8 +47,8 @@ class EmbeddedLoops(LoopBlocks):
 
     passes = 5, 4  # where weak rows keep something, drivers take more
 
-    def __init__(self, terms: SystemTerms, term: float = TIKHONOV, solutions: int = 2) -> None:
-        super().__init__(terms, term, solutions)
+    def __init__(self, terms: SystemTerms) -> None:
+        super().__init__(terms)
         #: squares of a column of the dependent coordinates, and of its part across those before it
         self._angles: dict[tuple[Expr, Expr], None] = {}
 

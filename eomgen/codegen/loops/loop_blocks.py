@@ -81,18 +81,15 @@ class LoopBlocks(ABC):
     ----------
     terms : SystemTerms
         With constraint rows and at least one degree of freedom.
-    term : float
-        What is added to J J^T of redundant rows, relative to its largest diagonal entry.
-    solutions : int
-        How many solutions with that term leave no trace of it, each for what the last one left.
     """
 
     #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations.
     passes: tuple[int, int]
+    #: Solutions that leave no trace of the term TIKHONOV of redundant rows, each for what the last one left.
+    solutions = 2
 
-    def __init__(self, terms: SystemTerms, term: float = TIKHONOV, solutions: int = 2) -> None:
+    def __init__(self, terms: SystemTerms) -> None:
         self.terms = terms
-        self.term, self.solutions = term, solutions
         self.s = terms.coordinate_scales
         one = terms.graph.one
         alike = len(set(terms.constraint_scales)) == 1
@@ -163,7 +160,7 @@ class LoopBlocks(ABC):
         if self.gentle:
             return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
-            return self._regularised(self.J, self.term)[0], (self.solutions, self.solutions)
+            return self._regularised(self.J, TIKHONOV)[0], (self.solutions, self.solutions)
         return factorize(gram(self.J)), (1, 1)
 
     def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr], order: int = 1) -> list[Expr]:
