@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import correlated
-from ..base.limits.constraints import MEASURED
+from ..base.limits.constraints import MEASURED, STRUCTURE
 from ..base.limits.numbers import SINGULAR
 from ..base.limits.systems import UNTOUCHED
 from ..base.operations import CONDITION, OPERATIONS
@@ -29,6 +29,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import operands, reachable
 from ..kinematics import Kinematics
 from ..kinematics.carried_reactions import carried_reactions
+from ..kinematics.constraint_functions import ConstraintFunctions
 from ..kinematics.eliminate import Matrix, dot, eliminate, total
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
@@ -36,6 +37,7 @@ from ..kinematics.reaction_parts import force_and_moment
 from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
 from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches, Row6
+from ..numeric.row_chains import SparseRows
 from .factor import factorize, solve
 from .held_constraints import LinearValues, closed, hold, solve_switched, switched_matrix
 from .laws import MANY, laws_in, pieces_of, solve_laws
@@ -281,14 +283,67 @@ def refuse_without_inertia(moved: Sequence[str], users: Users) -> None:
         raise ModelError([users.together(message, "give every body mass, or inertia about its joint")])
 
 
-def refuse_redundant(mobility: Mobility, users: Users) -> None:
-    """Refuse mechanisms whose reactions are not unique."""
-    if not mobility.redundant:
+def refuse_redundant(
+    kinematics: Kinematics,
+    mobility: Mobility,
+    multipliers: Sequence[Expr],
+    values: Mapping[Expr, Expr],
+    users: Users,
+) -> None:
+    """Refuse what depends on reactions that constraints which follow from others leave open.
+
+    Parameters
+    ----------
+    multipliers : sequence
+        The symbol of each constraint row's multiplier.
+    values : mapping
+        What the symbols of reactions and multipliers stand for, in terms of these.
+
+    Raises
+    ------
+    ModelError
+    """
+    mechanism, motion = kinematics.mechanism, kinematics.motion
+    if not mobility.redundant or not (shared := _shared(kinematics, mobility, multipliers, values)):
         return
+    quantities = mechanism.reaction_quantities
+    paths = [f"forces.{name}" for name, laws in users.laws.items() if shared & symbols_of(laws)]
+    for name, quantity in quantities.items():
+        seen = substitute([kinematics.graph.symbol(name)], motion.derived_symbols(mechanism, {name}))
+        paths += [quantity.path] if shared & symbols_of(seen) else []
     message = "depends on the reaction of a joint, and reactions are not unique: "
     message += f"{', '.join(mobility.redundant)} follow from the other constraints"
     remedy = "release only these rows by joints with more freedom, or take a law without reactions"
-    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-UNDETERMINED") for path in users.paths])
+    raise ModelError([mechanism.problem(path, message, remedy, "EG-UNDETERMINED") for path in dict.fromkeys(paths)])
+
+
+def _shared(
+    kinematics: Kinematics, mobility: Mobility, multipliers: Sequence[Expr], values: Mapping[Expr, Expr]
+) -> set[str]:
+    """Names of values that multipliers change which leave the motion as it is: C_q^T l = 0."""
+    numbers = {p.name: p.value for p in (*kinematics.mechanism.parameters, *kinematics.mechanism.inputs)}
+    every = {symbol.node[1] for symbol in values}
+    if mobility.assumed or any(value is None for value in numbers.values()):
+        return every
+    functions = ConstraintFunctions(kinematics, {name: float(value or 0.0) for name, value in numbers.items()})
+    slopes = jacobian(list(values.values()), list(multipliers))
+    names = sorted(symbols_of(list(slopes.values())))
+    evaluate = compile_evaluator(list(slopes.values()), names)
+    found, judged = set[str](), False
+    for place in mobility.samples:
+        J = functions.scaled_jacobian(np.array(place))
+        known = dict(zip(kinematics.names, place, strict=True)) | functions.values
+        S = np.zeros((len(values), len(multipliers)))
+        with np.errstate(all="ignore"):
+            for (i, j), slope in zip(slopes, evaluate([known.get(name, 0.0) for name in names]), strict=True):
+                S[i, j] = slope / functions.scales.c[j]
+        if not np.isfinite(J).all() or not np.isfinite(S).all() or SparseRows(J).rank < mobility.rank:
+            continue  # at a change point more is open, but there alone
+        judged = True
+        open_ = S @ SparseRows(np.ascontiguousarray(J.T)).motions(mobility.rank).T
+        moved = np.abs(open_).max(axis=1) > STRUCTURE * np.abs(S).max(axis=1)
+        found |= {symbol.node[1] for symbol, is_moved in zip(values, moved, strict=True) if is_moved}
+    return found if judged else every
 
 
 #: Equations of a mechanism onto which velocities are brought together with closed ones; of more they are judged only.
@@ -589,12 +644,10 @@ def _reactions(
     """
     graph = kinematics.graph
     wrenches = JointWrenches(kinematics)
-    labels = [kinematics.constraints.labels[i] for i in mobility.independent_rows]
-    refuse_redundant(mobility, users)
-    own = {label: graph.symbol(f"multiplier[{label}]") for label in labels}
-    idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in own}
-    every = carried_reactions(wrenches, own | idle)
-    known = own | idle | {row.label: row.multiplier for row in held}
+    rows = {label: graph.symbol(f"multiplier[{label}]") for label in kinematics.constraints.labels}
+    idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in rows}
+    every = carried_reactions(wrenches, rows | idle)
+    known = rows | idle | {row.label: row.multiplier for row in held}
     where = [reaction_of(name) for name in names]
     reactions = []
     for name, place in zip(names, where, strict=True):
@@ -603,11 +656,13 @@ def _reactions(
             reactions.append(every[place[0]][place[1]])
         else:
             reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), users)])
+    stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
+    refuse_redundant(kinematics, mobility, list(rows.values()), stands, users)
     if idle:
-        stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
         refuse_undetermined(kinematics, every, list(idle.values()), stands, users)
-        reactions = substitute(reactions, dict.fromkeys(idle.values(), graph.zero))
-    return reactions, [own[label] for label in labels]
+    free = [*idle.values(), *(rows[label] for label in mobility.redundant)]
+    reactions = substitute(reactions, dict.fromkeys(free, graph.zero)) if free else reactions
+    return reactions, [rows[kinematics.constraints.labels[i]] for i in mobility.independent_rows]
 
 
 def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users) -> str:

@@ -395,7 +395,8 @@ def test_thrust_of_a_sliding_joint_is_refused():
     refuses("EG-UNSUPPORTED forces.around", lambda: sleeve(thrust_radius=0.1).check())
 
 
-def test_reactions_that_are_not_unique_are_refused():
+def table() -> eg.Model:
+    """A bar on three parallel cranks, which share its weight in no way that rigid bodies determine."""
     m = eg.Model("table", gravity=(0, -G, 0))
     cranks = [m.body(f"crank{k}", mass=1.0, inertia={"zz": 0.1}, com=(0.5, 0, 0)) for k in range(3)]
     bar = m.body("bar", mass=1.0, inertia={"zz": 0.1})
@@ -403,8 +404,24 @@ def test_reactions_that_are_not_unique_are_refused():
         m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank)
         m.revolute(f"B{k}", crank.at(1, 0, 0), bar.at(k, 0, 0))
     m.initial(A0=0.5)
+    return m
+
+
+def test_reactions_that_are_not_unique_are_refused():
+    m = table()
     m.friction("pin", joint="A0", coefficient=0.1, radius=0.1, smoothing=1e-2)
     refuses("EG-UNDETERMINED forces.pin", m.check)
+
+
+def test_what_rows_leave_unique_beside_redundant_ones():
+    """The torque that holds a crank of the table, and a hinge on its bar: J and the moment of all weights by hand."""
+    m = table()
+    m.revolute("hinge", m.bodies["bar"].at(0.5, 0, 0), m.body("weight", mass=2.0, com=(0, -0.1, 0)))
+    m.coupling("lock", equation="A0_dot", closes="1 - t", opens="2 - t", closed=True)
+    m.output("torque", "multiplier(lock)")
+    m.output("load", "reaction(hinge).y")
+    mod = m.compile(target="numpy")
+    assert mod.outputs(0.0, mod.x0()) == pytest.approx([-4.5 * G * np.cos(0.5), 2.0 * G], rel=1e-12)
 
 
 def test_reactions_beside_a_massless_rod():

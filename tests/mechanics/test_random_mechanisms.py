@@ -77,8 +77,8 @@ def compiled(recipe: Recipe) -> tuple[Made, Any]:
     made = Made(recipe)
     try:
         return made, made.compile()
-    except eg.ModelError as why:  # its loop holds what is driven; a multiplier beside rows that follow from others
-        assert any(words in str(why) for words in ("the driver has no effect", "reactions are not unique"))
+    except eg.ModelError as why:  # its loop holds what is driven
+        assert "the driver has no effect" in str(why)
         reject()
 
 
@@ -420,8 +420,8 @@ def judge_dressed(recipe: Recipe, clothes: Clothes) -> None:
         if one.numbers.start and "driver" not in recipe.constraints:  # the same assembly
             for mine, theirs in zip(one.places(module), made.places(other), strict=True):
                 np.testing.assert_allclose(theirs, mine, rtol=0, atol=1e-8)
-    except eg.ModelError as error:  # of the joint that is cut now: a spring on its angle, a multiplier beside its rows
-        assert any(words in str(error) for words in ("only known up to full turns", "reactions are not unique"))
+    except eg.ModelError as error:  # of the joint that is cut now: a spring on its angle
+        assert "only known up to full turns" in str(error)
         return
     assert other.n_dof == module.n_dof
     first, second = one.motion(module, x), made.motion(other, y)
