@@ -321,7 +321,8 @@ def _shared(
     kinematics: Kinematics, mobility: Mobility, multipliers: Sequence[Expr], values: Mapping[Expr, Expr]
 ) -> set[str]:
     """Names of values that multipliers change which leave the motion as it is: C_q^T l = 0."""
-    numbers = {p.name: p.value for p in (*kinematics.mechanism.parameters, *kinematics.mechanism.inputs)}
+    mechanism = kinematics.mechanism
+    numbers = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
     every = {symbol.node[1] for symbol in values}
     if mobility.assumed or any(value is None for value in numbers.values()):
         return every
