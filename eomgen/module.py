@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .analysis.reactions import driving_forces as _driving_forces
     from .analysis.reactions import reactions as _reactions
     from .analysis.reactions import undetermined_reactions as _undetermined_reactions
-    from .analysis.workspace import workspace as _workspace
     from .ensembles.simulate_many import simulate_many as _simulate_many
     from .identification.base_parameters import base_parameters as _base_parameters
     from .identification.fit import fit as _fit
@@ -80,7 +79,6 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "consistent": "analysis.consistent",
     "kinematic_analysis": "simulation.kinematic",
     "motion_range": "analysis.coordinate_range",
-    "workspace": "analysis.workspace",
     "inverse_dynamics_derivatives": "runtime.derivative_calls",
     "report": "runtime.summary",
     "draw": "runtime.drawing",
@@ -251,7 +249,6 @@ class Module(BoundModel):
         consistent = _consistent
         kinematic_analysis = _kinematic_analysis
         motion_range = _motion_range
-        workspace = _workspace
         inverse_dynamics_derivatives = _inverse_dynamics_derivatives
         report = _report
         draw = _draw

@@ -69,25 +69,6 @@ def events() -> Any:
 
 
 @picture
-def kinematics_workspace() -> Any:
-    """What the tip of a two-link arm reaches."""
-    robot = eg.Model("arm")
-    upper, lower = (robot.body(name, mass=1, inertia={"zz": 0.1}) for name in ("upper", "lower"))
-    robot.revolute("shoulder", robot.ground, upper, coordinate="q1")
-    robot.revolute("elbow", upper.at(0.5, 0, 0), lower, coordinate="q2")
-    tip = lower.marker("tip", at=(0.3, 0, 0))
-    robot.output("tip_x", tip.position[0])
-    robot.output("tip_y", tip.position[1])
-    robot.initial(q2=0.5)
-    mod = robot.compile(target="numpy")
-    ws = mod.workspace({"q1": (0, np.pi / 2, 31), "q2": (0, np.pi, 41)}, of=["tip_x", "tip_y"])
-    made = ws.plot()
-    figure = np.ravel(made)[0].figure
-    figure.set_size_inches(5.2, 4.0)
-    return figure
-
-
-@picture
 def analyses() -> Any:
     """The four-bar of the IFToMM benchmark in equilibrium, and its eigenvalues over the damping."""
     m = eg.Model("four_bar", gravity=(0, -9.81, 0))

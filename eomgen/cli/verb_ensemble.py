@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..base.files import open_plain, save_figure, write_whole
-from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
+from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
 from ..runtime.near_names import require
 from ..runtime.room import require_room
 from ..runtime.storage import split_head, write_netcdf
@@ -20,7 +20,6 @@ from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .sections import verb_command
 from .shared_options import parse_number, require_folder
-from .workspace_request import read_axes
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -90,7 +89,7 @@ def ensemble(
         raise off_range(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     if grid and (cases is not None or vary or count is not None):
         raise at_odds("--grid defines all runs itself; leave out --cases, --vary and --count")
-    axes = read_axes("--grid", grid)
+    axes = read_grid(grid)
     values = _read(cases, module) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
@@ -198,3 +197,27 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
             raise at_odds(f"--vary {name.strip()} is given twice")
         drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
     return drawn
+
+
+def read_grid(options: tuple[str, ...]) -> dict[str, tuple[float, float, int]]:
+    """``NAME=LOW:HIGH:COUNT`` of each ``--grid`` -> (low, high, count) by name.
+
+    Raises
+    ------
+    UsageError
+    """
+    grid: dict[str, tuple[float, float, int]] = {}
+    for option in options:
+        name, equals, text = option.partition("=")
+        parts = text.split(":")
+        if not equals or not name.strip() or len(parts) != 3:
+            raise ill_typed(f"--grid {option}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
+        try:
+            low, high = (parse_number(part) for part in parts[:2])
+            count = int(parts[2])
+        except ValueError as error:  # a UsageError too
+            raise no_number(f"--grid {option}: {error}") from None
+        if name.strip() in grid:
+            raise at_odds(f"--grid {option}: give each name once")
+        grid[name.strip()] = (low, high, count)
+    return grid

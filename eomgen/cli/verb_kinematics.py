@@ -30,7 +30,6 @@ from .shared_options import (
 )
 from .verb_derive import summary
 from .verb_run import complete_parameters, final_names, sort_settings
-from .workspace_request import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
     from ..module import Module
@@ -53,14 +52,6 @@ SHOWN = 9  #: of them on the screen
     help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
 )
 @click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
-@click.option(
-    "--over",
-    multiple=True,
-    metavar="NAME=LOW:HIGH:COUNT",
-    help="Find the workspace of --of over a grid of up to three coordinates, one --over for each; t for drivers.",
-)
-@click.option("--of", multiple=True, metavar="NAME", help="Outputs or coordinates of the workspace.")
-@click.option("--within-limits", is_flag=True, help="Restrict the workspace to the limits of the joints.")
 @click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option(
@@ -80,9 +71,6 @@ def kinematics(
     target: str,
     ranges: tuple[str, ...],
     limits: tuple[str, ...],
-    over: tuple[str, ...],
-    of: tuple[str, ...],
-    within_limits: bool,
     partial: bool,
     settings: tuple[str, ...],
     out: Path | None,
@@ -92,12 +80,10 @@ def kinematics(
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
 
-    Without --range, drivers move the model from t = 0 to the end given in its file.  With --over and --of, find what
-    outputs can reach over a grid of coordinates instead.
+    Without --range, drivers move the model from t = 0 to the end given in its file.
     """
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
-    grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in RUNS:
         raise bad_file(f"--out {out}: the motion is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
@@ -112,13 +98,12 @@ def kinematics(
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
     check_columns(module, picture)
-    named = range_values(module, asked) if asked or not (limits or grid) else {}
+    named = range_values(module, asked) if asked or not limits else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()
     with stage("kinematics"):
         motion = bound.kinematic_analysis(initial=initial or None, partial=partial, **named) if named else None
         found = [bound.motion_range(name, initial=initial or None) for name in limits]
-        space = bound.workspace(grid, of, initial=initial or None, limits=within_limits) if grid else None
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files: list[str] = []
     if motion is not None and out is not None:
@@ -127,8 +112,6 @@ def kinematics(
     if motion is not None and plot is not None:
         plot_run(motion, find_paths(equations.kinematics.mechanism), motion.name, plot, picture)
         files.append(str(plot))
-    if space is not None:
-        files += write_workspace(space, out, plot)
     if as_json:
         report: dict[str, Any] = {
             "name": module.name,
@@ -137,7 +120,7 @@ def kinematics(
             "files": files,
         }
         report |= {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
-        print_json(report if space is None else report | {"workspace": workspace_to_dict(space)})
+        print_json(report)
         return
     say(str(equations.report))
     if motion is not None:
@@ -146,9 +129,6 @@ def kinematics(
         print_heading(f"range of {one.name}")
         sides = (("lower", one.lower, one.stops[0], one.gaps[0]), ("upper", one.upper, one.stops[1], one.gaps[1]))
         print_rows([(s, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for s, x, stop, gap in sides])
-    if space is not None:
-        print_heading(space.title)
-        print_rows(space.facts)
     for file in files:
         say(f"wrote {file}")
 

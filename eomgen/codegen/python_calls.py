@@ -61,7 +61,6 @@ def describe_calls(program: Program) -> list[Call]:
         ),
         Call("kinematic_analysis(t, **led)", "KinematicAnalysis", "motion over a range of time or of coordinates"),
         Call("motion_range(name)", "MotionRange", "the limits between which a coordinate can move"),
-        Call("workspace(over, of)", "Workspace", "values of outputs over a grid of coordinates"),
         Call("poses(q)", _shape(s.n_bodies, 4, 4), "body frames to ground, homogeneous"),
         Call("outputs(t, x)", _shape(s.n_y), "the outputs of the model at the projected state"),
         Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),

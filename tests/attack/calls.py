@@ -24,7 +24,7 @@ MODELS = {"pendulum": SMALL["pendulum"], "spring": SMALL["spring"], "four_bar": 
 TARGETS = ("numpy", "cython")
 NOT_CALLED = {"verify", "bind", "report"}  #: take seconds by design, or are bound before each call
 RARE = set(
-    "simulate simulate_many simulate_impacts sensitivities workspace kinematic_analysis motion_range equilibrium branches "
+    "simulate simulate_many simulate_impacts sensitivities kinematic_analysis motion_range equilibrium branches "
     "integrator".split()
 )
 MOST, FEW = 100_000, 2_000  #: numbers of an array; of points at which a mechanism is closed one after the other

@@ -173,8 +173,6 @@ CALLS: dict[str, Callable[[], Any]] = {
     "a range of unequal arrays": lambda: crank().kinematic_analysis(t=[0, 1], theta=[0, 1, 2]),
     "a range of two coordinates": lambda: crank().kinematic_analysis(theta=[0.0, 0.1], s=[0.3, 0.31]),
     "a range out of reach": lambda: crank().kinematic_analysis(s=[0.3, 9.0]),
-    "a workspace": lambda: crank().workspace(of=["s"], over=3),
-    "a grid": lambda: crank().workspace(of=["s"], over={"theta": (0, 1, 10**9)}),
     "projection from afar": lambda: crank().project(np.full(crank().n_x, 1e9)),
     "a state without numbers": lambda: crank().rhs(0.0, np.full(crank().n_x, np.nan)),
     "a rate without number": lambda: crank().energy([0.3, 0, 0.4, np.inf, 0, 0]),

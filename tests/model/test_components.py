@@ -378,7 +378,6 @@ DOORS: dict[str, Door] = {
     "modes": lambda m, n: m.modes({n("a.q"): 0.0, n("b.q"): 0.0}).frequencies,
     "sensitivities": lambda m, n: m.sensitivities([n("a.l"), n("a.q")], 0.1).dx,
     "motion_range": lambda m, n: m.motion_range(n("a.q"), within=(-0.5, 0.5)).upper,
-    "workspace": lambda m, n: m.workspace({n("a.q"): (0, 1, 4), n("b.q"): (0, 1, 3)}, n("b.height")).values,
     "consistent": lambda m, n: m.consistent(m.x0() + 1e-3, weights={n("a.q"): 3.0}, hold=[n("b.q")]),
     "actuator_forces": lambda m, n: m.actuator_forces(0.0, m.x0(), {n("a.q"): 1.0}, actuated=[n("a.q"), n("b.q")])
     .forces,

@@ -27,7 +27,6 @@ CRANK = {
     "impact": "m.impact(0.0, m.x0(), lock=['s']).impulses",
     "consistent": "m.consistent(m.x0() + 0.05)",
     "kinematic_analysis": "m.kinematic_analysis(theta=[0.3, 0.9, 1.2])['s']",
-    "workspace": "m.workspace({'theta': (0, 3, 7)}, ['s'])['s']",
     "motion_range": "m.motion_range('s', initial={'theta': 0.5}).upper",
     "regressor": "m.regressor(m.x0()[:3], m.x0()[3:], [1.0, 2.0, 3.0])",
     "simulate": "m.simulate(0.2, t_eval=[0.0, 0.2]).x",

@@ -67,7 +67,6 @@ COUNTS: dict[str, tuple[Any, int, str]] = {
     "block": (lambda m, n: m.simulate_many(0.01, count=1, block=n), 1, "block"),
     "max_steps": (lambda m, n: m.simulate_many(0.01, count=1, max_steps=n), 1, "max_steps"),
     "keep_events": (lambda m, n: m.simulate_many(0.01, count=1, keep_events=n), 1, "keep_events"),
-    "points": (lambda m, n: m.workspace({"theta": (0.0, 1.0, 3)}, "theta", points=n), 0, "points"),
     "impacts": (lambda m, n: m.simulate_impacts(0.01, {"theta": 1.0}, most=n), 1, "most"),
     "terminal": (lambda m, n: m.simulate(0.01, events=[swinging(n)]), 0, "theta: terminal"),
     "jobs": (lambda m, n: models.build("pendulum").compile(jobs=n), 1, "jobs"),

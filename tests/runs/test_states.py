@@ -84,7 +84,6 @@ def test_large_states_do_not_spoil_an_equilibrium() -> None:
     [
         lambda mod: mod.kinematic_analysis(s=[0.0, 1.0]),
         lambda mod: mod.motion_range("s"),
-        lambda mod: mod.workspace(over={"s": (0, 1)}, of=["place"]),
         lambda mod: mod.actuator_forces(0.0, mod.x0()),
         lambda mod: mod.canonical,
         lambda mod: mod.regressor([0.1], [0.0], [0.0]),

@@ -63,10 +63,6 @@ UNJUDGED = 1e-6
 LEAPS = (1e-3, 4e-3, 1.6e-2, 6e-2)
 #: Step of the path's parameter, relative to the path, before the way counts as blocked: 500 roundings.
 BLOCKED = 1e-13
-#: Smallest over largest singular value of J from which a grid point counts as singular.
-DEGENERATE = 1e-9
-#: Part of det J at the neighbours that counts as 0 between them.
-NEGLIGIBLE = 1e-10
 #: By which a limit may be passed, for rounding and what positions are closed to.
 SLACK = 1e-9
 #: Distance from a singularity of Euler angles (rad) at which a failure is put down to it.
@@ -78,8 +74,6 @@ NULL = 1e-13
 #: Scaled distance by which an interpolant across a singular position may miss a position on it: seven times the error
 #: of its rates there.
 ASTRAY = 1e-5
-#: Volume of a cell, in units of its edges, below which it is flat.
-FLAT_CELL = 1e-12
 #: Scaled way to either side over which the rate of a led coordinate is differenced where it turns back.
 EXTREME = 1e-4
 #: Part of a path in time over which constraints are differenced at a position that stands still: the root of rounding.
