@@ -399,7 +399,6 @@ VERBS = [  # words of the command line
     ("run", "--set", "vx(a.rod.end)=0.2", "--set", "x(b.rod.end)=0.3", "--end", "0.1", "--target", "numpy"),
     ("kinematics", "--range", "a.q=0:0.5:4", "--range", "b.q=0:0.2:4", "--target", "numpy"),
     ("kinematics", "--limits", "a.q", "--target", "numpy"),
-    ("kinematics", "--over", "a.q=0:1:4", "--over", "b.q=0:1:3", "--of", "b.height", "--target", "numpy"),
     ("ensemble", "--vary", "a.q=0:0.5", "--count", "3", "--end", "0.1", "--target", "numpy"),
     ("ensemble", "--grid", "a.q=0:0.5:2", "--grid", "b.l=0.4:0.5:2", "--end", "0.1", "--target", "numpy"),
     ("equilibrium", "--hold", "a.q=0.2", "--unknown", "a.tau", "--target", "numpy"),

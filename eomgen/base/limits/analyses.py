@@ -40,7 +40,7 @@ DAMPING, GAINED = 1e-3, 1e-4
 LEAST_UNKNOWN = 1e-3
 
 
-# -- motions along constraints without forces, singular positions, workspaces ------------------------------------------
+# -- motions along constraints without forces, singular positions ------------------------------------------------------
 
 
 #: Scaled way (rad, lengths) that a position is led along in small steps: 300 turns, 20,000 steps.
