@@ -36,7 +36,6 @@ LAYER = {
     "_lanes.pxi": ("_lanes.pxi",),
     "_steppers.pxi": ("_steppers.pxi",),
     "_journeys.pxi": ("_journeys.pxi",),
-    "_frozen.pxi": ("_frozen.pxi",),
     "_integrators.pxi": ("_integrators.pxi",),
     "_ensembles.pxi": ("_ensembles.pxi",),
     "eomgen_steppers.h": ("steppers/eomgen_steppers.h",),

@@ -12,7 +12,7 @@ import click
 from ..base.limits.numbers import RESTING
 from ..base.names import place_of_marker
 from ..base.texts import without_noise
-from ..errors import bad_file, incomplete
+from ..errors import bad_file
 from ..runtime.near_names import unknown
 from ..runtime.storage import RUNS
 from .failures import after_integration, reports_failures
@@ -78,23 +78,6 @@ CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps",
     metavar="FILE",
     help="Write an animation: FILE.gif, FILE.mp4 or FILE.html.",
 )
-@click.option(
-    "--checkpoint",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Save the run in FILE while it goes on; the same command continues it later, with exactly the same result.",
-)
-@click.option(
-    "--checkpoint-every",
-    type=NumberRange(min=0),
-    metavar="SECONDS",
-    help="Time between two writes of that file; 60 s by default.",
-)
-@click.option(
-    "--resume/--no-resume",
-    default=None,
-    help="Require a checkpoint / ignore it; by default the run continues if there is one.",
-)
 @picture_options
 @json_option
 @solver_options
@@ -113,9 +96,6 @@ def run(
     plot: Path | None,
     picture: Picture,
     animate: Path | None,
-    checkpoint: Path | None,
-    checkpoint_every: float | None,
-    resume: bool | None,
     as_json: bool,
     robot: dict[str, Any],
     solver: dict[str, Any],
@@ -135,11 +115,6 @@ def run(
     require_folder("--out", out)
     require_folder("--animate", animate)
     require_folder("--plot", plot)
-    require_folder("--checkpoint", checkpoint)
-    kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
-    kept = {key: value for key, value in kept.items() if value is not None}
-    if kept and checkpoint is None:
-        raise incomplete("--checkpoint-every and --resume need --checkpoint FILE; give it too")
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
@@ -163,7 +138,6 @@ def run(
             inputs=inputs or None,
             dense_output=not takes_impulses(module, solver)
             and (plot is not None or animate is not None or counts_work(equations)),
-            **kept,
             **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}

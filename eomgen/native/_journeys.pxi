@@ -54,7 +54,7 @@ cdef extern from "eomgen_loop.h" nogil:
         long trail_room
         double *trail
         long node, done, stored, n_pieces, n_notes, n_trail, resets
-        int begun, pause
+        int begun
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
@@ -111,8 +111,7 @@ cdef class Journey(Stepper):
         trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None;
         stall_check: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's,
         or 0), tape (code, numbers, out) or None, outside: functions f(t, x, for_slope), and for each event direction, most, action;
-        resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many; keep: (seconds, function),
-        called about so often, between two steps, with what freeze gives; or None.
+        resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many.
 
     Attributes
     ----------
@@ -124,8 +123,7 @@ cdef class Journey(Stepper):
 
     cdef eomgen_journey journey
     cdef eomgen_events events
-    cdef object watch, stall_check, outside, keeper
-    cdef double pause_every, pause_due
+    cdef object watch, stall_check, outside
     cdef long seen
     cdef cnp.ndarray times, states, notes, pieces, walked
     cdef list stored
@@ -152,8 +150,6 @@ cdef class Journey(Stepper):
             self.expect(**plan["events"])
         self.allocate(512)
         self.watch, self.stall_check, self.called_at, self.seen = plan["watch"], plan.get("stall_check"), perf_counter(), 0
-        self.pause_every, self.keeper = plan.get("keep") or (INFINITY, None)
-        self.pause_due = self.called_at + self.pause_every
         self.run.callback, self.run.callback_data, self.run.until_callback = call_python, <void *>self, self.stride
 
     cdef hold(self, values, kind):
@@ -257,26 +253,6 @@ cdef class Journey(Stepper):
             room = min(2 * max(self.journey.room, 256), 1 << 16)
             self.take()
             self.allocate(room)
-            if self.journey.pause:
-                self.journey.pause = 0
-                self.keeper(freeze(self, 0))
-                self.pause_due = perf_counter() + self.pause_every
-
-    def frozen(self, long status):
-        """All that a run depends on from here on, by name, where travel has returned a status."""
-        self.take()
-        self.allocate(max(self.journey.room, 256))
-        return freeze(self, status)
-
-    def resume(self, dict kept):
-        """Go on from what was frozen, with its results: the status at which it was, 0 on the way.
-
-        Raises
-        ------
-        ValueError
-            It cannot be of such a journey.
-        """
-        return thaw(self, kept)
 
     def jump(self, x):
         """Go on from another state, at an event that waits; a negative number if resets crowd together."""
@@ -341,7 +317,6 @@ cdef class Journey(Stepper):
         try:
             PyErr_CheckSignals()
             now = perf_counter()
-            self.journey.pause = now >= self.pause_due
             if self.watch is not None:
                 self.watch(t)
             if self.stall_check is not None and self.run.steps > self.seen:
@@ -368,6 +343,3 @@ cdef class Journey(Stepper):
             self.raised = error
             return 1
         return 0
-
-
-include "_frozen.pxi"

@@ -119,7 +119,6 @@ cdef extern from "eomgen_steppers.h" nogil:
                      double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
     int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
-    int eomgen_is_sound(const eomgen_method *, const eomgen_run *) noexcept
     void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
     void eomgen_play(const eomgen_tape *, double, const double *, const double *, const double *, double *) noexcept
     const char **eomgen_operations

@@ -90,15 +90,3 @@ def code_digest(module: BoundModel) -> str:
     path = Path(file or "")
     data = path.read_bytes() if path.is_file() else str(core.metadata).encode()
     return hashlib.sha256(data).hexdigest()
-
-
-def differences(wanted: Mapping[str, Any], found: Mapping[str, Any], path: str = "") -> list[str]:
-    """Dotted names of what two mappings do not have in common."""
-    names = []
-    for name in dict.fromkeys((*wanted, *found)):
-        a, b = wanted.get(name), found.get(name)
-        if isinstance(a, Mapping) and isinstance(b, Mapping):
-            names += differences(a, b, f"{path}{name}.")
-        elif a != b and not (a != a and b != b):  # NaN is like NaN here
-            names.append(f"{path}{name}")
-    return names

@@ -24,7 +24,6 @@ from .run_arguments import check_tolerances
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .checkpoint import Checkpoint
     from .progress import Progress
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
@@ -114,7 +113,6 @@ def integrate_compiled(
     watch: Progress | None,
     look: Callable[[float, Array, int], None] | None = None,
     events: Events | None = None,
-    checkpoint: Checkpoint | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
     """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
 
@@ -134,18 +132,10 @@ def integrate_compiled(
         "trail": KEPT if module.layout.rank else 0,
         "watch": None if watch is None else watch.look,
         "stall_check": look,
-        "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
     steps = require_one(options["rtol"]), options["atol"], options.get("max_step", inf), options.get("first_step", 0.0)
     journey = core.journey(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
-    status = 0
-    if checkpoint is not None and checkpoint.kept is not None:
-        try:
-            status = journey.resume(checkpoint.kept)
-        except (KeyError, TypeError, ValueError) as error:
-            raise checkpoint.damaged(error) from None
-    if status == 0:
-        status = journey.travel()
+    status = journey.travel()
     while status in (WAITING, RESET_FAILED) and events is not None:
         k = next((k for k, node in enumerate(nodes[1:-1]) if (node - journey.t) * (end - start) >= 0.0), len(nodes) - 2)
         forcing.enter(nodes[k], nodes[k + 1])  # as the compiled loop has it
@@ -155,8 +145,6 @@ def integrate_compiled(
         status = journey.jump(after) or journey.travel()
     if forcing:
         forcing.enter(start, end)  # who asks for inputs from here on asks for those of the whole run
-    if checkpoint is not None and journey.raised is None and status in (ENDED, TERMINAL):
-        checkpoint.save(journey.frozen(status))
     times, states, notes = journey.outcome()
     if events is not None and journey.raised is None:
         warn_of_unknown([events.names[i] for i in journey.unknown()])

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.texts import shown
-from ..errors import SimulationError, at_odds, cannot, ill_typed
+from ..errors import SimulationError, cannot, ill_typed
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_mapping, require_time_and_state, without_dots
 from ..runtime.room import as_real
@@ -63,20 +63,15 @@ class ControlledEvents(Events):
         As for :class:`Events`.
     controllers : mapping of str to callable
         Sampled state -> f(t, x).
-    keeps : bool
-        Whether the run keeps a checkpoint.
 
     Raises
     ------
     UsageError
-        A name that is no sampled state without a law, or what is no function f(t, x); a checkpoint.
+        A name that is no sampled state without a law, or what is no function f(t, x).
     """
 
-    def __init__(self, layout: Layout, given: Any, controllers: Any, keeps: bool) -> None:
+    def __init__(self, layout: Layout, given: Any, controllers: Any) -> None:
         found = _by_event(layout, controllers)
-        if found and keeps:
-            message = "a run with controllers= keeps no checkpoint, for a function may hold values that no file keeps"
-            raise at_odds(f"{message}; leave checkpoint= out")
         super().__init__(layout, given)
         self.controllers = found
         for i in found:

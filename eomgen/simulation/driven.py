@@ -40,7 +40,6 @@ def follow_drivers(
     t_eval: ArrayLike | None,
     events: Any,
     method: Any,
-    checkpoint: Any,
     options: Mapping[str, Any],
 ) -> KinematicAnalysis | None:
     """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other.
@@ -56,10 +55,6 @@ def follow_drivers(
                 f"method 'kinematic' is for mechanisms without degrees of freedom; {module.name} has {module.n_dof}"
             )
         return None
-    if checkpoint is not None:
-        raise cannot(
-            f"{module.name} is moved by its drivers, position by position; such a run cannot keep a checkpoint"
-        )
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module

@@ -7,7 +7,6 @@ reset; what happens after a step is what the compiled loop does (steppers/loop.c
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,6 @@ from .event_crossings import Crossings, Step
 from .events import RunEvent
 
 if TYPE_CHECKING:
-    from .solver_state import Pause
     from .stalling import StallCheck
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
@@ -135,7 +133,6 @@ def integrate(
     stall_check: StallCheck | None,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
-    pause: Pause | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
 
@@ -150,7 +147,7 @@ def integrate(
     """
     journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, stall_check)
     try:
-        journey.travel(reset, enter, pause)
+        journey.travel(reset, enter)
     except KeyboardInterrupt as interrupt:
         journey.status, journey.message = -1, MESSAGES[-1]
         raise Interrupted(journey.solution()) from interrupt
@@ -186,28 +183,13 @@ class _Journey:
         self.kept = True
 
     def travel(
-        self, reset: Callable[[float, Array, list[int]], Array] | None, enter: Callable[[float, float], None] | None,
-        pause: Pause | None = None,
-    ) -> None:  # fmt: skip
-        """Go on to the end, a terminal event or a failure, from where a checkpoint was kept if there is one."""
-        corners, k, going_on = len(self.nodes) - 1, 0, False
-        if pause is not None and pause.checkpoint.kept is not None:
-            k, status = pause.go_on(self, corners)
-            going_on = status == 2
-            if not going_on:
-                self.status, self.message = status, MESSAGES[status]
-                return
-        self._go(k, going_on, reset, enter, pause)
-        if pause is not None and self.status >= 0:
-            pause.save(self, corners - 1, ended=self.status)
-
-    def _go(
-        self, k: int, going_on: bool, reset: Callable[[float, Array, list[int]], Array] | None,
-        enter: Callable[[float, float], None] | None, pause: Pause | None,
-    ) -> None:  # fmt: skip
-        armed = going_on
-        if not going_on:
-            self._begin()
+        self, reset: Callable[[float, Array, list[int]], Array] | None, enter: Callable[[float, float], None] | None
+    ) -> None:
+        """Go on to the end, a terminal event or a failure."""
+        k, armed = 0, False
+        self._keep()
+        if self.t_eval is not None and self.t_eval.size and self.t_eval[0] == self.t:
+            self.asked.append(self.x)
         while k < len(self.nodes) - 1:
             if enter is not None:
                 enter(self.nodes[k], self.nodes[k + 1])
@@ -215,9 +197,6 @@ class _Journey:
                 k += 1
                 continue
             solver = self._start(self.nodes[k + 1])
-            if going_on and pause is not None:
-                pause.thaw(solver)
-                going_on = False
             if self.crossings is not None and not armed:
                 self.crossings.arm(self.t, self.x, self._length(solver))
                 armed = True
@@ -229,11 +208,8 @@ class _Journey:
                         self.status, self.message = -1, str(message)
                         return
                     stop = self._settle(solver)
-                    if stop is None and solver.status == "running":
-                        if self.stall_check is not None:
-                            self.stall_check.look(self.t, self.x)
-                        if pause is not None and perf_counter() >= pause.due:
-                            pause.save(self, k, solver)
+                    if stop is None and solver.status == "running" and self.stall_check is not None:
+                        self.stall_check.look(self.t, self.x)
             finally:
                 self._count(solver)
             if stop is None and self.t != self.nodes[k + 1]:
@@ -248,11 +224,6 @@ class _Journey:
                     self.x = np.array(reset(self.t, self.x, fired), dtype=float)
                 self._keep()
                 self.crossings.depart(self.t, self.x)
-
-    def _begin(self) -> None:
-        self._keep()
-        if self.t_eval is not None and self.t_eval.size and self.t_eval[0] == self.t:
-            self.asked.append(self.x)
 
     def _start(self, end: float) -> Any:
         options = dict(self.options)

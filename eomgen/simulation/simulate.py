@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -18,7 +17,6 @@ from ..errors import (
     SimulationInterrupted,
     calls_within,
     cannot,
-    incomplete,
 )
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
@@ -50,7 +48,7 @@ if TYPE_CHECKING:
 
 OPTIONS = (
     *("span", "initial", "parameters", "inputs", "method", "rtol", "atol", "t_eval", "events", "dense_output"),
-    *("max_step", "first_step", "progress", "step", "checkpoint", "checkpoint_every", "resume", "controllers"),
+    *("max_step", "first_step", "progress", "step", "controllers"),
 )
 
 
@@ -73,9 +71,6 @@ def simulate(
     first_step: Number | None = None,
     progress: bool | None = None,
     step: Number | None = None,
-    checkpoint: str | FilePath | None = None,
-    checkpoint_every: Number = 60.0,
-    resume: bool | None = None,
     **options: Unpack[SolverOptions],
 ) -> Trajectory:
     """Integrate the equations of motion.
@@ -120,12 +115,6 @@ def simulate(
         Size of the steps of RK4 and of moreau (s), and only of these.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
-    checkpoint : str or Path, optional
-        File that keeps the run: the same call again goes on from there, to the last bit, or returns the finished run.
-    checkpoint_every : float
-        Seconds between two writings of that file.
-    resume : bool, optional
-        True: the file must be there; False: begin anew; by default go on if it is there.
     **options
         Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance``,
         ``contact_iterations`` and ``contact_forces``, True to keep the force of each contact.
@@ -148,7 +137,7 @@ def simulate(
     EvaluationError
         The right-hand side cannot be evaluated at the initial state.
     UsageError
-        Unknown names, wrong shapes; a checkpoint of another run, or a damaged one.
+        Unknown names, wrong shapes.
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
@@ -160,34 +149,27 @@ def simulate(
             dense_output=True, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
         )  # fmt: skip
     settings: dict[str, Any] = {**options}
-    kept = pause = usual = size = None
+    usual = size = None
     shared = False
-    alone = inputs is None and events is None and controllers is None and checkpoint is None and resume is None
+    alone = inputs is None and events is None and controllers is None
     if alone and max_step is None and first_step is None and step is None and not settings:
         usual = settle(module, method, rtol, atol)
     if usual is None:
         method, step = own_step(module, method, step)
-    if checkpoint is not None:
-        from .checkpoint import Checkpoint, identify
-        from .solver_state import Pause
-
-        kept = Checkpoint(checkpoint, checkpoint_every, resume)
-    elif resume is not None:
-        raise incomplete("resume needs checkpoint=, the file to continue from")
     if usual is None and (
         (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof)
     ):
         from .driven import follow_drivers
 
         steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **settings}
-        motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
+        motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, steps)
         if motion is not None:
             return motion
     if usual is None and ((isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata):
         from .moreau import step_rigidly
 
         others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
-        others |= {"dense_output": dense_output, "checkpoint": checkpoint, "controllers": controllers, **settings}
+        others |= {"dense_output": dense_output, "controllers": controllers, **settings}
         return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
     if dense_output is not False:
         dense_output = read_flag("dense_output", dense_output)
@@ -204,7 +186,7 @@ def simulate(
         if controllers is not None:
             from .controllers import ControlledEvents
 
-            watched = ControlledEvents(module.layout, events, controllers, kept is not None)
+            watched = ControlledEvents(module.layout, events, controllers)
         forcing = Forcing(module.layout, inputs)
         compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
         if method == "RK4" and not compiled:
@@ -253,8 +235,8 @@ def simulate(
             settings = check_tolerances(module.n_x, abs(end - start), settings)
             require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
-        if kept is None and solver in (choose_solver("BDF"), choose_solver("Radau")):
-            run.sparse = None  # its factors cannot be kept in a file
+        if solver in (choose_solver("BDF"), choose_solver("Radau")):
+            run.sparse = None  # where the first Jacobian is worth it
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
@@ -265,15 +247,11 @@ def simulate(
     many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take
     if many:
         require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
-    if kept is not None:
-        pause = None if compiled else Pause(kept, solver, dense_output)
-        own = {name: value for name, value in settings.items() if name != "jac" or value != run.jacobian}
-        kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
     run.begin(start, end, x0, longest, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, run.look, watched, kept
+                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, run.look, watched
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -285,7 +263,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, run.stall_check,
-                    partial(watched.reset, bound, forcing), forcing.enter, pause,
+                    partial(watched.reset, bound, forcing), forcing.enter,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:

@@ -157,7 +157,6 @@ CALLS: dict[str, Callable[[], Any]] = {
     "an input by text": lambda: crank().simulate(0.1, inputs={"tau": "2*"}),
     "an input without values": lambda: crank().simulate(0.1, inputs={"tau": lambda t, x: np.nan}),
     "an input as a table": lambda: crank().simulate(0.1, inputs={"tau": ([0, 1], [1])}),
-    "a checkpoint without file": lambda: crank().simulate(0.1, resume=True),
     "an event by number": lambda: crank().simulate(0.1, events=[3]),
     "an event by text": lambda: crank().simulate(0.1, events=["theta - phi"]),
     "moreau without contacts": lambda: crank().simulate(0.1, method="moreau", step=1e-3),

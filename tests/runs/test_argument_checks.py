@@ -30,7 +30,6 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "end nan": (lambda m: m.simulate(np.nan), "EG-NUMBER span nan"),
     "store of bytes": (lambda m: m.simulate_many(0.1, count=2, store=b"here"), "EG-TYPE store b'here'"),
     "store with NUL": (lambda m: m.simulate_many(0.1, count=2, store="a\0b"), "EG-TYPE store"),
-    "checkpoint of a number": (lambda m: m.simulate(0.1, checkpoint=3), "EG-TYPE checkpoint 3"),
     "reduction of an array": (lambda m: m.simulate_many(0.1, count=2, reduce=np.empty((2, 0))), "EG-TYPE reduce"),
     "saved to a number": (lambda m: m.simulate(0.1).save(3), "EG-TYPE path 3"),
     "a long range": (lambda m: m.simulate(1.0, t_eval=range(10**9)), "EG-TOO-LARGE t_eval 1000000000"),

@@ -253,7 +253,7 @@ def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, met
     assert np.abs(module.simulate(1.05)["s"]).max() == 0.0  # without one it keeps its value
 
 
-def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> None:
+def test_controllers_that_cannot_be_are_refused(module: Any) -> None:
     refuses("EG-UNSUPPORTED servo", module.simulate, 1.0, controllers={"u": lambda t, x: 0.0})
     module = outside().compile(target="numpy")
     for given, words in (
@@ -266,8 +266,6 @@ def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> 
     ):
         refuses(words, module.simulate, 1.0, controllers=given)
     refuses("EG-NUMBER u nan 0", module.simulate, 1.0, controllers={"u": lambda t, x: float("nan")})
-    with refused("EG-CONFLICT checkpoint"):
-        module.simulate(1.0, controllers={"u": lambda t, x: 0.0}, checkpoint=tmp_path / "run.npz")
     with refused("EG-UNSUPPORTED none"):
         eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
 

@@ -65,7 +65,6 @@ typedef struct {
     double *trail;
     long node, done, stored, n_pieces, n_notes, n_trail, resets; /* start at 0; the caller may take rows and set back their counts */
     int begun, ended;
-    int pause; /* not 0: EOMGEN_FULL before the next step, whose state then is all that the run depends on */
 } eomgen_journey;
 
 enum {

@@ -142,9 +142,6 @@ static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, d
 /* dx'/dx at (t, y), where x' is f, into J; spare: 2 n doubles. 0, or the status of a failure, which is remembered. */
 int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare);
 
-/* Whether what a method keeps in K besides its rows, taken from elsewhere, names no place that is not there. */
-int eomgen_is_sound(const eomgen_method *method, const eomgen_run *run);
-
 /* How long the next step may be: max_step, or less where shapes may meet; K changes. */
 double eomgen_longest(eomgen_run *run);
 

@@ -150,7 +150,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         begin(method, run, j);
     }
     while (run->direction * (run->t - j->nodes[j->n_nodes - 1]) < 0.0) {
-        if (j->pause || (j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
+        if ((j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
             (j->trail_room > 0 && j->n_trail + 2 > j->trail_room) ||
             (j->events != NULL && j->n_notes + 2 * j->events->n > j->notes_room)) {
             return EOMGEN_FULL;

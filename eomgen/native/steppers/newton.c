@@ -228,19 +228,3 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
         r[i] = p * u - q * v, s[i] = p * v + q * u;
     }
 }
-
-/* Whether what an implicit method keeps from step to step names no place that is not there. */
-int eomgen_is_sound(const eomgen_method *method, const eomgen_run *run)
-{
-    const int n = run->n;
-    const newton_area a = newton_areas(run, method->rows_K);
-    if (form_of(&a) == SPARSE) { /* which has no use for the rows that others exchange */
-        return n >= SPARSE_FROM && sparse_is_sound(n, a.state[FILLED], a.real, a.order);
-    }
-    const int m = form_of(&a) == WHOLE ? n : form_of(&a) == HALF ? n / 2 : n - run->n_q;
-    int sound = form_of(&a) == WHOLE || form_of(&a) == HALF || (form_of(&a) == PARTS && has_parts(run));
-    for (int i = 0; i < 2 * n; i++) {
-        sound = sound && a.order[i] >= 0 && a.order[i] < (m > 1 ? m : 1);
-    }
-    return sound;
-}

@@ -267,23 +267,3 @@ static void sparse_solve_complex(int n, int filled, double *rows, const double *
         r[p.order[i]] = a[i] = x * u - y * v, s[p.order[i]] = b[i] = x * v + y * u;
     }
 }
-
-/* Whether a pattern is one: numbers that came from elsewhere may be any. room: n numbers. */
-static int sparse_is_sound(int n, double filled, double *rows, int *restrict room)
-{
-    if (!(filled >= n && 2.0 * filled <= (double)n * n)) {
-        return 0;
-    }
-    const sparse_pattern p = sparse_at(n, (int)filled, rows);
-    int sound = p.start[0] == 0 && p.start[n] == (int)filled;
-    memset(room, 0, (size_t)n * sizeof *room);
-    for (int i = 0; sound && i < n; i++) {
-        sound = p.order[i] >= 0 && p.order[i] < n && room[p.order[i]]++ == 0;
-        sound = sound && p.start[i] <= p.middle[i] && p.middle[i] < p.start[i + 1] && p.start[i + 1] <= (int)filled;
-        for (int at = p.start[i]; sound && at < p.start[i + 1]; at++) {
-            sound = at < p.middle[i] ? p.column[at] >= 0 && p.column[at] < i
-                                     : p.column[at] < n && (at == p.middle[i] ? p.column[at] == i : p.column[at] > i);
-        }
-    }
-    return sound;
-}
