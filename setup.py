@@ -15,7 +15,7 @@ from setuptools.command.build import build
 ROOT = Path(__file__).parent
 sys.path.insert(0, str(ROOT))
 
-from eomgen.compilation import find_compiler  # noqa: E402
+from eomgen.compilation.compiler import find_compiler  # noqa: E402
 from eomgen.compilation.native import build_native, product_in  # noqa: E402
 from eomgen.errors import ToolchainError  # noqa: E402
 

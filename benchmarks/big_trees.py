@@ -15,7 +15,9 @@ import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.program import Limits
-from eomgen.compilation import Options, compile_model, load_core
+from eomgen.compilation.build import compile_model
+from eomgen.compilation.compiler import Options
+from eomgen.compilation.load import load_core
 from eomgen.module import Module
 
 from .large_loops import closed_chain, timed

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import eomgen as eg
-from eomgen.compilation import find_compiler
+from eomgen.compilation.compiler import find_compiler
 from eomgen.runtime.late import eager
 
 from .measure import interleaved, seconds_per_call

@@ -12,8 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from eomgen import pipeline
-from eomgen.compilation.compiler import find_compiler
-from eomgen.compilation.options import Options, compile_flags
+from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
 from .call import compile_call_loop, over_kernel
 from .casadi_recursions import write_derivatives
@@ -69,7 +68,7 @@ int kernel(double t, const double *x, const double *u, const double *c, double *
     text, library = folder / "f.c", folder / "f.so"
     text.write_text(source + adapter, encoding="utf-8")
     compiler = find_compiler()
-    flags = compile_flags(Options(), compiler, 0, hidden=False)
+    flags = compile_flags(Options(), compiler, 0)
     subprocess.run([*compiler.command, *flags, "-shared", str(text), "-lm", "-o", str(library)], check=True)
     code = ctypes.CDLL(str(library))
     x, out = np.array(x), np.zeros(size)

@@ -58,8 +58,7 @@ class Ours:
     def __init__(self, file: str, lock: tuple[str, ...], folder: Path) -> None:
         from eomgen import pipeline
         from eomgen.codegen.c import emit_c
-        from eomgen.compilation import Options, find_compiler
-        from eomgen.compilation.options import compile_flags
+        from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
         model = robot(file, lock)
         equations = model.derive()
@@ -77,7 +76,7 @@ class Ours:
         files = [str(folder / name) for name in sources if name.endswith(".c")]
         compiler = find_compiler()
         size = sum(len(sources[Path(f).name]) for f in files if "_lanes" not in f)
-        flags = compile_flags(Options(), compiler, size, hidden=False)
+        flags = compile_flags(Options(), compiler, size)
         command = [
             *compiler.command,
             *flags,
@@ -118,7 +117,7 @@ class Peer:
         import pinocchio as pin
         from shipped_robots import EXAMPLES
 
-        from eomgen.compilation import find_compiler
+        from eomgen.compilation.compiler import find_compiler
 
         from .casadi_robots import casadi_source
 

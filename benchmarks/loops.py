@@ -14,8 +14,7 @@ from scipy.integrate import solve_ivp
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation.compiler import find_compiler
-from eomgen.compilation.options import Options, compile_flags
+from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
 from .linkages import n_four_bar
 from .models import EXAMPLES
@@ -34,7 +33,7 @@ def beside_closed_form(repeats: int) -> tuple[float, float, float]:
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8")
         ours, theirs = folder / "slider_crank.c", Path(__file__).with_suffix("").parent / "slider_crank.c"
-        flags = compile_flags(Options(), compiler, ours.stat().st_size, hidden=False)
+        flags = compile_flags(Options(), compiler, ours.stat().st_size)
         program = folder / "timing"
         files = [str(theirs), str(ours), "-I", name, "-lm", "-o", str(program)]
         subprocess.run([*compiler.command, *flags, *files], check=True)

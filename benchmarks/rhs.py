@@ -13,9 +13,8 @@ import numpy as np
 
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation import compile_c_library
-from eomgen.compilation.compiler import find_compiler
-from eomgen.compilation.options import Options, compile_flags
+from eomgen.compilation.build import compile_c_library
+from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
 from .latency import cold_cache
 from .measure import Sample
@@ -50,9 +49,9 @@ def flag_sets() -> dict[str, list[str]]:
     """Our default flags, and those for this processor; none has fast-math."""
     compiler = find_compiler()
     return {
-        "default": compile_flags(Options(), compiler, 0, hidden=False),
-        "-O2": compile_flags(Options(optimize=2), compiler, 0, hidden=False),
-        "native": compile_flags(Options(native=True), compiler, 0, hidden=False),
+        "default": compile_flags(Options(), compiler, 0),
+        "-O2": compile_flags(Options(optimize=2), compiler, 0),
+        "native": compile_flags(Options(native=True), compiler, 0),
     }
 
 

@@ -19,8 +19,7 @@ from eomgen.base.kernel_table import KERNELS
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.c_pairs import pair_files
 from eomgen.codegen.files import read_template
-from eomgen.compilation.compiler import find_compiler
-from eomgen.compilation.options import Options, compile_flags
+from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
 from .report import Limit, Report, Table
 from .tracks import track
@@ -45,7 +44,7 @@ def polygons(corners: int) -> eg.Model:
 def seconds_to_compile(sources: dict[str, str]) -> float:
     """Seconds of a processor for the files of contacts, with the flags of a module; the least of three."""
     compiler = find_compiler(None)
-    flags = compile_flags(Options(), compiler, 0, hidden=True)
+    flags = compile_flags(Options(), compiler, 0)
     with tempfile.TemporaryDirectory() as folder:
         headers = {f"{name}": read_template(f"c/{name}") for name in ("eomgen.h", "eomgen_real.h", "eomgen_sincos.h")}
         for name, text in {**headers, **sources}.items():

@@ -18,6 +18,11 @@ STEPPERS = (
     *("taylor_terms", "taylor"),
     *("event_values", "event_zero", "crossings", "loop"),
 )
+CONTACTS = ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
+CYTHON = (
+    *("model", "numbers", "batches", "kernel", "calls", "lanes", "steppers"),
+    *("journeys", "integrators", "ensembles"),
+)
 
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
 SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_coordinates.h", "eomgen_straight.h")
@@ -28,41 +33,23 @@ SOLVERS = ("linear_algebra", "projection", "embedding", "systems", "singular", "
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_native.pyx": ("_native.pyx",),
-    "_model.pxi": ("_model.pxi",),
-    "_numbers.pxi": ("_numbers.pxi",),
-    "_batches.pxi": ("_batches.pxi",),
-    "_kernel.pxi": ("_kernel.pxi",),
-    "_calls.pxi": ("_calls.pxi",),
-    "_lanes.pxi": ("_lanes.pxi",),
-    "_steppers.pxi": ("_steppers.pxi",),
-    "_journeys.pxi": ("_journeys.pxi",),
-    "_integrators.pxi": ("_integrators.pxi",),
-    "_ensembles.pxi": ("_ensembles.pxi",),
+    **{f"_{name}.pxi": (f"_{name}.pxi",) for name in CYTHON},
     "eomgen_steppers.h": ("steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("steppers/eomgen_loop.h",),
-    "eomgen_methods.h": tuple(f"steppers/{name}.c" for name in ("dop853", "rk45")),
+    "eomgen_methods.h": ("steppers/dop853.c", "steppers/rk45.c"),
     "eomgen_steppers.c": tuple(f"steppers/{name}.c" for name in STEPPERS),
     SOLVER: tuple(f"{name}.c" for name in SOLVERS),
     "_contacts.pxi": ("_contacts.pxi",),
     "eomgen_contacts.h": ("contacts/eomgen_contacts.h",),
-    "eomgen_contact_steps.h": (
-        "contacts/maps.c",
-        "steppers/lu.c",
-        *(f"contacts/{name}.c" for name in ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")),
-    ),
+    "eomgen_contact_steps.h": ("contacts/maps.c", "steppers/lu.c", *(f"contacts/{name}.c" for name in CONTACTS)),
     "eomgen_contacts.c": ("contacts/plain.c",),
     "eomgen_wide_contacts.c": ("contacts/wide.c",),
     "eomgen_wide_steps.c": ("steppers/wide.c",),
     "eomgen_ensembles.h": ("ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("ensembles/one_run.c", "ensembles/ensembles.c"),
     "eomgen_lane_runs.h": (
-        *(
-            "ensembles/lane_steps.c",
-            "steppers/taylor_terms.c",
-            "ensembles/lane_taylor.c",
-            "ensembles/lane_alone.c",
-            "ensembles/lane_runs.c",
-        ),
+        *("ensembles/lane_steps.c", "steppers/taylor_terms.c"),
+        *(f"ensembles/lane_{name}.c" for name in ("taylor", "alone", "runs")),
     ),
     **{f"eomgen_runs{width}.c": (f"ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }

@@ -196,7 +196,7 @@ def keywords() -> Iterator[str]:
     bound, robot = set(types.BoundValues.__annotations__), set(types.RobotKeywords.__annotations__)
     shown = {"module", "file", "format"}
     for known, those in {
-        "BuildOptions": arguments("compilation", "Options"),
+        "BuildOptions": arguments("compilation.compiler", "Options"),
         "StepOptions": bound | set(import_module("eomgen.ensembles.simulate_many").OPTIONS),
         "ReducedOptions": bound | set(import_module("eomgen.simulation.sensitivities").OPTIONS),
         "RobotKeywords": arguments("robots", "RobotOptions", "check_inertia"),

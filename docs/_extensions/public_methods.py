@@ -96,7 +96,7 @@ class Limits(SphinxDirective):
 MADE_BY_USERS = (
     "eomgen.Model",
     "eomgen.runtime.signals.Signal",
-    "eomgen.compilation.options.Options",
+    "eomgen.compilation.compiler.Options",
     "eomgen.robots.robot.RobotOptions",
 )
 

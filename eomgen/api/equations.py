@@ -107,7 +107,7 @@ class Equations(Derivation):
         kernels : names of kernels, optional
             Only these (see the README's table of calls); all by default, the rarer ones when they are first called.
         **options
-            Fields of :class:`eomgen.compilation.Options`, such as ``optimize`` or ``native``.
+            Fields of :class:`eomgen.compilation.compiler.Options`, such as ``optimize`` or ``native``.
 
         Returns
         -------

@@ -13,7 +13,7 @@ from .screen import print_json, print_table, readable_size, say
 from .shared_options import json_option
 
 if TYPE_CHECKING:
-    from ..compilation import Cache
+    from ..compilation.cache import Cache
 
 DAY = 86400.0
 MEGABYTE = 1_000_000
@@ -28,7 +28,7 @@ def cache(ctx: click.Context) -> None:
 
 
 def _cache() -> Cache:
-    from ..compilation import Cache, cache_directory
+    from ..compilation.cache import Cache, cache_directory
 
     return Cache(cache_directory())
 

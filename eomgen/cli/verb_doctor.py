@@ -116,7 +116,7 @@ def _import(name: str) -> tuple[bool, str]:
 
 
 def _compiler() -> Iterator[Check]:
-    from ..compilation import find_compiler
+    from ..compilation.compiler import find_compiler
 
     try:
         found = find_compiler()
@@ -162,7 +162,7 @@ def _fresh_cache() -> Iterator[None]:
 
 
 def _cache() -> Check:
-    from ..compilation import Cache, cache_directory
+    from ..compilation.cache import Cache, cache_directory
 
     try:
         cache = Cache(cache_directory())

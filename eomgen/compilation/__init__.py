@@ -2,27 +2,8 @@
 
 ::
 
-    sources -> options.compile_flags -> cache key -> found? -> load: native.Model
+    sources -> compiler: flags -> cache: key -> there? -> load: native.Model
                                              |  no
                                              v
-                         private attempt directory: compiler -> link -> manifest -> published by one rename
+                      build: private attempt directory: compile, link, manifest, published by one rename
 """
-
-from .build import Artifact, compile_c_library, compile_model
-from .cache import Cache, CacheEntry, cache_directory
-from .compiler import CompilerInfo, find_compiler
-from .load import load_core
-from .options import Options
-
-__all__ = [
-    "Artifact",
-    "Cache",
-    "CacheEntry",
-    "CompilerInfo",
-    "Options",
-    "cache_directory",
-    "compile_c_library",
-    "compile_model",
-    "find_compiler",
-    "load_core",
-]

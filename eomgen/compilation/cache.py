@@ -11,6 +11,7 @@ but this user and root could have written it, or any folder above it; see :mod:`
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import shutil
@@ -19,26 +20,15 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..base.files import (
-    MANIFEST,
-    OTHERS_WRITE,
-    Kept,
-    digest,
-    hold,
-    locked,
-    make_private,
-    read_entry,
-    read_manifest,
-    require_trusted,
-    sealed,
-)
+from .. import _STARTED
+from ..base import files
+from ..base.files import MANIFEST, Kept, digest
 from ..errors import ToolchainError, bad_cache
-from .commands import unwound_by_sigterm
 
 #: Layout of keys, entries and manifests; part of every key.
-FORMAT = 2
+FORMAT = 3
 #: Age in seconds after which an attempt is taken for abandoned, if no process holds it.
 GRACE = 3600.0
 
@@ -74,8 +64,7 @@ def compute_key(parts: Mapping[str, Any]) -> str:
     return digest(text.encode())
 
 
-@dataclass(frozen=True, slots=True)
-class CacheEntry:
+class CacheEntry(NamedTuple):
     """A published build.
 
     Attributes
@@ -87,7 +76,7 @@ class CacheEntry:
     name : str
         Name of the model.
     directory : Path
-        Where it lies.
+        Where it lies; ``sources/`` in it holds the texts that a model was made from.
     product : Path
         The file to load or link.
     size : int
@@ -108,13 +97,7 @@ class CacheEntry:
 
 @dataclass(frozen=True, slots=True)
 class Cache:
-    """The builds below one directory.
-
-    Attributes
-    ----------
-    root : Path
-        The directory; made when the first build needs it, readable by its owner alone.
-    """
+    """The builds below one directory, which is made when the first build needs it, readable by its owner alone."""
 
     root: Path
 
@@ -127,14 +110,13 @@ class Cache:
         return self.root / "attempts"
 
     @property
-    def shortcuts(self) -> Kept:
-        """Notes that tell keys of builds; see :mod:`.shortcut`."""
-        return Kept(self.root / "shortcuts")
-
-    @property
     def templates(self) -> Kept:
         """Bytecode of templates."""
         return Kept(self.root / "templates")
+
+    @property
+    def _notes(self) -> Kept:
+        return Kept(self.root / "shortcuts")
 
     def find(self, key: str) -> CacheEntry | None:
         """The entry of a key if it is there and every file is as it was published; notes that it was used.
@@ -149,8 +131,7 @@ class Cache:
             return None
         try:
             self.require_own()
-            manifest, _ = read_entry(directory)
-            entry = _describe(directory, manifest)
+            entry = _describe(directory, files.read_entry(directory)[0])
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
         if entry.key != key:
@@ -168,37 +149,33 @@ class Cache:
         """
         for folder in (self.root, self._entries, self._attempts):
             if os.path.lexists(folder):
-                require_trusted(folder)
+                files.require_trusted(folder)
 
     @contextmanager
     def attempt(self, key: str) -> Iterator[Path]:
         """A private directory to build in; removed at the end unless published, kept after a ToolchainError."""
-        directory = self._open_attempt(key)
         try:
-            with unwound_by_sigterm(), hold(directory):  # so that no other process sweeps it
-                yield directory
-        except ToolchainError:
-            raise  # its message names files in here
-        except OSError as error:
-            shutil.rmtree(directory, ignore_errors=True)
-            raise bad_cache(f"cannot build in the cache directory {self.root}: {error}") from error
-        except BaseException:
-            shutil.rmtree(directory, ignore_errors=True)
-            raise
-        shutil.rmtree(directory, ignore_errors=True)
-
-    def _open_attempt(self, key: str) -> Path:
-        try:
-            for directory in (self.root, self._entries, self._attempts):
-                make_private(directory)
-                require_trusted(directory)
+            for folder in (self.root, self._entries, self._attempts):
+                files.make_private(folder)
+                files.require_trusted(folder)
             self.sweep()
-            return self._make_attempt(key[:16])
+            directory = self._make_attempt(key[:16])
         except OSError as error:
             raise bad_cache(
                 f"the cache directory {self.root} cannot be written: {error}. "
                 "Set EOMGEN_CACHE_DIR to a directory that can"
             ) from error
+        try:
+            with files.hold(directory):  # so that no other process sweeps it
+                yield directory
+        except ToolchainError:
+            raise  # its message names files in here
+        except BaseException as error:
+            shutil.rmtree(directory, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise bad_cache(f"cannot build in the cache directory {self.root}: {error}") from error
+            raise
+        shutil.rmtree(directory, ignore_errors=True)
 
     def _make_attempt(self, prefix: str) -> Path:
         import tempfile
@@ -214,12 +191,10 @@ class Cache:
         ----------
         attempt : Path
             Directory from :meth:`attempt`, with the files to keep and nothing else.
-        key : str
-            Key of the build.
-        kind, name, product : str
+        key, kind, name, product : str
             As in :class:`CacheEntry`; `product` is a file name.
         recipe : mapping
-            What a curious person may want to know: compiler, flags.
+            How it was made: compiler, flags, options.
 
         Returns
         -------
@@ -228,18 +203,18 @@ class Cache:
         """
         paths = sorted(attempt.rglob("*"))
         for path in paths:  # whatever the umask of the compiler
-            path.chmod(path.stat().st_mode & ~OTHERS_WRITE)
-        files = {str(path.relative_to(attempt)): digest(path.read_bytes()) for path in paths if path.is_file()}
+            path.chmod(path.stat().st_mode & ~files.OTHERS_WRITE)
+        contents = {str(path.relative_to(attempt)): path.read_bytes() for path in paths if path.is_file()}
         manifest = {
             "key": key, "kind": kind, "name": name, "product": product, "created": time.time(),
-            "size": sum((attempt / file).stat().st_size for file in files),
-            "files": files, "recipe": dict(recipe),
+            "size": sum(map(len, contents.values())),
+            "files": {file: digest(content) for file, content in contents.items()}, "recipe": dict(recipe),
         }  # fmt: skip
         with open(os.open(attempt / MANIFEST, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as f:
-            f.write(sealed(manifest))
+            f.write(files.sealed(manifest))
         target = self._entries / key
         for _ in range(10):
-            with locked(self.root / "lock"):
+            with files.locked(self.root / "lock"):
                 try:
                     os.rename(attempt, target)
                 except OSError as error:
@@ -259,18 +234,11 @@ class Cache:
         found = []
         for directory in self._entries.iterdir() if self._entries.is_dir() else ():
             with suppress(OSError, ValueError, KeyError, TypeError, ToolchainError):
-                found.append(_describe(directory, read_manifest(directory)))
+                found.append(_describe(directory, files.read_manifest(directory)))
         return sorted(found, key=lambda entry: entry.used, reverse=True)
 
     def prune(self, older_than: float | None = None, max_size: int | None = None) -> list[CacheEntry]:
-        """Remove the entries least recently used.
-
-        Parameters
-        ----------
-        older_than : float, optional
-            Remove what was not used for so many seconds.
-        max_size : int, optional
-            Remove from the oldest on until so many bytes are left.
+        """Remove what was not used for so many seconds, and from the oldest on until so many bytes are left.
 
         Returns
         -------
@@ -308,35 +276,28 @@ class Cache:
         """Remove the entry of a key that turned out to be of no use, if it can be removed."""
         with suppress(ToolchainError):
             self.require_own()
-            with locked(self.root / "lock"):
+            with files.locked(self.root / "lock"):
                 self._remove(self._entries / key)
+
+    def sweep(self) -> None:
+        """Remove attempts that nobody holds and nobody has touched for GRACE; in the future: a wrong clock."""
+        for attempt in self._attempts.iterdir() if self._attempts.is_dir() else ():
+            with suppress(OSError):  # another process may sweep too
+                if abs(time.time() - attempt.stat().st_mtime) > GRACE:
+                    with files.hold(attempt):
+                        shutil.rmtree(attempt)
 
     def _forget(self) -> None:
         """Remove the notes of builds that are gone."""
-        notes = self.shortcuts
-        for name in notes.names():
-            key = (notes.read(name) or b"").decode("ascii", "replace")
+        for note in self._notes.names():
+            key = (self._notes.read(note) or b"").decode("ascii", "replace")
             if not key or not os.path.isdir(self._entries / key):
-                notes.remove(name)
-
-    def sweep(self, grace: float = GRACE) -> int:
-        """Remove the attempts that nobody holds and nobody has touched for `grace` seconds; returns their number.
-
-        One whose time lies as far in the future was left by a clock that was wrong.
-        """
-        count = 0
-        for attempt in self._attempts.iterdir() if self._attempts.is_dir() else ():
-            with suppress(OSError):  # another process may sweep too
-                if abs(time.time() - attempt.stat().st_mtime) > grace:
-                    with hold(attempt):
-                        shutil.rmtree(attempt)
-                        count += 1
-        return count
+                self._notes.remove(note)
 
     def _remove(self, entry: Path) -> None:
         """Remove an entry, which disappears at once and is then taken apart."""
         try:
-            make_private(self._attempts)
+            files.make_private(self._attempts)
             away = self._make_attempt("removed")
             with suppress(FileNotFoundError):
                 os.rename(entry, away / entry.name)
@@ -344,10 +305,45 @@ class Cache:
         except OSError as error:
             raise bad_cache(f"the cache entry {entry} cannot be removed: {error}") from error
 
+    # A note under the digest of a program, and of all that its sources and flags follow from, tells the key of its
+    # build: sources need not be written again. It is a hint where to look; the entry itself is checked as ever.
+
+    def find_noted(self, note: str | None) -> CacheEntry | None:
+        """The entry that a note tells, if it is there."""
+        key = (self._notes.read(note) or b"").decode("ascii", "replace") if note else ""
+        return self.find(key) if key else None
+
+    def note(self, note: str | None, key: str) -> None:
+        """Keep a note; a cache that cannot be written still serves."""
+        if note:
+            self._notes.write(note, key.encode())
+
 
 def _describe(directory: Path, manifest: Mapping[str, Any]) -> CacheEntry:
-    return CacheEntry(
-        key=manifest["key"], kind=manifest["kind"], name=manifest["name"], directory=directory,
-        product=directory / manifest["product"], size=manifest["size"], created=manifest["created"],
-        used=(directory / MANIFEST).stat().st_mtime,
-    )  # fmt: skip
+    kept = {name: manifest[name] for name in ("key", "kind", "name", "size", "created")}
+    used = (directory / MANIFEST).stat().st_mtime
+    return CacheEntry(**kept, directory=directory, product=directory / manifest["product"], used=used)
+
+
+# -- the code that writes sources --------------------------------------------------------------------------------------
+
+#: What sources and flags follow from, apart from the program and the templates: of eomgen.
+WRITERS = ("graph", "codegen", "compilation", "base", "numeric", "native")
+
+
+def digest_writers() -> str | None:
+    """SHA-256 of the code and templates that sources and flags follow from; None if they changed since they ran."""
+    found, package = hashlib.sha256(), Path(__file__).parents[1]
+    folders = [*(str(package / name) for name in WRITERS), str(files.shipped("templates"))]
+    while folders:  # os.walk, at half its time
+        with os.scandir(folders.pop()) as listing:
+            listed = sorted(listing, key=lambda entry: entry.name)
+        folders += [entry.path for entry in listed if entry.is_dir() and entry.name != "__pycache__"]
+        for entry in listed:
+            if entry.is_file():
+                with open(entry.path, "rb", buffering=0) as file:
+                    state, text = os.fstat(file.fileno()), file.read()
+                if max(state.st_mtime, state.st_ctime) > _STARTED:
+                    return None
+                found.update(f"{entry.name} {len(text)}\n".encode() + text)
+    return found.hexdigest()

@@ -8,25 +8,19 @@ from __future__ import annotations
 
 import contextlib
 import importlib.machinery
-import io
 import os
 import sys
-import tempfile
-import threading
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from threading import Lock
 from types import ModuleType
 from typing import Any
 
 from ..base.files import digest, locked
 from ..errors import MissingDependencyError, ToolchainError
 from ..layer import read_native
-from .build import compile_and_link
-from .compiler import CompilerInfo, find_compiler
-from .options import Options, compile_flags, link_flags, machine_flags
-from .processor import is_x86
 
 NAME = "_native"
 PACKAGE = Path(__file__).parents[1]
@@ -34,7 +28,7 @@ PACKAGE = Path(__file__).parents[1]
 #: fewer states take 0.85 of the time that vectorised loops take (gcc 12, pendulum).
 PLAIN = ("eomgen_steppers.c", "eomgen_contacts.c")
 PATIENCE = 300.0  #: seconds to wait for another process that builds it
-_lock = threading.Lock()
+_lock = Lock()
 
 
 def find_native() -> ModuleType:
@@ -47,21 +41,14 @@ def find_native() -> ModuleType:
     ToolchainError
         It must be built, and there is no compiler, there are no headers of Python, or the build fails.
     """
-    name = f"{__package__.partition('.')[0]}.{NAME}"
+    name, clone = f"{__package__.partition('.')[0]}.{NAME}", PACKAGE.parent / "pyproject.toml"
     with _lock:
-        if name not in sys.modules and (PACKAGE.parent / "pyproject.toml").is_file():
-            _renew()
+        if name not in sys.modules and clone.is_file() and not _is_current():
+            with locked(clone, PATIENCE):
+                if not _is_current():  # nor has another process built it
+                    print("eomgen: building eomgen._native from its changed sources", file=sys.stderr)
+                    build_native(PACKAGE)
         return import_module(name)
-
-
-def _renew() -> None:
-    """Build the module of a clone where it is not what its sources say."""
-    if _is_current():
-        return
-    with locked(PACKAGE.parent / "pyproject.toml", PATIENCE):
-        if not _is_current():  # nor has another process built it
-            tell("building eomgen._native from its changed sources")
-            build_native(PACKAGE)
 
 
 def _is_current() -> bool:
@@ -83,46 +70,41 @@ def product_in(folder: Path) -> Path:
 
 
 def build_native(folder: Path) -> None:
-    """Build the module into a folder, in the place of an earlier one.
+    """Build the module into a folder, in the place of an earlier one; errors are those of :func:`find_native`."""
+    import tempfile
 
-    Raises
-    ------
-    MissingDependencyError
-        Cython is not installed.
-    ToolchainError
-        No compiler, no headers of Python, or the build fails.
-    """
+    from .build import compile_and_link
+    from .compiler import Options, compile_flags, find_compiler, is_x86, link_flags, machine_flags
+
     headers, compiler, product = find_python_headers(), find_compiler(), product_in(folder)
+    numpy: Any = import_module("numpy")
+    # for all processors of this kind: wider vectors are chosen when it runs
+    plain = [*compile_flags(Options(), compiler, 0, portable=True), "-fvisibility=hidden"]
+    wide = [*compile_flags(Options(optimize=2), compiler, 0, portable=True), "-fvisibility=hidden"]
+    wide += ["-ftree-vectorize"] if compiler.kind == "gcc" else []
+    cython = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
+    cython += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
+    cython += [f"-I{headers}", f"-I{numpy.get_include()}"]
     with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
         for name, text in read_native().items():
             Path(private, name).write_text(text, encoding="utf-8")
         with contextlib.chdir(private):  # no folder's name in the C text
             _run_cython(Path(f"{NAME}.pyx"))
-        files = {path.name: Path(path.name) for path in sorted(Path(private).glob("*.c"))}
-        flags = {name: _flags(name, compiler, headers) for name in files}
-        flags[""] = link_flags(Options(), compiler, extension=True)
-        compile_and_link(Path(private), digest_sources(), NAME, files, flags, product.name, compiler, os.cpu_count())
+        files = {Path(path.name): wide for path in sorted(Path(private).glob("*.c"))}
+        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(f"{NAME}.c"): cython}
+        link = link_flags(Options(), compiler, extension=True)
+        made = compile_and_link(Path(private), NAME, files, link, compiler, suffix=product.name.removeprefix(NAME))
         folder.mkdir(parents=True, exist_ok=True)
         aside = folder / f".{os.getpid()}-{product.name}"
-        aside.write_bytes(Path(private, product.name).read_bytes())
+        aside.write_bytes(Path(private, made).read_bytes())
         aside.chmod(0o755)
         os.replace(aside, product)
 
 
-def _flags(file: str, compiler: CompilerInfo, headers: Path) -> list[str]:
-    """Flags of a C file, for all processors of this kind: wider vectors are chosen when it runs."""
-    if file != f"{NAME}.c":
-        vectors = file not in PLAIN or not is_x86()
-        flags = compile_flags(Options(optimize=2 if vectors else None), compiler, 0, hidden=True, portable=True)
-        return [*flags, "-ftree-vectorize"] if vectors and compiler.kind == "gcc" else flags
-    numpy: Any = import_module("numpy")
-    flags = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
-    flags += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
-    return [*flags, f"-I{headers}", f"-I{numpy.get_include()}"]
-
-
 def _run_cython(source: Path) -> None:
     """Translate the module's text to C in this process; cythonize would want setuptools."""
+    import io
+
     try:
         from Cython.Compiler import Main
     except ImportError:
@@ -154,8 +136,3 @@ def find_python_headers() -> Path:
             code="EG-COMPILER-MISSING",
         )
     return directory
-
-
-def tell(line: str) -> None:
-    """Tell what is being done on stderr."""
-    print(f"eomgen: {line}", file=sys.stderr)

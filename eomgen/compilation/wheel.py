@@ -15,10 +15,8 @@ from typing import NamedTuple
 from ..base.files import as_path, open_plain, write_whole
 from ..errors import MissingDependencyError, UsageError, at_odds, bad_data, cannot
 from ..targets import TARGETS
-from .commands import COMPILE, allowed, raise_failure, run
-from .compiler import find_compiler
+from .compiler import Options, allowed, find_compiler, machine_flags, run
 from .native import find_python_headers
-from .options import Options, machine_flags
 
 SETUPTOOLS = 77  #: first version that knows ``license-files`` of the project table
 #: Time of the files in a wheel (s since 1970), unless SOURCE_DATE_EPOCH says otherwise: the first that zip knows.
@@ -37,21 +35,12 @@ import json, os, sys
 os.environ.update(json.loads(sys.argv[2]))
 os.umask(0o022)
 from setuptools import build_meta
-name = build_meta.build_wheel(sys.argv[1])
-print()
-print(name)
+build_meta.build_wheel(sys.argv[1])
 """
 
 
 class BuiltWheel(NamedTuple):
-    """A wheel that was built.
-
-    Attributes
-    ----------
-    path : Path
-    note : str
-        Why it is for computers like this one alone; empty if it may be given to others.
-    """
+    """A wheel, and why it is for computers like this one alone; empty if it may be given to others."""
 
     path: Path
     note: str
@@ -73,7 +62,15 @@ def require_wheel(target: str) -> None:
         raise cannot(
             f"--wheel is for target {' or '.join(able)}; target {target} makes a {about}: generate it without --wheel"
         )
-    _require_setuptools()
+    try:
+        version = metadata.version("setuptools")
+    except metadata.PackageNotFoundError:
+        version = ""
+    if not version or int(version.partition(".")[0]) < SETUPTOOLS:
+        found = f"setuptools {version} is installed" if version else "it is not installed"
+        raise MissingDependencyError(
+            f"a wheel needs setuptools {SETUPTOOLS} or later, and {found}: pip install 'eomgen[wheel]'"
+        )
     if target == "cython":
         _refuse_native()
         if util.find_spec("Cython") is None:
@@ -101,7 +98,7 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
     Raises
     ------
     UsageError
-        The folder is no generated package, or one of another target; a flag compiles for this very processor.
+        The folder is no generated package, or what :func:`require_wheel` refuses.
     MissingDependencyError
         setuptools is not installed, or too old.
     ToolchainError
@@ -127,10 +124,8 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
             shutil.copyfile(folder / name, source / name)
         size = sum((source / name).stat().st_size for name in files)
         command = [sys.executable, "-P", "-c", _BUILD, str(made), json.dumps(variables)]
-        said = run(command, source, COMPILE + 4.0 * allowed(size))
-        if said.returncode:
-            raise_failure(f"building the wheel of {folder}", said, folder)
-        built, note = made / said.stdout.split()[-1], ""
+        run(command, source, 5.0 * allowed(size), f"building the wheel of {folder}")
+        (built,), note = made.glob("*.whl"), ""
         if target == "cython":
             built, note = _audit(built, Path(private, "audited"), variables["SOURCE_DATE_EPOCH"])
         write_whole(directory / built.name, built.read_bytes())
@@ -150,18 +145,6 @@ def _read(folder: Path) -> tuple[list[str], str]:
     if missing:
         raise bad_data(f"{folder} lacks files that were generated: {', '.join(missing[:5])}; generate it again")
     return files, target
-
-
-def _require_setuptools() -> None:
-    try:
-        version = metadata.version("setuptools")
-    except metadata.PackageNotFoundError:
-        version = ""
-    if not version or int(version.partition(".")[0]) < SETUPTOOLS:
-        found = f"setuptools {version} is installed" if version else "it is not installed"
-        raise MissingDependencyError(
-            f"a wheel needs setuptools {SETUPTOOLS} or later, and {found}: pip install 'eomgen[wheel]'"
-        )
 
 
 def _refuse_native() -> None:
@@ -187,9 +170,9 @@ def _audit(wheel: Path, directory: Path, epoch: str) -> tuple[Path, str]:
     )
     command = ["env", tools, f"SOURCE_DATE_EPOCH={epoch}", sys.executable, "-P", "-m", "auditwheel", "repair"]
     command += ["--wheel-dir", str(directory), str(wheel)]
-    said = run(command, wheel.parent, COMPILE)
+    said = run(command, wheel.parent, allowed(0))
     found = sorted(directory.glob("*.whl")) if said.returncode == 0 else []
     if not found:
-        last = (said.stderr + said.stdout).strip().splitlines()[-1:] or ["no word why"]
+        last = said.stdout.splitlines()[-1:] or ["no word why"]
         return wheel, f"{kept}: auditwheel says: {last[0].strip()}"
     return found[0], ""

@@ -128,14 +128,14 @@ def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...]
                 f"this worker has no module {name}: install its package there", code="EG-PACKAGE-MISSING"
             ) from error
     try:
-        compilation = import_module("eomgen.compilation")
+        build, load = (import_module(f"eomgen.compilation.{name}") for name in ("build", "load"))
     except ImportError as error:
         raise MissingDependencyError(
             "a worker on another machine builds the module itself, so it needs eomgen: pip install eomgen there"
         ) from error
     facts = json.loads(recipe)
-    options = compilation.Options(**facts["options"])
-    return compilation.load_core(compilation.compile_model(facts["sources"], facts["name"], options))
+    options = build.Options(**facts["options"])
+    return load.load_core(build.compile_model(facts["sources"], facts["name"], options))
 
 
 def _core(core: Any, p: None, u: None) -> Any:

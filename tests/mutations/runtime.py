@@ -226,7 +226,7 @@ FAULTS = (
         "tests/runs/test_ensembles.py::test_a_grid_has_every_combination",
     ),
     Fault(
-        "cache-key-flags", "_find_or_build",
+        "cache-key-flags", "_find_or_compile",
         "compute_key(parts)",
         'compute_key(parts | {"flags": ""})',
         "a model compiled with other flags is taken from the cache",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ...alone import alone, timed
-from ...compilation import Options, compile_model, load_core
-from ...compilation.native_faults import blame_source
-from ...compilation.shortcut import Shortcut
-from ...errors import ToolchainError, no_such
+from ...compilation.build import compile_model, note_of
+from ...compilation.cache import Cache, cache_directory
+from ...compilation.compiler import Options
+from ...compilation.load import load_core
+from ...errors import ModelError, Problem, ToolchainError, no_such
 from ...graph.functions import Function
 from ..fingerprint import fingerprint
 from ..program import Program
@@ -23,22 +25,40 @@ def load(
     unknown = [name for name in options if name not in allowed]
     if unknown:
         raise no_such(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
-    chosen = Options(**options)
+    chosen, cache = Options(**options), Cache(cache_directory())
     with alone(), timed(seconds, "emit"):
-        shortcut = Shortcut(fingerprint(program), chosen)
-        artifact = shortcut.find()
-        if artifact is None:
+        note = note_of(fingerprint(program), chosen)
+        entry = cache.find_noted(note)
+        if entry is None:
             from ..c import emit_c
             from ..files import keep_bytecode
 
-            keep_bytecode(shortcut.cache.templates)
+            keep_bytecode(cache.templates)
             sources = emit_c(program)
     with timed(seconds, "compile"):
-        if artifact is None:
+        if entry is None:
             try:
-                artifact = compile_model(sources, program.name, chosen)
+                entry = compile_model(sources, program.name, chosen)
             except ToolchainError as error:
-                raise blame_source(error, functions.values()) or error from None
-            shortcut.keep(artifact)
+                raise _blame_source(error, functions.values()) or error from None
+            cache.note(note, entry.key)
     with alone(), timed(seconds, "load"):
-        return load_core(artifact)
+        return load_core(entry)
+
+
+def _blame_source(error: ToolchainError, functions: Iterable[Function]) -> ModelError | None:
+    """The faults of users' C sources that a compiler reported, at their lines; None if it reports others."""
+    remedy = "correct the C source; it may include system headers only, and a function is double f(double, ...)"
+    problems: dict[tuple[str, int, str], Problem] = {}
+    for function in functions:
+        if function.native is None:
+            continue
+        file = function.native.file
+        line = rf"^(?:.*[/\\])?{re.escape(file)}:(\d+):(?:\d+:)? *(?:fatal )?error: *(.*)$"
+        reported = re.findall(line, error.output, re.MULTILINE)
+        for number, message in dict(reversed(reported)).items():  # the first of each line
+            what = f"the compiler says: {message}"
+            place = f"functions.{function.name}"
+            problem = Problem(place, what, remedy, file, int(number), code="EG-COMPILER-FAILED")
+            problems.setdefault((file, int(number), what), problem)  # of functions that share a file, the first
+    return ModelError([problems[key] for key in sorted(problems)]) if problems else None

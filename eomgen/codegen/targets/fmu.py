@@ -27,7 +27,7 @@ from ...base.limits import runs
 from ...base.limits.in_c import definitions
 from ...base.texts import html_text, one_line
 from ...compilation.build import compile_c_library
-from ...compilation.options import Options
+from ...compilation.compiler import Options
 from ...describe.units import read_unit
 from ...errors import ModelError, Problem, bad_file, no_choice
 from ...layer import read_layer
@@ -630,7 +630,7 @@ def fmu_bytes(
     if folder is not None:
         code = {Path(name).name: text for name, text in unit.files.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
-        library = compile_c_library(code, program.name, options, progress).path
+        library = compile_c_library(code, program.name, options, progress).product
         files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...alone import alone, timed
-from ...compilation.numpy_module import load_numpy
+from ...compilation.load import load_numpy
 from ...errors import cannot, incomplete
 from ...graph.functions import Function
 from ...numeric.user_functions import Curve, Surface, Twin
