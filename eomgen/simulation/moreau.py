@@ -311,7 +311,7 @@ def step_rigidly(
     _require_no_others(module, events)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
-    forcing.enter(start, end)
+    forcing.begin(start, end)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     require_room("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
     x = find_state(bound, initial, start, forcing)

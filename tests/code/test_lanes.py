@@ -30,10 +30,10 @@ np.save(sys.argv[3], module.rhs(0.0, x) if len(x[0]) > 100 else module.simulate_
 
 @pytest.fixture
 def named(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., eg.Model]:
-    """A model whose code no other test has."""
+    """A model whose code no other function has."""
 
     def make(name: str = "two_link_manipulator") -> eg.Model:
-        own = re.sub(r"\W", "_", request.node.name)
+        own = request.node.originalname
         text = (models.EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
         (tmp_path / "named.yaml").write_text(re.sub("^name: .*", f"name: {own}", text, flags=re.MULTILINE))
         return eg.load(tmp_path / "named.yaml")

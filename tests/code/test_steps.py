@@ -33,7 +33,7 @@ def mixed(copies: int) -> Any:
         m.state(f"b{k}", f"-0.3*a{k}*c{k}", initial=1.0)
         m.state(f"c{k}", f"exp(-t) - {w}*c{k}*a{k} + b{(k + 1) % copies}", initial=-0.3)
     m.initial(s_dot=0.2)
-    return m.compile(optimize=0)
+    return m.compile(**IN_C)
 
 
 @pytest.mark.parametrize("copies", [1, 3], ids=["few states", "many states"])

@@ -79,7 +79,7 @@ SLOPES = {
 }
 
 
-@pytest.mark.parametrize("given", ["exact", pytest.param("first", marks=pytest.mark.thorough), "none"])
+@pytest.mark.parametrize("given", ["exact", *(pytest.param(g, marks=pytest.mark.thorough) for g in ("first", "none"))])
 def test_jacobian_and_targets(sources: Path, given: str) -> None:
     def declare(m: eg.Model) -> None:
         m.native("swing", sources / "laws.c", python=sources / "laws.py", **SLOPES[given])
@@ -110,7 +110,9 @@ def test_without_a_python_function_only_compiled_code_runs(sources: Path) -> Non
     assert m.check()
     assert m.derive().force[0].has(sympy_call("swing", m.coordinate("q"), 0).func)
     x = np.array([0.4, 0.0])
-    assert m.compile(optimize=0).rhs(0, x)[1] == pytest.approx(-9.81 * math.sin(0.4), rel=1e-15)
+    compiled = m.compile(optimize=0)
+    assert compiled.rhs(0, x)[1] == pytest.approx(-9.81 * math.sin(0.4), rel=1e-15)
+    assert compiled.jacobian(0, x)[1] == pytest.approx([-9.81 * math.cos(0.4), 0.0], abs=1e-7)  # by differences
     refuses("EG-MISSING functions.swing C", m.compile, target="numpy")
     m.body("heavy", mass="2 + swing(0)")
     refuses("EG-MISSING functions.swing C", m.check)
