@@ -62,7 +62,6 @@ CODES = {
     "EG-DIMENSION": "The dimensions of quantities do not agree.",
     "EG-NOTATION": "A text is not the LaTeX of a symbol.",
     "EG-EXPRESSION": "A text is not an expression, or not one of the form that is needed.",
-    "EG-MODEL": "The description of the model is wrong in another way.",
     "EG-TOPOLOGY": "The joints do not connect the bodies as they must.",
     "EG-UNDEFINED": "An angle, a direction or a length is not defined by what it is measured between.",
     "EG-LOOP-OPEN": "The loops do not close from the guess.",
@@ -139,7 +138,7 @@ class EomgenError(Exception):
         What kind of fault it is: a stable word such as ``EG-SHAPE``, one of ``eomgen.errors.CODES``.
     """
 
-    code: str = "EG-MODEL"
+    code: str = ""
 
     def __init_subclass__(cls, code: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -179,7 +178,7 @@ class Problem(NamedTuple):
     remedy: str = ""  #: what is allowed, or what to do
     file: str = ""  #: model file, or the file of the Python call
     line: int = 0  #: 1-based line in that file, 0 if none
-    code: str = "EG-MODEL"  #: the kind of fault
+    code: str = ""  #: the kind of fault
 
     def __str__(self) -> str:
         place = f"{_cell(self.file) or self.file}:{self.line}: " if self.file else ""

@@ -139,7 +139,7 @@ class Faults:
         for problem in description.problems:
             self.take(problem)
 
-    def add(self, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> None:
+    def add(self, path: str, message: str, remedy: str = "", code: str = "") -> None:
         """Note a fault at a dotted path."""
         self.take(Problem(path, message, remedy, *place_of(path, self.lines), code))
 

@@ -356,7 +356,7 @@ class Mechanism:
         """Whether there are no bodies: a Lagrangian, or equations, came instead."""
         return self.lagrangian is not None or self.given is not None
 
-    def problem(self, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> Problem:
+    def problem(self, path: str, message: str, remedy: str = "", code: str = "") -> Problem:
         """A problem at a dotted path, with the file and line the path or its nearest parent came from."""
         return Problem(path, message, remedy, *place_of(path, self.lines), code)
 

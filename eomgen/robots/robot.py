@@ -208,7 +208,7 @@ class Robot:
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def problem(self, path: str, message: str, remedy: str, place: Place, code: str = "EG-MODEL") -> None:
+    def problem(self, path: str, message: str, remedy: str, place: Place, code: str = "") -> None:
         """Note a fault."""
         self.problems.append(Problem(path, message, remedy, *place, code))
 

@@ -97,7 +97,7 @@ class _UrdfReader:
         return robot
 
     # -- values ---------------------------------------------------------------------------------------------------
-    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> None:
+    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "", code: str = "") -> None:
         self.robot.problems.append(element.problem(path, message, remedy, code))
 
     def number(

@@ -43,7 +43,7 @@ class XmlElement:
             yield element
             waiting.extend(reversed(element.children))
 
-    def problem(self, path: str, message: str, remedy: str = "", code: str = "EG-MODEL") -> Problem:
+    def problem(self, path: str, message: str, remedy: str = "", code: str = "") -> Problem:
         """A fault at this element."""
         return Problem(path, message, remedy, self.file, self.line, code)
 

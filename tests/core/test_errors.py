@@ -26,7 +26,6 @@ NOT_HERE = {
     "EG-STALLED": "needs a run that takes long; tests/runs",
     "EG-ENDLESS": "needs a run that takes long; tests/runs",
     "EG-UNSOLVED": "depends on rounding",
-    "EG-MODEL": "every known fault has a code of its own",
     "EG-EVALUATION": "no public call is known to meet it",
     "EG-INTERRUPTED": "needs Ctrl-C; tests/runs",
     "EG-CACHE": "needs a folder that nobody may write; tests/code",
