@@ -111,10 +111,10 @@ CASES: dict[str, tuple[Callable[[], eg.Model], str, list[str]]] = {
     "slider_crank": (lambda: models.build("powered_slider_crank"), "embedding", KERNELS),
     "slider": (lambda: crank("s"), "embedding", KERNELS),
     "balls": (rods, "embedding", [k for k in KERNELS if k != "kinematics"]),
-    "balls, reactions": (rods, "newton_euler", []),
+    "balls, reactions": (rods, "newton_euler", ["rhs", "project"]),
     "freedoms": (five_bar, "embedding", KERNELS),
     "freedoms, multipliers": (five_bar, "augmented", []),
-    "lengths": (carriage, "embedding", []),
+    "lengths": (carriage, "embedding", ["rhs", "project", "embedded_mass_matrix"]),
     "towed": (towed, "embedding", ["rhs", "project", "jacobian", "parameter_jacobian", "input_jacobian"]),
     "tree": (lambda: chain(13), "embedding", ["rhs", "jacobian", "input_jacobian", "parameter_jacobian"]),
     "long tree": (lambda: chain(40), "embedding", ["rhs", "jacobian"]),
@@ -364,12 +364,13 @@ def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, 
 
 def test_a_gap_that_is_left_is_reported() -> None:
     """Two rods in one place whose lengths differ: half of the difference is left at either."""
-    mod = rods(twice=True).compile(target="numpy")
-    x, p, place = mod.x0(), np.array(mod.p), mod.p_names.index("gap")
+    model = rods(twice=True)
+    mod, judge = model.compile(kernels=["project", "constraints"], optimize=0), model.compile(target="numpy")
+    x, p, place = judge.x0(), np.array(judge.p), judge.p_names.index("gap")
     for gap in (0.0, 2e-11):
         p[place] = gap
         closed = mod.project(x, p=p)
-        residuals = mod.bind(p=p).constraints(closed[: mod.n_q], rows="all")
+        residuals = judge.bind(p=p).constraints(closed[: judge.n_q], rows="all")
         assert np.abs(residuals).max() == pytest.approx(gap / 2, abs=1e-14)
     for gap in (1e-9, 1e-3):
         p[place] = gap
