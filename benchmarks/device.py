@@ -108,7 +108,7 @@ def registers(quick: bool) -> Table | None:
     """What the machine code needs, which NVRTC tells without a GPU; None without NVRTC."""
     from eomgen import pipeline
     from eomgen.codegen.targets.cuda import emit_device_text
-    from eomgen.device.nvrtc import compile_with_log
+    from eomgen.device.cuda_device import compile_with_log
     from eomgen.errors import MissingDependencyError
 
     rows = []

@@ -18,10 +18,8 @@ from PIL import Image
 import eomgen as eg
 from eomgen.base.files import example_files, find_example
 from eomgen.runtime.refined import states_at
-from eomgen.show.film_frames import Frames
-from eomgen.show.palettes import indices_in, palette_of
-from eomgen.show.shown_motion import moving_scene, sample
-from eomgen.show.writers import gif_bytes
+from eomgen.show.frames import Frames, moving_scene, sample
+from eomgen.show.writers import gif_bytes, indices_in, palette_of
 
 DOCS = Path(__file__).parent
 STILL, MOVING, SPATIAL = 70.0, 42.0, 54.0  #: dots in an inch of a picture, of a film in the plane and of one in space

@@ -98,7 +98,7 @@ class Derivation(Displayed):
 
     @cached_property
     def _shown_text(self) -> str:
-        from .reading.equations_text import equations_text
+        from .reading.writers import equations_text
 
         lines = [equations_text(self), ""]
         counts = (f"{name} {operations.total}" for name, operations in self.operations.items())

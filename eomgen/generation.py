@@ -15,7 +15,7 @@ from .errors import EomgenError, cannot
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
 from .targets import find_function, find_target
-from .verification.record_calls import RECORDED, record_calls
+from .verification.cases import RECORDED, record_calls
 
 if TYPE_CHECKING:
     from .derivation import Derivation

@@ -202,7 +202,7 @@ def keywords() -> Iterator[str]:
         "RobotKeywords": arguments("robots", "RobotOptions", "check_inertia"),
         "LoadOptions": arguments("loading", "load", "path", "robot") | robot,
         "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},
-        "FilmOptions": arguments("show.mode_shapes", "animate_mode", "x", "shape", *shown),
+        "FilmOptions": arguments("show.animate", "animate_mode", "x", "shape", *shown),
     }.items():
         for name in sorted(those ^ set(getattr(types, known).__annotations__)):
             yield f"eomgen.runtime.option_types: {known}: {name}"

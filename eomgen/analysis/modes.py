@@ -33,7 +33,7 @@ from .stability import symmetric_modes, uncertainty
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.option_types import FilmOptions
-    from ..show.player import InlineFilm, InlinePage
+    from ..show.browser import InlineFilm, InlinePage
 
 
 COLUMNS = 12  #: of mode shapes in the table of a notebook

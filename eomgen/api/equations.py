@@ -16,7 +16,7 @@ from ..runtime.near_names import find_lacking
 
 if TYPE_CHECKING:
     from ..describe.builder import Builder
-    from ..device.arrays_on_device import Device
+    from ..device.cuda_device import Device
     from ..device.device_module import DeviceModule
     from ..explain import Explanation
     from ..runtime.option_types import BuildOptions

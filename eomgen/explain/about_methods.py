@@ -13,7 +13,7 @@ from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..reading import Quantities
-from ..reading.written import needed
+from ..reading.quantities import needed
 from .author import Author, Shown
 from .document import FormulaLine, Piece, Section, Sentence
 

@@ -12,9 +12,8 @@ from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..reading import Quantities, ReadingView
-from ..reading.written import Written, needed, write
-from .document import Folded, FormulaLine, Piece, PutIn, Sentence
-from .printer import Printer
+from ..reading.quantities import Written, needed, write
+from .document import Folded, FormulaLine, Piece, Printer, PutIn, Sentence
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
 FOLD = 900  #: nodes of a quantity from which a page shows it only on request

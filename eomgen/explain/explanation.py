@@ -13,11 +13,8 @@ from typing import TYPE_CHECKING, Any
 from ..base.files import write_whole
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..graph.pair_calls import opaque_names
-from .document import DrawnPicture, Folded, Piece, Section
-from .printer import Printer
-from .write_html import write_html
-from .write_markdown import write_markdown
-from .write_tex import write_tex
+from .document import DrawnPicture, Folded, Piece, Printer, Section
+from .writers import write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:
     from .author import Author
@@ -140,32 +137,32 @@ def _pictures(sections: Sequence[Section]) -> Any:
 
 def explain(equations: Any, level: str = "full") -> Explanation:
     """See :meth:`eomgen.api.equations.Equations.explain`."""
-    from . import about_forces, about_mechanism, about_methods, about_motion, about_numbers
+    from . import about_methods
+    from . import sections as about
     from .author import Author
-    from .shown_against_module import compare
-    from .shown_values import moving_state, told_state
+    from .comparison import compare, moving_state, told_state
 
     if level not in LEVELS:
         raise no_such(f"no level {level!r}; there are {', '.join(LEVELS)}")
     full = level == "full"
     author = Author(equations, full)
     module, reason = _module(author)
-    sections: list[Section | None] = [about_mechanism.mechanism(author, module)]
-    sections += [about_mechanism.bodies(author), about_mechanism.coordinates(author)]
+    sections: list[Section | None] = [about.mechanism(author, module)]
+    sections += [about.bodies(author), about.coordinates(author)]
     if full:
-        sections += about_motion.motion(author)
-        sections.append(about_motion.constraints(author))
-        sections += about_forces.forces(author)
+        sections += about.motion(author)
+        sections.append(about.constraints(author))
+        sections += about.forces(author)
         sections += [about_methods.energies(author), about_methods.steps(author)]
-    sections += [about_methods.final(author), about_forces.states(author), about_numbers.counts(author)]
+    sections += [about_methods.final(author), about.states(author), about.counts(author)]
     if full:
         state, moved = {}, False
         if module is not None:
             x, moved = moving_state(module, author.independent_velocities)
             state = told_state(module, x)
-        sections.append(about_numbers.calculation(author, state, reason, moved))
+        sections.append(about.calculation(author, state, reason, moved))
     found = None if module is None else compare(author, module)
-    sections.append(about_numbers.difference(found, reason))
+    sections.append(about.difference(found, reason))
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
     if author.put_in:
         values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())

@@ -1,34 +1,277 @@
-"""Identification: the regressor at random states -> the combinations of inertial parameters that forces can tell.
-
-Columns of Y that vanish, or depend on others, at all states belong to parameters without effect of their own.  Which do
-is found from a QR factorization at random states (M. Gautier, Numerical calculation of the base inertial parameters of
-robots, J. Robotic Systems 8 (1991), 485-506); it holds for joints of any kind, and loops too, by the directions that
-their constraints leave.
-"""
+"""Identification: combinations of inertial parameters that forces can tell, and their values from measured motions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import EFFECT, ROUNDED_COEFFICIENT
+from ..base.limits.analyses import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from ..base.texts import as_html, as_text
-from ..errors import ProjectionError, off_range
-from ..runtime.near_names import unknown
+from ..errors import ProjectionError, cannot, ill_shaped, off_range
+from ..runtime.near_names import read_names, unknown
 from ..runtime.refusals import refuse_states
-from ..runtime.room import read_number
-from .random_states import free_directions, random_states
-from .regressor import STANDARD, regressor, standard_names, standard_parameters
+from ..runtime.room import read_number, read_numbers
+from .regressor import (
+    STANDARD,
+    free_directions,
+    inertial_remainder,
+    random_states,
+    regressor,
+    standard_names,
+    standard_parameters,
+)
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .base_fit import BaseFit
+
+# -- linear least squares ----------------------------------------------------------------------------------------------
+
+# tau less what is not inertial = Y_b beta, row by row of the regressor, each generalized force weighted by its own
+# noise, which the residuals of a first round tell (M. Gautier, Dynamic identification of robots with power model, Proc.
+# IEEE Int. Conf. Robotics and Automation, 1997, 1922-1927, sec. 3, weights each joint so).
+
+
+class Reduced(Protocol):
+    """Base parameters as their fit sees them."""
+
+    @property
+    def module(self) -> BoundModel:
+        """Whose they are."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each is called."""
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What each stands for."""
+
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, t: float = 0.0) -> Array:
+        """Y_b, (n_v, n_base, k)."""
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """Base parameters that explain measured forces best.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Base parameters by their leading standard parameter, then the model's parameters of ``also``.
+    values, errors : dict of str to float
+        Estimates and their standard errors, infinite where the motion does not tell.
+    covariance : (k, k) array
+        In the order of ``names``; NaN where the motion does not tell.
+    sigma : dict of str to float
+        Standard deviation of each generalized force's noise, by velocity, as given or found.
+    residuals : (n_v, samples) array
+        Measured less computed forces (N, N m).
+    condition : float
+        Of the weighted columns, each at length 1: how well the motion excites the parameters (1 is best).
+    undetermined : tuple of str
+        What the motion does not tell apart.
+    """
+
+    base: Reduced
+    names: tuple[str, ...]
+    values: dict[str, float]
+    errors: dict[str, float]
+    covariance: Array
+    sigma: dict[str, float]
+    residuals: Array
+    condition: float
+    undetermined: tuple[str, ...]
+
+    @property
+    def relative_errors(self) -> dict[str, float]:
+        """Standard errors over the estimates."""
+        return {n: self.errors[n] / abs(x) if x else float("inf") for n, x in self.values.items()}
+
+    def _facts(self) -> list[tuple[str, str]]:
+        texts = self.base.texts
+        rows = []
+        for name, value in self.values.items():
+            error = self.errors[name]
+            told = f"+- {error:.2g}" if np.isfinite(error) else "not told by the motion"
+            rows.append((f"{value:.6g}", f"{told}   {texts.get(name, name)}"))
+        noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
+        return [*rows, ("noise", noise), ("condition", f"{self.condition:.3g}")]
+
+    def __repr__(self) -> str:
+        return as_text(f"base parameters of {self.base.module.name} from measured forces", self._facts())
+
+    def _repr_html_(self) -> str:
+        return as_html(f"base parameters of {self.base.module.name} from measured forces", self._facts())
+
+
+def fit_base(
+    base: Reduced,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    tau: ArrayLike,
+    *,
+    also: Sequence[str] = (),
+    sigma: ArrayLike | None = None,
+    u: Any = None,
+) -> BaseFit:
+    """Find base parameters, and others in which forces are linear, from measured motions and forces.
+
+    Parameters
+    ----------
+    q, v, a : (n_q, k), (n_v, k), (n_v, k) arrays
+        Measured motion, k samples; accelerations come from filtered differences.
+    tau : (n_v, k) array
+        Measured generalized forces, in the order of ``v_names``; rows or samples that are NaN are left out.
+    also : sequence of str, optional
+        Parameters of the model in which the forces are linear, such as coefficients of friction or the inertia of a
+        drive; others that are not inertial keep the module's values.
+    sigma : (n_v,) array, optional
+        Standard deviations of the noise of tau; found from the residuals by default.
+    u : optional
+        Inputs, as for ``bind``, if the model has any whose forces are not part of tau.
+
+    Returns
+    -------
+    BaseFit
+
+    Raises
+    ------
+    UsageError
+        A wrong shape, an unknown name, a parameter in which the forces are not linear, fewer values than unknowns, or
+        a mechanism with loops.
+    """
+    module = base.module
+    if module.layout.n_c:
+        raise cannot(
+            f"model {module.name!r} has loops or other constraints, whose forces are in tau too; fit() of base "
+            "parameters takes trees, mod.fit(data, parameters) takes all"
+        )
+    measured = np.asarray(read_numbers("tau", tau), dtype=float)
+    own = base.regressor(q, v, a)
+    if measured.ndim != 2 or own.ndim != 3 or measured.shape != own.shape[::2]:
+        raise ill_shaped(f"tau must have shape ({module.n_v}, k) with k samples, as v has, not {measured.shape}")
+    rest, further = _not_inertial(base, (q, v, a), read_names("also", also), u)
+    names = (*base.names, *further)
+    data = _Data(np.concatenate([own, *(column[:, None] for column in further.values())], axis=1), measured - rest)
+    if data.count <= len(names):
+        raise ill_shaped(f"{data.count} finite values of tau cannot tell {len(names)} parameters")
+    if sigma is not None:
+        spread = np.asarray(read_numbers("sigma", sigma), dtype=float) * np.ones(module.n_v)
+        if not (spread > 0.0).all():
+            raise off_range("sigma must be positive, a standard deviation for each generalized force")
+    else:
+        spread = data.sizes()
+        for _ in range(ROUNDS):
+            spread = data.noise(data.solve(spread)[0], len(names))
+    beta, covariance, condition, weak = data.solve(spread)
+    with np.errstate(invalid="ignore"):
+        deviations = np.sqrt(np.diag(covariance))
+    return BaseFit(
+        base,
+        names,
+        dict(zip(names, map(float, beta), strict=True)),
+        {name: float("inf") if weak[k] else float(deviations[k]) for k, name in enumerate(names)},
+        covariance,
+        dict(zip(module.v_names, map(float, spread), strict=True)),
+        data.residuals(beta),
+        condition,
+        tuple(name for name, is_weak in zip(names, weak, strict=True) if is_weak),
+    )
+
+
+class _Data:
+    """Columns (n_v, unknowns, k) and what they have to give (n_v, k), where that is known."""
+
+    def __init__(self, columns: Array, target: Array) -> None:
+        self.columns, self.target = columns, target
+        self.there = np.isfinite(target) & np.isfinite(columns).all(axis=1)
+        self.count = int(self.there.sum())
+
+    def sizes(self) -> Array:
+        """What each force is like, 1 for one that vanishes."""
+        squares = np.where(self.there, self.target, 0.0) ** 2
+        found = np.sqrt(squares.sum(axis=1) / np.maximum(1, self.there.sum(axis=1)))
+        return np.where(found > 0.0, found, 1.0)
+
+    def residuals(self, beta: Array) -> Array:
+        """Measured less computed."""
+        return np.asarray(self.target - np.tensordot(beta, self.columns, (0, 1)))
+
+    def noise(self, beta: Array, unknowns: int) -> Array:
+        """Standard deviation of each force's residuals, its share of the unknowns taken off."""
+        squares = np.where(self.there, self.residuals(beta), 0.0) ** 2
+        free = np.maximum(1, self.there.sum(axis=1)) * (1.0 - unknowns / self.count)
+        return np.asarray(np.maximum(np.sqrt(squares.sum(axis=1) / free), MEASURED * self.sizes()))
+
+    def solve(self, spread: Array) -> tuple[Array, Array, float, Any]:
+        """Estimates, covariance, condition and which unknowns the rows do not tell, by singular values."""
+        there = self.there
+        rows = (np.moveaxis(self.columns, 1, -1) / spread[:, None, None])[there]
+        right = (self.target / spread[:, None])[there]
+        sizes = np.linalg.norm(rows, axis=0)
+        scale = np.where(sizes > 0.0, sizes, 1.0)
+        U, s, Vt = algebra.svd(rows / scale, full_matrices=False)
+        told = s > IDENTIFIED * s[0]
+        beta = (Vt[told].T @ ((U[:, told].T @ right) / s[told])) / scale
+        covariance = (Vt[told].T / s[told] ** 2) @ Vt[told] / np.outer(scale, scale)
+        weak = (np.abs(Vt[~told]) > np.sqrt(IDENTIFIED)).any(axis=0)
+        covariance[weak], covariance[:, weak] = np.nan, np.nan
+        return beta, covariance, float(s[0] / s[-1]) if s[-1] > 0.0 else float("inf"), weak
+
+
+def _not_inertial(
+    base: Reduced, motion: tuple[ArrayLike, ArrayLike, ArrayLike], also: tuple[str, ...], u: Any
+) -> tuple[Array, dict[str, Array]]:
+    """Forces that are not inertial without those of the parameters of ``also``, and the column of each of these."""
+    module = base.module
+    for name in also:
+        if name not in module.p_names:
+            raise unknown("parameter", name, module.p_names)
+    values = dict(zip(module.p_names, map(float, module.p), strict=True))
+
+    def forces(name: str, factor: float) -> Array:
+        return np.asarray(inertial_remainder(module, *motion, p=values | {name: factor * size}, u=u))
+
+    rest = np.asarray(inertial_remainder(module, *motion, u=u))
+    whole = float(np.nanmax(np.abs(module.inverse_dynamics(*motion)), initial=0.0))
+    columns: dict[str, Array] = {}
+    for name in also:
+        size = values[name] or 1.0
+        first, second, third = (forces(name, factor) for factor in (1.0, 2.0, 3.0))
+        columns[name] = (second - first) / size
+        allowed = LINEAR * max(whole, float(np.nanmax(np.abs(third), initial=0.0)))
+        if np.nanmax(np.abs(third - 2.0 * second + first), initial=0.0) > allowed:
+            raise cannot(f"forces are not linear in {name}; mod.fit(data, parameters) finds such parameters")
+        if np.nanmax(np.abs(second - first), initial=0.0) <= allowed:
+            raise cannot(
+                f"{name} changes no force beside those of inertia and gravity, which the base parameters hold already"
+            )
+        if np.nanmax(np.abs(regressor(module, *motion, p=values | {name: 2.0 * size}) - regressor(module, *motion))):
+            raise cannot(f"{name} changes the geometry; mod.fit(data, parameters) finds such parameters")
+        rest = rest - values[name] * columns[name]
+    doubled = {name: 2.0 * (values[name] or 1.0) for name in also}
+    every = np.asarray(inertial_remainder(module, *motion, p=values | doubled, u=u))
+    total = sum((doubled[name] * column for name, column in columns.items()), rest)
+    largest = max(whole, float(np.nanmax(np.abs(every), initial=0.0)))
+    if np.nanmax(np.abs(every - total), initial=0.0) > LINEAR * largest:
+        raise cannot(f"forces are not linear in {', '.join(also)} together; find one of each product only")
+    return rest, columns
+
+
+# -- base parameters ---------------------------------------------------------------------------------------------------
+
+# Columns of Y that vanish, or depend on others, at all states belong to parameters without effect of their own. Which
+# do is found from a QR factorization at random states (M. Gautier, Numerical calculation of the base inertial
+# parameters of robots, J. Robotic Systems 8 (1991), 485-506); it holds for joints of any kind, and loops too, by the
+# directions that their constraints leave.
+
 
 SEED = 1991
 #: Rows of the regressor for each column, so that random states miss no direction.
@@ -132,8 +375,7 @@ class BaseParameters:
         return np.ascontiguousarray(regressor(self.module, q, v, a, t=t)[:, columns])
 
     def fit(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, tau: ArrayLike, **options: Any) -> BaseFit:
-        """Find the base parameters from measured motions and forces: see :func:`~.base_fit.fit_base`."""
-        from .base_fit import fit_base
+        """Find the base parameters from measured motions and forces: see :func:`~.base_parameters.fit_base`."""
 
         return fit_base(self, q, v, a, tau, **options)
 

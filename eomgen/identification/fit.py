@@ -1,20 +1,18 @@
-"""Identification: parameters, inputs and initial values of a module that reproduce measured motions best.
-
-Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of :mod:`.run_slopes`, or
-of :mod:`..simulation.sensitivities` for loops, events and inputs that depend on the state.  Covariance of the
-estimates: (J^T J)^-1 of the weighted residuals (Y. Bard, Nonlinear Parameter Estimation, 1974, section 7.5).
-"""
+"""Identification: parameters, inputs and initial values of a module that reproduce measured motions best."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import MEASURED, ROUNDS
+from ..base.limits.analyses import IDENTIFIED, MEASURED, QUADRATURE, ROUNDS
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
+from ..base.texts import aligned_rows, as_html
 from ..errors import (
     ParameterError,
     SimulationError,
@@ -26,17 +24,345 @@ from ..errors import (
     off_range,
 )
 from ..runtime.allowed_parameters import bounds_of
-from ..runtime.late_start import fixed_told, tell_fixed
+from ..runtime.derivative_calls import output_derivatives
+from ..runtime.input_kinds import Expressed, Tabulated
+from ..runtime.late_start import fixed_told, start_slopes, tell_fixed
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_number
+from ..runtime.signals import Forcing
+from ..simulation.simulate import simulate
 from .experiments import Experiment, read_experiments, read_sigma
-from .fit_result import Fit
-from .run_slopes import run_slopes
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
+
+# -- derivatives of a run ----------------------------------------------------------------------------------------------
+
+# S' = J S + df/dp is linear, so it needs no steps of its own: along those of the compiled run, on each the four nodes
+# of Gauss's formula of order 8 (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993,
+# section II.7), all Jacobians come from one call and all steps from one set of linear systems. The same formula applied
+# to the run itself tells whether the steps are short enough; where they are not, and for loops, events and laws of
+# inputs that depend on the state, :mod:`..simulation.sensitivities` integrates the derivatives beside the motion.
+
+
+#: Nodes and weights of Gauss's formula with four nodes on [0, 1], its matrix by the conditions C(4):
+#: sum_j a_ij c_j^(k-1) = c_i^k / k.
+NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(4)[0] + 1.0), 0.5 * np.polynomial.legendre.leggauss(4)[1])
+POWERS = np.arange(1, 5)
+#: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
+#: more in the derivatives than in the run.
+TIGHTER = 0.1
+MATRIX = algebra.solve(NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] ** POWERS[:, None]) / POWERS[:, None]).T
+
+
+def run_slopes(
+    module: BoundModel, names: Sequence[str], columns: Sequence[str], arguments: Mapping[str, Any]
+) -> dict[str, Array] | None:
+    """The derivatives of the run that ``simulate(module, **arguments)`` makes; None where this way does not serve.
+
+    Parameters
+    ----------
+    module : BoundModel
+    names : sequence of str
+        Parameters, inputs (a constant added) and initial values.
+    columns : sequence of str
+        States and outputs whose derivatives are wanted.
+    arguments : mapping
+        Of ``simulate``, ``span`` and ``t_eval`` among them.
+
+    Returns
+    -------
+    dict of str to (n_t, names) array, or None
+    """
+    layout, initial = module.layout, arguments["initial"]
+    if layout.n_c or layout.quaternion_slots or layout.n_events or layout.given_rates or layout.initial_outputs:
+        return None
+    if not (isinstance(initial, Mapping) and initial.keys() <= set(layout.x)):
+        return None
+    forcing = Forcing(layout, arguments["inputs"])
+    if not _of_time_alone(forcing):
+        return None
+    bound = module.bind(arguments["parameters"], forcing.constants)
+    forcing.attach(bound)
+    start, stop = arguments["span"]
+    measured = np.asarray(arguments["t_eval"], dtype=float)
+    plain = {key: value for key, value in arguments.items() if key != "t_eval"}
+    plain |= {name: TIGHTER * np.asarray(arguments[name]) for name in ("rtol", "atol")}
+    steps = simulate(module, **plain).t
+    grid = np.unique(np.concatenate([steps, measured, forcing.corners(start, stop)]))
+    h = np.diff(grid)
+    t = (grid[:-1, None] + h[:, None] * NODES).ravel()
+    run = simulate(module, **plain, t_eval=np.unique(np.concatenate([t, grid])))
+    at, ends = np.searchsorted(run.t, t), np.searchsorted(run.t, grid)
+    x, u = run.x[:, at], _inputs(forcing, bound, t)
+    rate = np.asarray(bound.rhs(t, x, u=u)).reshape(layout.n_x, len(h), -1)
+    missed = run.x[:, ends[:-1]] + h * (rate @ WEIGHTS) - run.x[:, ends[1:]]
+    if not np.abs(missed).max() <= QUADRATURE * np.abs(run.x).max():
+        return None
+    S = _linear(h, *_slopes(bound, names, t, x, u), _start(bound, names, initial))
+    wanted = np.searchsorted(grid, measured)
+    found = {name: S[wanted, k] for k, name in enumerate(layout.x)}
+    if not set(columns) <= found.keys():
+        outputs = _outputs(bound, names, forcing, measured, run.x[:, ends[wanted]], S[wanted])
+        found |= {name: outputs[:, k] for k, name in enumerate(layout.y) if name not in found}
+    return {name: found[name] for name in columns}
+
+
+def _of_time_alone(forcing: Forcing) -> bool:
+    """Whether no input is a Python function, has conditions, or depends on state or parameters."""
+    for index, signal in forcing.varying.items():
+        if index not in forcing.formulas and not isinstance(signal, Tabulated):
+            return False
+    return not any(_depends(formula) for formula in forcing.formulas.values())
+
+
+def _depends(formula: Expressed) -> bool:
+    return formula.branches or any(operation in ("x", "p") for operation, *_ in formula.tape[0])
+
+
+def _inputs(forcing: Forcing, module: BoundModel, t: Array) -> Array:
+    """u (n_u, k) at times."""
+    return forcing.sample(t, np.zeros((module.n_x, len(t))))
+
+
+def _start(module: BoundModel, names: Sequence[str], given: Mapping[str, float]) -> Array:
+    """S (n_x, k) of the initial state: one for a state that is to be found; declared values follow from parameters."""
+    S = np.array([[float(name == state) for name in names] for state in module.x_names])
+    for state, by_p in start_slopes(module.layout, module.kernels.context.p).items():
+        if state not in given:
+            S[module.x_names.index(state)] += [
+                by_p[module.p_names.index(name)] if name in module.p_names else 0.0 for name in names
+            ]
+    return S
+
+
+def _slopes(module: BoundModel, names: Sequence[str], t: Array, x: Array, u: Array) -> tuple[Array, Array]:
+    """J (k, n_x, n_x) and df/d(names) (k, n_x, names) at nodes."""
+    kernels = module.kernels
+    J = np.moveaxis(np.asarray(kernels.timed("jacobian")(t, x, u=u)), -1, 0)
+    by = np.zeros((len(t), module.n_x, len(names)))
+    for kernel, known in (("parameter_jacobian", module.p_names), ("input_jacobian", module.u_names)):
+        there = [(column, known.index(name)) for column, name in enumerate(names) if name in known]
+        if there:
+            values = np.moveaxis(np.asarray(kernels.timed(kernel)(t, x, u=u)), -1, 0)
+            for column, index in there:
+                by[:, :, column] = values[:, :, index]
+    return J, by
+
+
+def _linear(h: Array, J: Array, by: Array, start: Array) -> Array:
+    """S (steps + 1, n, k) of S' = J S + by, J and by at the nodes of all steps.
+
+    Slopes K_i = J_i (S + h sum_j a_ij K_j) + by_i: of each step one system in all K_i, with S and by on its right side.
+    """
+    count, n, s = len(h), start.shape[0], len(NODES)
+    J, by = J.reshape(count, s, n, n), by.reshape(count, s, n, -1)
+    system = -np.einsum("m,ij,mipq->mipjq", h, MATRIX, J).reshape(count, s * n, s * n)
+    system[:, range(s * n), range(s * n)] += 1.0
+    right = np.concatenate([J, by], axis=-1).reshape(count, s * n, -1)
+    K = algebra.solve(system, right).reshape(count, s, n, -1)
+    gain = h[:, None, None] * np.einsum("i,mipq->mpq", WEIGHTS, K)
+    found = np.empty((count + 1, *start.shape))
+    found[0] = start
+    for m in range(count):
+        found[m + 1] = found[m] + gain[m, :, :n] @ found[m] + gain[m, :, n:]
+    return found
+
+
+def _outputs(module: BoundModel, names: Sequence[str], forcing: Forcing, t: Array, x: Array, S: Array) -> Array:
+    """Derivatives (n_t, n_y, k) of the outputs."""
+    layout = module.layout
+    result = np.empty((len(t), layout.n_y, len(names)))
+    u = _inputs(forcing, module, t)
+    J, by = _slopes(module, names, t, x, u)
+    rates = np.asarray(module.rhs(t, x, u=u))
+    n_q, n_x, n_v = layout.n_q, layout.n_x, layout.n_v
+    of = [layout.n_u + module.p_names.index(name) if name in module.p_names else
+          module.u_names.index(name) if name in module.u_names else -1 for name in names]  # fmt: skip
+    for j, time in enumerate(t):
+        Y = output_derivatives(module.bind(u=u[:, j]), float(time), x[:, j], rates[n_q:, j])
+        here = S[j]
+        result[j] = Y[:, :n_x] @ here + Y[:, n_x : n_x + n_v] @ (J[j] @ here + by[j])[n_q:]
+        for column, place in enumerate(of):
+            if place >= 0:
+                result[j, :, column] += Y[:, n_x + n_v + place]
+    return result
+
+
+# -- the result --------------------------------------------------------------------------------------------------------
+
+
+class Fit:
+    """Values that make a module's runs agree best with measured ones.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What was to be found.
+    values, errors : dict of str to float
+        Estimates, and their standard errors; an error is NaN at a bound and infinite where the data do not tell.
+    covariance, correlation : (k, k) arrays
+        In the order of ``names``; NaN in rows of values at a bound or that the data do not tell.
+    sigma : dict of str to float
+        Standard deviation of each column's noise, as given, or as found from the residuals.
+    cost : float
+        Half the sum of the squared residuals over their standard deviations.
+    residuals : (n,) array
+        (run - data) / sigma, experiment by experiment, column by column.
+    degrees_of_freedom : int
+        Number of residuals less that of unknowns.
+    undetermined : list of dict of str to float
+        Directions of the values, relative to their sizes, that the data do not tell; empty if they tell all.
+    at_bounds : tuple of str
+    evaluations : int
+        Trial values of the last round.
+    success : bool
+    message : str
+        SciPy's reason for the end.
+    """
+
+    def __init__(
+        self, problem: Any, values: Array, jacobian: Array, limits: tuple[Array, Array], found: Any, known: bool
+    ) -> None:
+        self._problem, self._values, self._jacobian = problem, values, jacobian
+        self.names: tuple[str, ...] = problem.names
+        self.values = dict(zip(self.names, map(float, values), strict=True))
+        self.sigma: dict[str, float] = dict(problem.sigma)
+        self.sigma_given = known
+        self.residuals: Array = problem.residuals(values)
+        self.cost = 0.5 * float(self.residuals @ self.residuals)
+        self.degrees_of_freedom = len(self.residuals) - len(self.names)
+        self.evaluations, self.success, self.message = int(found.nfev), bool(found.success), str(found.message)
+        active = np.asarray(found.active_mask, dtype=int) != 0
+        self.at_bounds = tuple(name for name, at in zip(self.names, active, strict=True) if at)
+        self._low, self._high = limits
+        self.covariance, self.undetermined = self._certainty(active)
+        with np.errstate(invalid="ignore"):
+            spread = np.sqrt(np.diag(self.covariance))
+            self.correlation = self.covariance / np.outer(spread, spread)
+        told = {name for direction in self.undetermined for name in direction}
+        self.errors = {
+            name: float("inf") if name in told else float(error) for name, error in zip(self.names, spread, strict=True)
+        }
+
+    def _certainty(self, active: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Array, list[dict[str, float]]]:
+        """(J^T J)^-1 of the values that the data tell, and directions that they do not."""
+        k = len(self.names)
+        covariance = np.full((k, k), np.nan)
+        free = np.flatnonzero(~active)
+        if not len(free):
+            return covariance, []
+        J = self._jacobian[:, free]
+        size = np.sqrt((J * J).sum(axis=0))
+        scale = np.where(size > 0.0, size, 1.0)
+        _, s, Vt = algebra.svd(J / scale, full_matrices=False)
+        weak = s <= IDENTIFIED * s[0] if s[0] > 0.0 else np.ones(len(s), dtype=bool)
+        directions, touched = [], np.zeros(len(free), dtype=bool)
+        for row in Vt[weak]:
+            step = row / scale
+            relative = step / np.maximum(np.abs(self._values[free]), np.finfo(float).tiny)
+            relative = relative / np.abs(relative).max()
+            taken = np.abs(row) > np.sqrt(IDENTIFIED)
+            touched |= taken
+            directions.append({self.names[free[i]]: float(relative[i]) for i in np.flatnonzero(taken)})
+        inverse = (Vt[~weak].T / s[~weak] ** 2) @ Vt[~weak] / np.outer(scale, scale)
+        inverse[touched], inverse[:, touched] = np.nan, np.nan
+        covariance[np.ix_(free, free)] = inverse
+        return covariance, directions
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters among the values, as ``simulate`` and ``bind`` take them."""
+        return {name: x for name, x in self.values.items() if name in self._problem.module.p_names}
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The initial values among the values."""
+        return {name: self.values[name] for name in self._problem.initial_names}
+
+    @cached_property
+    def trajectories(self) -> list[Trajectory]:
+        """The run of each experiment with the values found, at the times that were measured."""
+        return [self._problem.run(self._values, one) for one in self._problem.experiments]
+
+    @property
+    def reduced_chi_squared(self) -> float:
+        """Sum of the squared residuals over the degrees of freedom: near 1 where the noise is as ``sigma`` says."""
+        return 2.0 * self.cost / self.degrees_of_freedom
+
+    def plot(self, *columns: str, experiment: int = 0) -> Any:
+        """Draw what was measured as points and the run as a line, a panel for each column.
+
+        Parameters
+        ----------
+        *columns : str
+            All measured ones by default.
+        experiment : int
+
+        Returns
+        -------
+        matplotlib Figure
+        """
+        plt = require("matplotlib.pyplot", "matplotlib", "plot")
+        one, run = self._problem.experiments[experiment], self.trajectories[experiment]
+        chosen = columns or tuple(one.columns)
+        figure, panels = plt.subplots(
+            len(chosen), 1, sharex=True, squeeze=False, figsize=(7.0, 1.0 + 1.6 * len(chosen)), layout="constrained"
+        )
+        for panel, name in zip(panels[:, 0], chosen, strict=True):
+            unit = run.units.get(name, "")
+            panel.plot(one.t, one.columns[name], ".", color="0.6", markersize=3, label="measured")
+            panel.plot(run.t, run[name], color="C0", label="fitted run")
+            panel.set_ylabel(f"{name} ({unit})" if unit else name)
+            panel.grid(alpha=0.3)
+        panels[0, 0].legend(loc="upper right", fontsize="small")
+        panels[-1, 0].set_xlabel("t (s)")
+        return figure
+
+    def _facts(self) -> list[tuple[str, str]]:
+        rows = []
+        for name, value in self.values.items():
+            error = self.errors[name]
+            if name in self.at_bounds:
+                told = "at its bound"
+            elif not np.isfinite(error):
+                told = "not told by the data"
+            else:
+                part = f" ({100.0 * error / abs(value):.2g} %)" if value else ""
+                told = f"+- {error:.2g}{part}"
+            rows.append((name, f"{value:.7g}  {told}"))
+        noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
+        rows.append(("noise" if self.sigma_given else "noise found", noise))
+        rows.append(("residuals", f"{len(self.residuals)}, chi^2 per degree of freedom {self.reduced_chi_squared:.4g}"))
+        for direction in self.undetermined:
+            change = ", ".join(f"{name} {x:+.3g}" for name, x in direction.items())
+            rows.append(("not told apart", f"relative changes {change} change no measured value"))
+        strong = [
+            f"{a} and {b} {self.correlation[i, j]:+.3f}"
+            for i, a in enumerate(self.names)
+            for j, b in enumerate(self.names)
+            if i < j and abs(self.correlation[i, j]) > 0.95
+        ]
+        if strong:
+            rows.append(("correlated", ", ".join(strong)))
+        rows.append(("ended", f"{self.message} ({self.evaluations} trials)"))
+        return rows
+
+    def __repr__(self) -> str:
+        return "\n".join([f"fit of {self._problem.module.name}", *aligned_rows(self._facts())])
+
+    def _repr_html_(self) -> str:
+        return as_html(f"fit of {self._problem.module.name}", self._facts())
+
+
+# -- the fit -----------------------------------------------------------------------------------------------------------
+
+# Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of :mod:`.fit`,
+# or of :mod:`..simulation.sensitivities` for loops, events and inputs that depend on the state. Covariance of the
+# estimates: (J^T J)^-1 of the weighted residuals (Y. Bard, Nonlinear Parameter Estimation, 1974, section 7.5).
+
 
 DERIVATIVES = ("exact", "differences")
 

@@ -1,9 +1,4 @@
-"""Identification: states and accelerations -> the matrix Y by which a tree's forces are linear in inertial parameters.
-
-Y pi is what the joints must exert to move the bodies and to hold them against gravity, pi being per body its mass m,
-first moment m c and inertia I about the body's origin, in body axes (C. G. Atkeson, C. H. An, J. M. Hollerbach,
-Estimation of inertial parameters of manipulator loads and links, Int. J. Robotics Research 5(3) (1986), 101-119).
-"""
+"""DOC"""
 
 from __future__ import annotations
 
@@ -13,14 +8,81 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
 from ..base.algebra import Array
-from ..errors import cannot, ill_shaped
+from ..base.limits.constraints import STATE as RANK
+from ..errors import EvaluationError, ProjectionError, cannot, ill_shaped
 from ..runtime.kernels import into
 from ..runtime.refusals import refuse_states
 from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+
+# -- random states -----------------------------------------------------------------------------------------------------
+
+
+def random_states(module: BoundModel, random: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
+    """Random q, v, a on the constraints, as fast as gravity makes the mechanism over its own length."""
+    layout = module.layout
+    s = layout.scales.q[:, None]
+    rate = _rate(module)
+    if not layout.n_c:
+        long = np.array([kind == "length" for kind in layout.coordinate_kinds], dtype=bool)[:, None]
+        q = np.where(long, layout.length, np.pi) * random.uniform(-1.0, 1.0, (module.n_q, count))
+        for i, _ in layout.quaternion_slots:
+            e = random.normal(size=(4, count))
+            q[i : i + 4] = e / np.linalg.norm(e, axis=0)
+        v, a = random.normal(size=(2, module.n_v, count))
+        return q, rate * s * v, rate * rate * s * a
+    states: list[Array] = []
+    accelerations: list[Array] = []
+    for _ in range(4 * count):
+        if len(states) == count:
+            break
+        try:
+            x, own = _on_constraints(module, random, rate)
+        except EvaluationError:
+            continue
+        states.append(x)
+        accelerations.append(own)
+    if not states:
+        raise ProjectionError(f"model {module.name!r}: no random state could be put on the constraints")
+    x = np.array(states).T
+    return x[: module.n_q], x[module.n_q :], np.array(accelerations).T
+
+
+def _on_constraints(module: BoundModel, random: np.random.Generator, rate: float) -> tuple[Array, Array]:
+    """A state x on the constraints, and accelerations that keep it there."""
+    layout = module.layout
+    n_q, scales = module.n_q, layout.scales
+    q = scales.move(layout.q_reference, np.pi * random.uniform(-1.0, 1.0, module.n_v))
+    x = module.project(np.concatenate([q, rate * scales.q * random.normal(size=module.n_v)]))
+    free = free_directions(scales.jacobian(module.constraint_jacobian(x[:n_q], rows="all")))
+    own = module.rhs(0.0, x)[n_q:]  # keeps the constraints, as does every change along what they leave free
+    return x, own + scales.q * (free @ (rate * rate * random.normal(size=free.shape[1])))
+
+
+def _rate(module: BoundModel) -> float:
+    """sqrt(g / L), at which gravity and inertia are alike; 1 where there is no gravity."""
+    still = np.zeros(module.n_v)
+    terms = module.kernels.motion("inertial_terms")(module.layout.q_reference, still, still)
+    fall = float(np.linalg.norm(terms[:, 9:12], axis=1).max())
+    return float(np.sqrt(fall / module.layout.length)) if fall > 0.0 else 1.0
+
+
+def free_directions(J: Array) -> Array:
+    """Directions of scaled velocities that constraints leave, as orthonormal columns."""
+    _, sizes, Vt = algebra.svd(J)
+    return Vt[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
+
+
+# -- regressor ---------------------------------------------------------------------------------------------------------
+
+# Y pi is what the joints must exert to move the bodies and to hold them against gravity, pi being per body its mass m,
+# first moment m c and inertia I about the body's origin, in body axes (C. G. Atkeson, C. H. An, J. M. Hollerbach,
+# Estimation of inertial parameters of manipulator loads and links, Int. J. Robotics Research 5(3) (1986), 101-119).
+
 
 #: The inertial parameters of a body, in the order of columns; I is about the body's origin.
 STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")

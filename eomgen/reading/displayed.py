@@ -26,13 +26,13 @@ class Displayed(Readable):
         return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
 
     def _repr_latex_(self) -> str:
-        from .equations_latex import equations_latex
+        from .writers import equations_latex
 
         return equations_latex(self)
 
     @cached_property
     def _shown_text(self) -> str:
-        from .equations_text import equations_text
+        from .writers import equations_text
 
         return equations_text(self)
 
@@ -42,13 +42,13 @@ class Displayed(Readable):
 
     @cached_property
     def _facts_html(self) -> str:
-        from .equations_html import facts_html
+        from .writers import facts_html
 
         return facts_html(self)
 
     @cached_property
     def _equations_html(self) -> str:
-        from .equations_html import equations_html
+        from .writers import equations_html
 
         return equations_html(self)
 
@@ -67,7 +67,7 @@ class Displayed(Readable):
         -------
         ReadingView
         """
-        from .functions_of_time import dynamic_symbols
+        from .writes_quantities import dynamic_symbols
 
         return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
 

@@ -16,12 +16,11 @@ from sympy.printing.c import reserved_words as c_words
 from sympy.printing.mathematica import MCodePrinter
 
 from ..errors import UnavailableError
-from ..printing.formula_of import DIGITS
+from ..printing.formula import DIGITS
 from ..runtime.near_names import unknown
 from ..targets import FORMATS
-from .equations_latex import latex_lines
-from .equations_text import COLUMNS, equations_text
 from .readable import Readable
+from .writers import COLUMNS, equations_text, latex_lines
 
 _MATLAB_WORDS = "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
 _MATLAB_WORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"

@@ -1,13 +1,18 @@
-"""Stage reading, by name: a SymPy matrix that is a sum with named parts; mappings whose values are made when asked."""
+"""Stage reading, named parts: SymPy matrices that are sums with named parts -> groups and blocks of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from enum import IntEnum
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import sympy
 
 from ..runtime.near_names import unknown
+
+# -- named parts -------------------------------------------------------------------------------------------------------
+
 
 Value = TypeVar("Value")
 
@@ -83,3 +88,157 @@ class SpatialMotion(NamedTuple):
     angular: Any
     linear: Any
     center_of_mass: Any
+
+
+# -- groups ------------------------------------------------------------------------------------------------------------
+
+
+class PartMeaning(IntEnum):
+    """What a named part is, in the order in which parts are told."""
+
+    CONSTANT = 0  #: of parameters alone
+    TURN = 1  #: sine or cosine
+    ROTATION = 2
+    POSITION = 3  #: of what bodies and constraints share
+    INERTIA = 4  #: of the mass matrix
+    CONSTRAINT = 5  #: of the Jacobian of the constraints
+    ANGULAR_VELOCITY = 6
+    VELOCITY = 7  #: of what bodies and constraints share
+    FORCE = 8  #: of the right side
+    CONSTRAINT_RATE = 9  #: of gamma
+
+
+#: Names that tell what they are: ``R_rod_12``, ``omega_rod_x``.
+NAMES = (
+    (re.compile(r"R_(?:.+_)?[123]{2}"), PartMeaning.ROTATION),
+    (re.compile(r"omega_.+_[xyz]"), PartMeaning.ANGULAR_VELOCITY),
+)
+Named = Sequence[tuple[Any, Any]]
+
+
+def grouped(
+    named: Named,
+    outputs: Mapping[PartMeaning, Sequence[Any]],
+    constants: Collection[str],
+    moving: Collection[str],
+) -> dict[PartMeaning, list[tuple[Any, Any]]]:
+    """Named parts by meaning.
+
+    Parameters
+    ----------
+    named : sequence of (sympy.Symbol, sympy.Expr)
+        In an order in which each uses only those before it; so are those of each group, and the groups.
+    outputs : mapping of PartMeaning to sequence of sympy.Expr
+        What uses the parts: entries of the mass matrix, of the right side, of the constraints.
+    constants, moving : collection of str
+        Names of parameters; of velocities and inputs.
+    """
+    known = {symbol.name: meaning for symbol, _ in named for form, meaning in NAMES if form.fullmatch(symbol.name)}
+    inside = {symbol: x.free_symbols for symbol, x in named}
+    uses = _uses(named, outputs, known, inside)
+    level: dict[Any, int] = {}  # 0 of parameters, 1 of coordinates, 2 of velocities
+    meaning: dict[Any, PartMeaning] = {}
+    groups: dict[PartMeaning, list[tuple[Any, Any]]] = {}
+    for symbol, x in named:
+        below = [level[s] if s in level else _level(s.name, constants, moving) for s in inside[symbol]]
+        level[symbol] = max(below, default=0)
+        own = known.get(symbol.name) or _meaning(x, level[symbol], uses[symbol])
+        meaning[symbol] = max([own, *(meaning[s] for s in inside[symbol] if s in meaning)])
+        groups.setdefault(meaning[symbol], []).append((symbol, x))
+    return dict(sorted(groups.items()))
+
+
+def _uses(
+    named: Named,
+    outputs: Mapping[PartMeaning, Sequence[Any]],
+    known: Mapping[str, PartMeaning],
+    inside: Mapping[Any, set[Any]],
+) -> dict[Any, set[PartMeaning]]:
+    """For what each part is used in the end, on the way to a known part too."""
+    uses: dict[Any, set[PartMeaning]] = {symbol: set() for symbol, _ in named}
+    for meaning, entries in outputs.items():
+        for x in entries:
+            for symbol in x.free_symbols & uses.keys():
+                uses[symbol].add(meaning)
+    for symbol, _ in reversed(named):
+        own = {known[symbol.name]} if symbol.name in known else uses[symbol]
+        for part in inside[symbol] & uses.keys():
+            uses[part] |= own
+    return uses
+
+
+def _level(name: str, constants: Collection[str], moving: Collection[str]) -> int:
+    return 0 if name in constants else 2 if name in moving else 1
+
+
+def _meaning(x: Any, level: int, uses: set[PartMeaning]) -> PartMeaning:
+    if level == 0:
+        return PartMeaning.CONSTANT
+    if isinstance(x, sympy.sin | sympy.cos):
+        return PartMeaning.TURN
+    for known, at in ((PartMeaning.ROTATION, 1), (PartMeaning.ANGULAR_VELOCITY, 2)):
+        if known in uses and level <= at:
+            return known
+    body, row = (
+        uses & {PartMeaning.INERTIA, PartMeaning.FORCE},
+        uses & {PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE},
+    )
+    if body and row:
+        return PartMeaning.POSITION if level == 1 else PartMeaning.VELOCITY
+    own = body or row
+    if level == 1 and len(own) > 1:
+        own = own & {PartMeaning.INERTIA, PartMeaning.CONSTRAINT}
+    return max(own, default=PartMeaning.FORCE)
+
+
+# -- blocks of matrices ------------------------------------------------------------------------------------------------
+
+# Coordinates of one branch of the tree belong together, as those of one leg of a platform do; rows of the constraints
+# that are of one joint do too.
+
+
+MOST = 10  #: blocks in a row that are shown
+
+Places = tuple[int, ...]
+
+
+class MatrixBlocks(NamedTuple):
+    """Groups of coordinates, and groups of constraint equations."""
+
+    coordinates: tuple[Places, ...]
+    equations: tuple[Places, ...]
+
+
+def find_blocks(
+    inertia: Sequence[Sequence[bool]],
+    constraints: Sequence[Sequence[bool]],
+    labels: Sequence[str],
+    branches: Sequence[int],
+) -> MatrixBlocks | None:
+    """Groups, None where there is one group of coordinates or where there are too many groups.
+
+    Parameters
+    ----------
+    inertia : sequence of sequence of bool
+        Where the mass matrix (n, n) does not vanish.
+    constraints : sequence of sequence of bool
+        Where the Jacobian (m, n) does not vanish.
+    labels : sequence of str
+        Of the rows of the Jacobian, the joint before the first dot.
+    branches : sequence of int
+        Of each coordinate the branch of the tree, counted at ground; those of one branch stay together.
+    """
+    n = len(inertia)
+    group = [branches.index(branch) for branch in branches]
+    for i in range(n):
+        for j in range(i):
+            if inertia[i][j] and group[i] != group[j]:
+                old, new = max(group[i], group[j]), min(group[i], group[j])
+                group = [new if k == old else k for k in group]
+    coordinates = tuple(tuple(j for j in range(n) if group[j] == k) for k in dict.fromkeys(group))
+    joints = [label.partition(".")[0] for label in labels]
+    equations = tuple(tuple(i for i, x in enumerate(joints) if x == joint) for joint in dict.fromkeys(joints))
+    if not 1 < len(coordinates) <= MOST or not 1 < len(equations) <= MOST or len(coordinates) == n:
+        return None
+    held = sum(any(constraints[i][j] for i in rows for j in columns) for rows in equations for columns in coordinates)
+    return MatrixBlocks(coordinates, equations) if held < len(equations) * len(coordinates) else None

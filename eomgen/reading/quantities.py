@@ -1,30 +1,262 @@
-"""Stage reading: Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions of their graph.
-
-What is of the size of the degrees of freedom is embedded with B of v = B v_i + b (Shabana, Computational Dynamics,
-sec. 5.7): M = B^T M_t B, Q = B^T Q_t, Q_v = B^T (Q_v,t - M_t a), so that M v_i' = Q_v + Q.
-"""
+"""Stage reading: Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..equations import METHODS
+from ..equations.analytical import form_energies
 from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
+from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
-from ..graph.differentiate import gradient
+from ..graph.differentiate import gradient, vjp
+from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
+from ..kinematics.energies import potential_energy
 from ..kinematics.mobility import Mobility
-from .applied_forces import forces_by_element, without_forces
-from .named_rotations import name_rotations
-from .written import is_short
+from ..simplify import WHOLE, joined_nodes, simplify
+
+# -- generalized forces ------------------------------------------------------------------------------------------------
+
+# Q of a force element is found by virtual power, Q = sum F . dv/dv_j; where the element has a potential V, also as
+# -dV/dq and the virtual power of the rest.  Of the two, the one with fewer operations is taken.
+
+
+GRAVITY = "gravity"  #: name of the entry of gravity
+POTENTIAL, FORCES, DISSIPATION = "potential", "forces", "dissipation"  #: entries of a bare Lagrangian
+
+
+def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
+    """Generalized forces (n_v,) on the tree, by the name of the force element; of gravity where there is any.
+
+    An element that is itself called ``gravity`` keeps its name; gravity is ``gravity_field`` then.  A bare Lagrangian
+    has the entries ``potential`` (-dV/dq), ``forces`` and ``dissipation``, those of them that do not vanish.
+    """
+    if kinematics.mechanism.lagrangian is not None:
+        return _of_lagrangian(kinematics)
+    found: dict[str, list[Expr]] = {}
+    names = {terms.force.name for terms in kinematics.forces}
+    if not all(x.is_zero for x in kinematics.mechanism.gravity):
+        height = potential_energy(replace(kinematics, forces=()))
+        found[GRAVITY if GRAVITY not in names else f"{GRAVITY}_field"] = _downhill(kinematics, height)
+    for terms in kinematics.forces:
+        force = _virtual_power(kinematics, terms.marker_loads, terms.coordinate_loads)
+        if terms.potential is not None:
+            rest = _virtual_power(kinematics, terms.marker_remainder, terms.coordinate_remainder)
+            slope = _downhill(kinematics, terms.potential)
+            other = [a + b for a, b in zip(slope, rest, strict=True)]
+            force = min(other, force, key=lambda forces: count(forces).total)
+        found[terms.force.name] = force
+    return found
+
+
+def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
+    bare = kinematics.mechanism.lagrangian
+    assert bare is not None
+    _, potential = form_energies(kinematics)
+    drag = gradient(bare.dissipation, list(kinematics.v))
+    found = {
+        POTENTIAL: _downhill(kinematics, potential),
+        FORCES: list(bare.forces),
+        DISSIPATION: [-d for d in drag],
+    }
+    return {name: force for name, force in found.items() if not all(x.is_zero for x in force)}
+
+
+def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
+    """-dV/dq along the velocities: -N^T dV/dq where q' = N v."""
+    slope = [-x for x in gradient(potential, list(kinematics.q))]
+    if kinematics.rates == kinematics.v:
+        return slope
+    return vjp(list(kinematics.rates), slope, list(kinematics.v))
+
+
+def _virtual_power(
+    kinematics: Kinematics, at_markers: Sequence[MarkerLoad], along: Sequence[CoordinateLoad]
+) -> list[Expr]:
+    """The generalized forces of some loads."""
+    motion, loop = kinematics.motion, kinematics.loop_coordinates
+    total = [kinematics.graph.zero] * len(kinematics.v)
+    moved: list[Expr] = []
+    weights: list[Expr] = []
+    for load in at_markers:
+        moved += [*motion.velocity(load.marker), *motion.angular_velocity(load.marker)]
+        weights += [*load.force, *load.torque]
+    for one in along:
+        if one.coordinate in kinematics.velocity_labels:
+            j = kinematics.velocity_labels.index(one.coordinate)
+            total[j] = total[j] + one.value
+        else:
+            moved.append(loop.rates[loop.names.index(one.coordinate)])
+            weights.append(one.value)
+    pairs = [(x, w) for x, w in zip(moved, weights, strict=True) if not (x.is_zero or w.is_zero)]
+    if not pairs:
+        return total
+    powers = vjp([x for x, _ in pairs], [w for _, w in pairs], list(kinematics.v))
+    return [a + b for a, b in zip(total, powers, strict=True)]
+
+
+def without_forces(kinematics: Kinematics) -> Kinematics:
+    """The same motion with no gravity and no force element; of a bare Lagrangian, L without V."""
+    mechanism, graph = kinematics.mechanism, kinematics.graph
+    bare = mechanism.lagrangian
+    if bare is not None:
+        still = tuple(graph.zero for _ in bare.forces)
+        moving = bare.expression + form_energies(kinematics)[1]
+        bare = replace(bare, expression=moving, forces=still, dissipation=graph.zero)
+    alone = replace(mechanism, gravity=vec.zero(graph), forces=(), lagrangian=bare)
+    return replace(kinematics, mechanism=alone, forces=())
+
+
+# -- entries of rotations ----------------------------------------------------------------------------------------------
+
+
+FEW = 600  #: operations up to which expressions are shorter to read without these names
+
+
+def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple[list[Expr], list[tuple[str, Expr]]]:
+    """Expressions in which nodes of one function are one, and names that stand in long ones for rotations.
+
+    The rotation of a joint in Euler parameters is R; of several joints, R_<joint>.
+    """
+    turning = [
+        (kinematics.mechanism.joints[branch.joint].name, link.joint_rotation)
+        for branch, link in zip(kinematics.topology.branches, kinematics.links, strict=True)
+        if kinematics.mechanism.joints[branch.joint].joint.quaternion_slots
+    ]
+    stems = [f"R_{joint}_" if len(turning) > 1 else "R_" for joint, _ in turning]
+    entries = [
+        (f"{stem}{i + 1}{j + 1}", rotation[i][j])
+        for stem, (_, rotation) in zip(stems, turning, strict=True)
+        for i in range(3)
+        for j in range(3)
+    ]
+    values = [x for _, x in entries]
+    joined, _ = joined_nodes([*expressions, *values], (), kinematics.euler_parameters)
+    whole, values = joined[: len(expressions)], joined[len(expressions) :]
+    if not entries:
+        return whole, []
+    from ..graph.sympy_raise import inlined_size
+
+    if inlined_size(whole) <= FEW:
+        return whole, []
+    taken = symbols_of(whole)
+    graph = whole[0].graph
+    named = {x: name for (name, _), x in zip(entries, values, strict=True) if len(x.node) > 2 and name not in taken}
+    found = substitute(whole, {x: graph.symbol(name) for x, name in named.items()})
+    used = symbols_of(found)
+    return found, [(name, x) for x, name in named.items() if name in used]
+
+
+# -- expressions in SymPy ----------------------------------------------------------------------------------------------
+
+# Everything that a user reads as SymPy comes through :func:`write`.
+
+
+READABLE = 400  #: operations an expression, on average, up to which expressions are written out
+LONGEST = 5_000  #: operations of all of them together
+
+
+class Written(NamedTuple):
+    """SymPy expressions, with the named parts that they use.
+
+    Attributes
+    ----------
+    intermediates : list of (sympy.Symbol, sympy.Expr)
+        In an order in which each uses only those before it; empty where everything is written out.
+    expressions : list of sympy.Expr
+    """
+
+    intermediates: list[tuple[Any, Any]]
+    expressions: list[Any]
+
+
+def is_short(expressions: Sequence[Expr]) -> bool:
+    """Whether expressions are written out whole."""
+    from ..graph.sympy_raise import inlined_size
+
+    several = {x.id: x for x in expressions if x.value is None}
+    return inlined_size(expressions) <= min(READABLE * len(several), LONGEST)
+
+
+def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
+    """The named parts that a value uses, and those that these use."""
+    wanted = set(value.free_symbols)
+    found = []
+    for symbol, expression in reversed(list(named)):
+        if symbol in wanted:
+            found.append((symbol, expression))
+            wanted |= expression.free_symbols
+    return found[::-1]
+
+
+def write(
+    expressions: Sequence[Expr],
+    symbols: Callable[[str], Any] | None = None,
+    prefix: str = "z",
+    given: Sequence[tuple[str, Expr]] = (),
+    rates: Collection[str] = (),
+    parameters: Collection[str] = (),
+    unit: Sequence[Sequence[str]] = (),
+    roots: bool = False,
+) -> Written:
+    """Expressions of one graph in SymPy.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+    symbols : callable, optional
+        Name -> the SymPy symbol, or function of time, that stands for it; plain symbols by default.
+    prefix : str, optional
+        Named parts are called ``z0``, ``z1``, ...
+    given : sequence of (str, Expr), optional
+        Names that stand in the expressions already, and what they stand for, in order.
+    rates : collection of str, optional
+        Names of velocities and accelerations.
+    parameters : collection of str, optional
+        Names of parameters.
+    unit : sequence of sequence of str, optional
+        Names of Euler parameters, four by four: the sum of their squares is 1.
+    roots : bool, optional
+        Whether long roots and denominators that are written several times get names in any case.
+
+    Returns
+    -------
+    Written
+    """
+    if not expressions:
+        return Written([], [])
+    expressions, given = joined_nodes(expressions, given, unit)
+    form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
+    if form is None:
+        return Written([], [])
+    named, found = form.sympy(symbols, parameters, prefix, roots)
+    return Written([(name, _with_derivatives(x)) for name, x in named], [_with_derivatives(x) for x in found])
+
+
+def _with_derivatives(expression: Any) -> Any:
+    """With sqrt(x^2) for |x|: SymPy takes names for complex numbers, of which |x| has no derivative."""
+    import sympy
+
+    if not expression.has(sympy.Abs):
+        return expression
+    return expression.replace(sympy.Abs, lambda x: sympy.sqrt(x**2))
+
+
+# -- quantities --------------------------------------------------------------------------------------------------------
+
+# What is of the size of the degrees of freedom is embedded with B of v = B v_i + b (Shabana, Computational Dynamics,
+# sec. 5.7): M = B^T M_t B, Q = B^T Q_t, Q_v = B^T (Q_v,t - M_t a), so that M v_i' = Q_v + Q.
+
 
 Row = tuple[Expr, ...]
 Rows = tuple[Row, ...]

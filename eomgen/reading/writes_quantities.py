@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.names import hint
 from ..describe.dotted_names import Undotted
+from ..describe.input_names import split_rate
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, at_odds, incomplete
 from ..graph.copies import copied
@@ -19,13 +20,51 @@ from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
 from ..runtime.near_names import UnknownNameError
-from .names_of_unknowns import momentum_names
-from .put_in import put_in, read_value, read_values
-from .quantities import Quantities
-from .written import needed, write
+from .methods import momentum_names, put_in, read_value, read_values
+from .quantities import Quantities, needed, write
 
 if TYPE_CHECKING:
     from .named_parts import ByName
+
+# -- functions of time -------------------------------------------------------------------------------------------------
+
+
+def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
+    """Name -> SymPy: ``theta`` is theta(t), ``theta_dot`` its derivative, ``theta_ddot`` the second one.
+
+    Velocities that are no rates of coordinates (``ball_wx``), inputs, momenta and multipliers are functions of time as
+    well; parameters are plain symbols; t is ``dynamicsymbols._t``.
+    """
+    orders: dict[str, tuple[str, int]] = {name: (name, 0) for name in kinematics.names}
+    loop = kinematics.loop_coordinates.names
+    for name in (*kinematics.names, *loop):
+        orders |= {name: (name, 0), f"{name}_dot": (name, 1), f"{name}_ddot": (name, 2)}
+    for velocity in (*kinematics.velocity_names, *kinematics.state_names):
+        base, order = orders.setdefault(velocity, (velocity, 0))
+        orders[acceleration_name(velocity)] = (base, order + 1)
+    inputs = kinematics.input_names
+    for name in inputs:
+        base, order = split_rate(name)
+        orders[name] = (base, order) if base in inputs else (name, 0)
+    orders |= {name: (name, 0) for name in momentum_names(kinematics)}
+
+    return partial(_function_of_time, orders)
+
+
+def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
+    import sympy
+    from sympy.physics.mechanics import dynamicsymbols
+
+    if name == "t":
+        return dynamicsymbols._t
+    if name not in orders:
+        return sympy.Symbol(name)
+    base, order = orders[name]
+    return dynamicsymbols(base, order)
+
+
+# -- quantities in SymPy -----------------------------------------------------------------------------------------------
+
 
 Derived = tuple[Kinematics, Mobility, TreeEquations]
 Names = list[tuple[str, Expr]]

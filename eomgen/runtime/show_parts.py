@@ -12,7 +12,7 @@ PARTS = {
     "animate": "show.animate",
     "draw": "show.draw",
     "explore": "show.explore",
-    "mode_shapes": "show.mode_shapes",
+    "mode_shapes": "show.animate",
 }
 
 

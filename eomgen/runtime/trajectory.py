@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from ..show.player import InlineFilm, InlinePage
+    from ..show.browser import InlineFilm, InlinePage
     from .bound_model import BoundModel
     from .change_points import ChangePoint
     from .option_types import AnimationOptions

@@ -12,10 +12,8 @@ from ..base.limits.pictures import ROUNDED, SAME
 from ..base.names import hint
 from ..base.picture_data import GROUND, PictureData, PlacedFrame, read_picture
 from ..errors import no_such, not_finite
-from .elements import element_items
-from .joints import joint_items, wall_items
-from .plane import find_view
-from .scene import Item, Label, Scene, attachments, distinct, frame_items, link_items, placed, symbol_size
+from .scene import Item, Label, Scene, attachments, distinct, find_view, frame_items, link_items, placed, symbol_size
+from .symbols import element_items, joint_items, wall_items
 
 MARGIN = 0.06  #: of the extent, around the picture
 LEAST = 0.4  #: shortest edge over the longest

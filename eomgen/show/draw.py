@@ -3,17 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from ..base.algebra import Array
 from ..base.texts import shown
-from ..errors import at_odds, ill_shaped, ill_typed, no_number
-from .branch_views import telling_values, telling_view
+from ..errors import MissingDependencyError, at_odds, ill_shaped, ill_typed, no_number
+from .axes import telling_values, telling_view
 from .build_scene import build_scene
-from .optional import matplotlib
 from .scene import Scene
+
+# -- optional libraries ------------------------------------------------------------------------------------------------
+
+
+K3D = (3, 2)  #: first version whose snapshots need no network
+
+
+def matplotlib(part: str, purpose: str) -> Any:
+    """A module of matplotlib.
+
+    Raises
+    ------
+    MissingDependencyError
+    """
+    return _load(f"matplotlib.{part}", "matplotlib", purpose)
+
+
+def k3d(purpose: str) -> Any:
+    """k3d, of a version that writes pages which need no network.
+
+    Raises
+    ------
+    MissingDependencyError
+    """
+    found = _load("k3d", "k3d>=3.2", purpose)
+    version = tuple(int(x) for x in str(found.__version__).split(".")[:2] if x.isdigit())
+    if version < K3D:
+        raise MissingDependencyError(
+            f'{purpose} needs k3d 3.2 or later, not {found.__version__}: pip install "k3d>=3.2"'
+        )
+    return found
+
+
+def ipywidgets(purpose: str) -> Any:
+    """Sliders and buttons of notebooks.
+
+    Raises
+    ------
+    MissingDependencyError
+    """
+    return _load("ipywidgets", "ipywidgets>=8.1", purpose)
+
+
+def _load(module: str, package: str, purpose: str) -> Any:
+    top = module.partition(".")[0]
+    try:
+        return import_module(module)
+    except ImportError as error:
+        if error.name is not None and error.name.partition(".")[0] != top:
+            raise  # the library is there and something it needs is not
+        raise MissingDependencyError(f'{purpose} needs {top}: pip install "{package}"') from error
+
+
+# -- pictures ----------------------------------------------------------------------------------------------------------
+
 
 SMALL = 4.6  #: longer edge of a picture in a notebook (inch)
 
@@ -76,7 +131,7 @@ def figure_of(scene: Scene) -> Any:
         made = figure(figsize=(7.0, 6.4), layout="constrained")
         made.add_subplot(projection="3d")
         return made
-    from .flat import figure_size
+    from .axes import figure_size
 
     made = figure(figsize=figure_size(scene), layout="constrained")
     made.add_subplot()
@@ -111,12 +166,12 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None, view: tuple[float, flo
         needed = "plain axes" if flat else 'axes in space: plt.figure().add_subplot(projection="3d")'
         raise ill_typed(f"the mechanism is {'planar' if flat else 'spatial'}; ax must be {needed}")
     if flat:
-        from .flat import Flat, figure_size
+        from .axes import Flat, figure_size
 
         if ax is None:
             ax = pyplot.figure(figsize=figure_size(scene), layout="constrained").add_subplot()
         return Flat(scene, ax)
-    from .axes_3d import Axes3DPicture
+    from .axes import Axes3DPicture
 
     if ax is None:
         ax = pyplot.figure(figsize=(7.0, 6.4), layout="constrained").add_subplot(projection="3d")

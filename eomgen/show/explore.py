@@ -12,7 +12,7 @@ from ..base.texts import html_text
 from ..errors import EomgenError
 from .browser import move_objects, scene_plot
 from .build_scene import build_scene
-from .optional import ipywidgets
+from .draw import ipywidgets
 
 COORDINATES = 12  #: sliders for coordinates, at most
 PARAMETERS = 16

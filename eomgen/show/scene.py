@@ -1,7 +1,4 @@
-"""Stage show, scene: data of a picture and poses over frames -> solids and lines, each fixed to a body or following it.
-
-Nothing here knows how it is drawn: the backends ask every :class:`Item` where its points are at a frame.
-"""
+"""DOC"""
 
 from __future__ import annotations
 
@@ -10,12 +7,101 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.pictures import SAME
+from ..base.limits.pictures import NOTHING, SAME
 from ..base.picture_data import GROUND, JointData, PictureData, PlacedFrame
-from .hollow_plates import hollow_lines, hollow_plate
-from .mesh_files import mesh_of
-from .solids import ROUND, Mesh, Triangles, rounded, solid, sphere, turned
+from .solids import ROUND, Mesh, Triangles, mesh_of, rounded, solid, sphere, turned
+
+# -- plates with holes -------------------------------------------------------------------------------------------------
+
+
+CORNERS = 4  #: fewest of an outline that turns both ways
+
+
+def hollow_lines(data: PictureData, body: int) -> list[Array]:
+    """Closed lines (n, 3) in a plane of a body, in its axes, which are not those around their convex hull."""
+    found = []
+    for element in data.elements:
+        stops = [stop for stop, _, _ in element.get("stops", ())]
+        if element["kind"] != "lines" or len(stops) <= CORNERS or any(stop.body != body for stop in stops):
+            continue
+        points = np.array([stop.position for stop in stops])
+        near = SAME * max(float(np.ptp(points, axis=0).max()), SAME)
+        if np.abs(points[0] - points[-1]).max() > near:
+            continue
+        points = points[np.abs(points - np.roll(points, 1, axis=0)).max(axis=1) > near]
+        flat = _in_plane(points) if len(points) >= CORNERS else None
+        if flat is not None and (_turns(flat[0]) < -near * near).any():
+            found.append(points)
+    return found
+
+
+def hollow_plate(points: Array, half: float) -> Mesh:
+    """A plate within a closed line in a plane, of which ``half`` of the thickness lies on each side."""
+    flat = _in_plane(points)
+    assert flat is not None
+    corners, axes, middle = flat
+    n, cap = len(corners), _triangles(corners)
+    ring = np.arange(n)
+    after = np.roll(ring, -1)
+    sides = np.vstack([np.column_stack([ring, after, ring + n]), np.column_stack([after, after + n, ring + n])])
+    vertices = np.vstack([np.column_stack([corners, np.full(n, height)]) for height in (-half, half)])
+    return vertices @ axes + middle, np.vstack([cap[:, ::-1], cap + n, sides])
+
+
+def _in_plane(points: Array) -> tuple[Array, Array, Array] | None:
+    """Counterclockwise corners (n, 2) in axes of the plane, the axes as rows and their origin; None out of a plane."""
+    middle = points.mean(axis=0)
+    _, sizes, axes = algebra.svd(points - middle)
+    if sizes[2] > SAME * sizes[0]:
+        return None
+    axes[2] = np.cross(axes[0], axes[1])
+    corners = (points - middle) @ axes[:2].T
+    x, y = corners.T
+    if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0:
+        axes[1:] *= -1.0
+        corners[:, 1] *= -1.0
+    return corners, axes, middle
+
+
+def _turns(corners: Array) -> Array:
+    """Cross products of the edges before and after each corner."""
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    turns: Array = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return turns
+
+
+def _triangles(corners: Array) -> np.ndarray:
+    """Triangles (n - 2, 3) that fill a counterclockwise outline, cut off one by one (Meisters, 1975)."""
+    left, found = list(range(len(corners))), list[tuple[int, int, int]]()
+    k = tried = 0
+    while len(left) > 3:
+        a, b, c = (left[(k + step) % len(left)] for step in (-1, 0, 1))
+        rest = corners[[i for i in left if i not in (a, b, c)]]
+        turns = [_side(corners[p], corners[q], rest) for p, q in ((a, b), (b, c), (c, a))]
+        empty = not np.all([turn >= 0.0 for turn in turns], axis=0).any()
+        if tried > len(left) or (_side(corners[a], corners[b], corners[c : c + 1])[0] >= 0.0 and empty):
+            found.append((a, b, c))
+            left.pop(k % len(left))
+            tried = 0
+        else:
+            tried += 1
+            k += 1
+        k %= len(left)
+    return np.array([*found, tuple(left)])
+
+
+def _side(p: Array, q: Array, points: Array) -> Array:
+    """Positive where points lie to the left of the line from p to q."""
+    side: Array = (q[0] - p[0]) * (points[:, 1] - p[1]) - (q[1] - p[1]) * (points[:, 0] - p[0])
+    return side
+
+
+# -- the scene ---------------------------------------------------------------------------------------------------------
+
+# Nothing here knows how it is drawn: the backends ask every :class:`Item` where its points are at a frame.
+
 
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
 OF_LINK = 0.16  #: and of the middle link's length, at most
@@ -377,3 +463,128 @@ def frame_items(data: PictureData, symbol: float) -> list[Item]:
 def disc(radius: float, thick: float) -> Mesh:
     """A wheel about z."""
     return turned((radius, radius), (-thick / 2, thick / 2), 48)
+
+
+# -- colours -----------------------------------------------------------------------------------------------------------
+
+
+#: Okabe and Ito's colours, which colour-blind readers tell apart, without yellow; then darker ones.
+BODIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A5195", "#2F4B7C", "#A05195", "#665191")
+DARK = "#333333"
+
+
+class Style(NamedTuple):
+    """How a role is drawn; None: in the colour of the body."""
+
+    color: str | None
+    face: str | None = None
+    edge: str | None = None
+    width: float = 1.2
+    alpha: float = 1.0
+
+
+STYLES = {
+    "hatch": Style("#777777", "#BBBBBB", "#777777", 1.1),
+    "rail": Style("#888888", "#CCCCCC", "#888888", 1.2),
+    "shape": Style(None, None, None, 0.8, 0.75),
+    "link": Style(None, None, None, 0.8, 0.85),
+    "wheel": Style(DARK, None, DARK, 1.2, 0.45),
+    "force": Style("#B22222", "#B22222", "#B22222", 1.3),
+    "pull": Style("#B22222", width=1.3),
+    "com": Style(DARK, DARK, DARK, 0.5),
+    "block": Style(None, None, DARK, 1.0),
+    "joint": Style(DARK, "white", DARK, 1.3),
+    "frame": Style(None, width=1.2),
+    "trace": Style("#999999", width=1.2),
+    "arrow": Style("#7B1FA2", width=1.8),
+}
+AXES = {"x": "#D62728", "y": "#2CA02C", "z": "#1F77B4"}
+
+
+def style_of(role: str) -> Style:
+    """How a role is drawn."""
+    return STYLES[role]
+
+
+def color_of(item: Item | Label) -> str:
+    """The colour of lines and, where the role has none of its own, of faces."""
+    if isinstance(item, Item) and item.color:
+        return item.color
+    if item.role == "frame":
+        return AXES[item.name] if isinstance(item, Item) else DARK
+    own = STYLES[item.role].color if isinstance(item, Item) else None
+    if own is not None and not (item.role == "wheel" and isinstance(item, Item) and item.faces is not None):
+        return own
+    return BODIES[item.body % len(BODIES)] if item.body != GROUND else "#888888"
+
+
+# -- the plane of a mechanism ------------------------------------------------------------------------------------------
+
+
+TRIALS = 6  #: positions that are looked at
+ROUNDING = SAME  #: relative size of what is rounding and not motion
+
+
+def find_view(poses: Callable[[Array], Array], q: Array, quaternions: list[int], gravity: Array) -> Array | None:
+    """Axes of a page (3, 3), rows right, up and towards the reader in ground axes; None of a spatial mechanism.
+
+    Positions of the tree are drawn at random, loops open: every motion that the joints have shows.
+
+    Parameters
+    ----------
+    poses : callable
+        q (n_q, k) -> (n_bodies, 4, 4, k).
+    q : (n_q,) array
+    quaternions : list of int
+        First of each four Euler parameters.
+    gravity : (3,) array
+    """
+    random = np.random.default_rng(0)
+    trial = q[:, None] + random.uniform(-1.0, 1.0, (len(q), TRIALS))
+    for i in quaternions:
+        trial[i : i + 4] /= np.linalg.norm(trial[i : i + 4], axis=0)
+    first = poses(q[:, None])[..., 0]
+    moved = poses(trial)
+    if not np.isfinite(moved).all():
+        return None
+    travel = moved[:, :3, 3] - first[:, :3, 3, None]
+    turns = np.einsum("bijk,blj->bilk", moved[:, :3, :3], first[:, :3, :3])  # relative rotation
+    size = max(float(np.abs(travel).max(initial=0.0)), NOTHING)
+    # the normal n has n . travel = 0 and R n = n
+    rows = [(travel / size).transpose(0, 2, 1).reshape(-1, 3)]
+    rows.append((turns.transpose(0, 3, 1, 2) - np.eye(3)).reshape(-1, 3))
+    stacked = np.vstack(rows)
+    candidates = [np.eye(3)[k] for k in (2, 1, 0)]
+    strength = float(np.linalg.norm(gravity))
+    if strength:  # a page on which things fall is better than one on which they do not
+        candidates.sort(key=lambda n: abs(float(n @ gravity)) > ROUNDING * strength)
+    axes = algebra.svd(stacked, full_matrices=True)[2]
+    candidates.append(axes[2])
+    for n in candidates:
+        if float(np.abs(stacked @ n).max(initial=0.0)) <= 1e3 * ROUNDING:
+            return _page(n, gravity)
+    return None
+
+
+def _page(normal: Array, gravity: Array) -> Array:
+    """Right, up and towards the reader, for a normal in ground axes."""
+    up = None
+    strength = float(np.linalg.norm(gravity))
+    along_axis = strength > 0.0 and float(np.abs(gravity).max()) > (1.0 - ROUNDING) * strength
+    if along_axis and abs(float(normal @ gravity)) < ROUNDING * strength:
+        up = -gravity / strength
+    if up is None:
+        k = int(np.argmax(np.abs(normal)))
+        up = np.eye(3)[1 if k == 2 else 2]
+        up = up - (up @ normal) * normal
+        up /= np.linalg.norm(up)
+    right = np.cross(up, normal)
+    if right[int(np.argmax(np.abs(right)))] < 0.0:
+        right = -right
+    return np.array([right, up, np.cross(right, up)])
+
+
+def page_axes(up: Array) -> tuple[int, int]:
+    """Of a picture in space: the axis that is nearest to the vertical, and the one that runs to the right."""
+    vertical = int(np.argmax(np.abs(up)))
+    return vertical, 1 if vertical == 0 else 0

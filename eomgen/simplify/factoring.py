@@ -1,18 +1,21 @@
-"""Stage simplify: a polynomial -> sums of products of sums, short to read.
-
-Common factors are taken out greedily, the one that shortens most first; what several products share is taken out once
-more.  This is algebraic factoring as of logic synthesis (R. K. Brayton and C. McMullen, The decomposition and
-factorization of Boolean expressions, ISCAS 1982), with a length for readers as the cost.
-"""
+"""Stage simplify: a polynomial -> sums of products of sums, short to read."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
+from fractions import Fraction
 from functools import reduce
+from typing import NamedTuple
 
+from ..graph.traverse import reachable
 from .atoms import (
     ONE,
+    STACKED,
+    SUM,
+    SUMS,
+    TURNS,
     Atoms,
+    Costs,
     Frozen,
     Monomial,
     Number,
@@ -20,15 +23,23 @@ from .atoms import (
     Work,
     add,
     common,
+    constant,
     freeze,
     inverse,
     join,
     multiply,
+    number,
     ratio,
     scaled,
 )
-from .costs import STACKED, SUM, Costs
-from .expansion import content
+from .expansion import Expansion, content, divided
+
+# -- factors -----------------------------------------------------------------------------------------------------------
+
+# Common factors are taken out greedily, the one that shortens most first; what several products share is taken out once
+# more.  This is algebraic factoring as of logic synthesis (R. K. Brayton and C. McMullen, The decomposition and
+# factorization of Boolean expressions, ISCAS 1982), with a length for readers as the cost.
+
 
 PAIRS = 40  #: terms up to which all pairs are tried for their common factor
 TRIED = 3  #: factors that are tried to the end where there are few terms
@@ -198,3 +209,291 @@ def sums_in(polys: Iterable[Poly], atoms: Atoms) -> dict[int, int]:
                     if count[atom] == 1:
                         stack.append(dict(atoms.table[atom].what))
     return count
+
+
+# -- exact quotients ---------------------------------------------------------------------------------------------------
+
+# Of (2 a + a b + 4 x + 2 b x) / (2 + b) remains a + 2 x. Terms are divided together with those that differ from them in
+# symbols of the denominator alone.
+
+
+def without_exact_quotients(poly: Poly, atoms: Atoms) -> Poly:
+    """The same polynomial, with what its denominators divide divided by them.
+
+    Parameters
+    ----------
+    poly : Poly
+    atoms : Atoms
+        What it is made of; denominators of several terms are atoms of kind ``sum``.
+    """
+    below = {a for m in poly for a, n in m if n <= -1 and atoms.table[a].kind == "sum"}
+    for atom in sorted(below):
+        poly = _divided_by(poly, atom, atoms)
+    return poly
+
+
+def _divided_by(poly: Poly, atom: int, atoms: Atoms) -> Poly:
+    divisor: Poly = dict(atoms.table[atom].what)
+    if len(divisor) < 2:
+        return poly
+    own = {a for m in divisor for a, _ in m}
+    groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
+    for m, x in poly.items():
+        power = next((n for a, n in m if a == atom), 0)
+        if power <= -1:
+            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
+            group = groups.setdefault((outer, power), {})
+            group[tuple(f for f in m if f[0] in own)] = x
+    for (outer, power), above in groups.items():
+        quotient = divided(above, divisor) if above else None
+        if quotient is not None:
+            rest = ((atom, power + 1),) if power != -1 else ()
+            poly = add(poly, multiply(above, {join(outer, ((atom, power),)): 1}), -1)
+            poly = add(poly, multiply(quotient, {join(outer, rest): 1}))
+    return poly
+
+
+# -- signs as quotients ------------------------------------------------------------------------------------------------
+
+# At x = 0 the quotient has none; who prints signs says so.
+
+
+MADE = "sgn"  #: kind of the atoms for what was x / |x|
+
+
+def with_signs(poly: Poly, atoms: Atoms) -> Poly:
+    """A polynomial that is multiplied out, with the signs of what it divides by magnitudes of."""
+    below = {a for m in poly for a, n in m if _is_below(a, n, atoms)}
+    for atom in sorted(below):
+        poly = _sign_divided_by(poly, atom, atoms)
+    return poly
+
+
+def factors_with_signs(poly: Poly, atoms: Atoms) -> Poly:
+    """The same of products of factored sums, each by itself."""
+    result: Poly = {}
+    for monomial, x in poly.items():
+        below = [a for a, n in monomial if _is_below(a, n, atoms)]
+        term: Poly = {monomial: x}
+        for atom in below:
+            ((m, y),) = term.items()
+            term = _of_factor(m, y, atom, atoms) or term
+        result = add(result, term)
+    return result
+
+
+def _is_below(atom: int, n: Fraction | int, atoms: Atoms) -> bool:
+    return atoms.table[atom].kind == "abs" and n < 0 and n % 2 == 1
+
+
+def _sign_divided_by(poly: Poly, atom: int, atoms: Atoms) -> Poly:
+    divisor = dict(atoms.table[atom].what[0])
+    own = {a for m in divisor for a, _ in m}
+    groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
+    for m, x in poly.items():
+        power = dict(m).get(atom, 0)
+        if _is_below(atom, power, atoms):
+            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
+            groups.setdefault((outer, power), {})[tuple(f for f in m if f[0] in own)] = x
+    for (outer, power), above in groups.items():
+        left, once = above, _quotient(above, divisor)
+        rest = power
+        while rest < 0 and once is not None and (twice := _quotient(once, divisor)) is not None:  # x^2 is |x|^2
+            left, once, rest = twice, _quotient(twice, divisor), rest + 2
+        if rest < 0 and once is not None:
+            left, made = once, _sign(outer, rest, atom, atoms, "sum")
+        else:
+            made = {join(outer, ((atom, rest),)): 1}
+        if left is not above:
+            poly = add(poly, multiply(above, {join(outer, ((atom, power),)): 1}), -1)
+            poly = add(poly, multiply(left, made))
+    return poly
+
+
+def _quotient(above: Poly, divisor: Poly) -> Poly | None:
+    """The quotient; None where the divisor does not divide what is above."""
+    if len(divisor) > 1:
+        return divided(above, divisor)
+    ((monomial, x),) = divisor.items()
+    if any(dict(m).get(a, 0) < n for m in above for a, n in monomial):
+        return None
+    return multiply(above, {inverse(monomial): ratio(1, x)})
+
+
+def _sign(outer: Monomial, power: Fraction | int, atom: int, atoms: Atoms, kind: str) -> Poly:
+    """outer sign(x) |x|^(power + 1) of the magnitude |x| that is an atom; a sum in it is an atom of the kind."""
+    rest = join(outer, ((atom, power + 1),)) if power != -1 else outer
+    sign = atoms.id(MADE, atoms.table[atom].what)
+    return {atoms.without_squared_signs(join(rest, ((sign, 1),)), kind): 1}
+
+
+def _of_factor(monomial: Monomial, x: Number, atom: int, atoms: Atoms) -> Poly | None:
+    """A product with the sign of what stands in it as a factor and in a magnitude below; None where none does."""
+    power = dict(monomial)[atom]
+    divisor = dict(atoms.table[atom].what[0])
+    outer = tuple(f for f in monomial if f[0] != atom)
+    if len(divisor) == 1:
+        quotient = _quotient({outer: x}, divisor)
+        return None if quotient is None else multiply(quotient, _sign((), power, atom, atoms, "factor"))
+    for factor, n in outer:
+        kind, what = atoms.table[factor]
+        if kind == "factor" and n >= 1 and (times := _times(dict(what), divisor)) is not None:
+            rest = join(outer, ((factor, -1),))
+            return multiply({ONE: x * times}, _sign(rest, power, atom, atoms, "factor"))
+    return None
+
+
+def _times(a: Poly, b: Poly) -> Number | None:
+    """The number a / b; None where it is none."""
+    if a.keys() != b.keys():
+        return None
+    times = {ratio(a[m], b[m]) for m in a}
+    return times.pop() if len(times) == 1 else None
+
+
+# -- products as they were formed --------------------------------------------------------------------------------------
+
+
+class Literal:
+    """Forms of nodes as they stand; sums in products are atoms of kind ``factor``."""
+
+    def __init__(self, expansion: Expansion) -> None:
+        self.expansion = expansion
+        self.atoms = expansion.atoms
+        self._of: dict[int, Poly] = {}
+
+    def put(self, i: int, poly: Poly) -> None:
+        """Let a polynomial, such as a name, stand for a node from here on."""
+        self._of[i] = poly
+
+    def form(self, i: int) -> Poly:
+        """The form of a node."""
+        graph = self.expansion.graph
+        for k in reachable(graph, [i], stop=self._of):
+            if k not in self._of:
+                self._of[k] = self._formed(*graph.nodes[k])
+        return self._of[i]
+
+    def _formed(self, kind: str, *args: object) -> Poly:
+        if kind == "const":
+            value, of_pi = number(args[0])  # type: ignore[arg-type]
+            return {((self.atoms.id("pi", ""), 1),): value} if of_pi else constant(value)
+        if kind == "sym":
+            return self.atoms.poly("sym", args[0])
+        parts = [self._of[k] for k in args]  # type: ignore[index]
+        if kind in ("add", "sub"):
+            return add(parts[0], parts[1], 1 if kind == "add" else -1)
+        if kind == "neg":
+            return scaled(parts[0], -1)
+        if kind in ("mul", "absorb"):
+            product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
+            product = dict(
+                self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()
+            )
+            return factors_with_signs(product, self.atoms)
+        if kind == "div" and parts[1]:
+            ((below, x),) = self._one_term(parts[1]).items()
+            quotient = multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
+            return factors_with_signs(quotient, self.atoms)
+        if kind == "sqrt" and parts[0] and next(iter(parts[0])) != ONE:
+            return {((self.atoms.id("factor", freeze(parts[0])), Fraction(1, 2)),): 1}
+        if kind in ("sin", "cos"):
+            return self.expansion.angles.of_angle(kind, self.expansion.angles.simplified(parts[0]))
+        return self.atoms.poly(kind, tuple(freeze(p) for p in parts))
+
+    def _one_term(self, poly: Poly) -> Poly:
+        return poly if len(poly) < 2 else self.atoms.poly("factor", freeze(poly))
+
+
+# -- both together -----------------------------------------------------------------------------------------------------
+
+# A damper's force c r' (r - s) / r^2 reads best as the product that it is, the inertia beside it with its terms
+# collected.  Products of sums in which lengths stand, as those of springs and dampers, are kept where multiplying them
+# out makes them longer; what is inertia may cancel with other inertia.
+
+
+PLAIN = ("sym", "pi", "name", *TURNS, *SUMS)  #: kinds of atoms of which inertia is made
+
+
+class Parts(NamedTuple):
+    """What a node is the sum of."""
+
+    kept: Poly  #: products of factored sums
+    out: Poly  #: multiplied out
+
+
+class Mixed:
+    """Sums of products that are kept and of what is multiplied out."""
+
+    def __init__(self, expansion: Expansion, factoring: Factoring, simplified: Callable[[Poly], Poly]) -> None:
+        self.expansion, self.factoring, self.simplified = expansion, factoring, simplified
+        self.atoms: Atoms = expansion.atoms
+        self._of: dict[int, Parts] = {}
+
+    def put(self, i: int, poly: Poly) -> None:
+        """Let a polynomial, such as a name, stand for a node from here on."""
+        self._of[i] = Parts({}, poly)
+
+    def form(self, i: int) -> Poly | None:
+        """The form of a node; None where nothing is kept."""
+        for k in reachable(self.expansion.graph, [i], stop=self._of):
+            if k not in self._of:
+                self._of[k] = self._parts(k)
+        parts = self._of[i]
+        return self._whole(parts) if parts.kept else None
+
+    def _whole(self, parts: Parts) -> Poly:
+        """Both together, with common factors taken out."""
+        return self.factoring.factored(add(factors_with_signs(parts.kept, self.atoms), self.simplified(parts.out)))
+
+    def _parts(self, i: int) -> Parts:
+        kind, *args = self.expansion.graph.nodes[i]
+        if kind not in ("add", "sub", "neg", "mul", "absorb", "div"):
+            return Parts({}, self.expansion.expand(i))
+        first, *rest = (self._of[k] for k in args)
+        if kind == "neg":
+            return Parts(scaled(first.kept, -1), scaled(first.out, -1))
+        second = rest[0]
+        if kind in ("add", "sub"):
+            sign = 1 if kind == "add" else -1
+            return Parts(add(first.kept, second.kept, sign), add(first.out, second.out, sign))
+        if kind == "div":
+            return self._quotient(i, first, args[1])
+        return self._product(i, first, second)
+
+    def _product(self, i: int, a: Parts, b: Parts) -> Parts:
+        if not (a.kept and b.kept):
+            few, many = (a, b) if not a.kept else (b, a)
+            if many.kept:  # a sum of which some products are kept: each has one more factor
+                return Parts(multiply(many.kept, self._factor(few)), self.expansion.times(many.out, few.out))
+            if max(len(a.out), len(b.out)) < 2:
+                return Parts({}, self.expansion.expand(i))
+        if a.kept and b.kept:
+            return Parts(multiply(self._factor(a), self._factor(b)), {})
+        out = self.expansion.expand(i)
+        if self._has_lengths(out):
+            kept = multiply(self._factor(a), self._factor(b))
+            costs = self.factoring.costs.of_terms
+            if costs(kept) < costs(self.factoring.factored(self.simplified(out))):
+                return Parts(kept, {})
+        return Parts({}, out)
+
+    def _has_lengths(self, poly: Poly) -> bool:
+        """Whether there are roots, their squares, or functions other than sines and cosines."""
+        return any(self._is_length(a, n) for m in poly for a, n in m)
+
+    def _is_length(self, atom: int, n: Fraction | int) -> bool:
+        return n != int(n) or atom in self.expansion.under_roots or self.atoms.table[atom].kind not in PLAIN
+
+    def _quotient(self, i: int, above: Parts, below: int) -> Parts:
+        if not above.kept:
+            return Parts({}, self.expansion.expand(i))
+        over = self.expansion.quotient({ONE: 1}, self.expansion.expand(below))
+        if len(over) != 1:
+            return Parts({}, self.expansion.expand(i))
+        return Parts(multiply(above.kept, over), self.expansion.quotient(above.out, self.expansion.expand(below)))
+
+    def _factor(self, parts: Parts) -> Poly:
+        """One term, a sum in it being one factor."""
+        whole = self._whole(parts)
+        return whole if len(whole) < 2 else self.factoring.product(whole, one_term=True)

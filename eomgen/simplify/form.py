@@ -18,15 +18,9 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, common_graph, operands, reachable
 from ..records import dataclass
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
-from .exact_quotients import without_exact_quotients
 from .expansion import Expansion
-from .factoring import Factoring
-from .good_names import GoodNames
-from .inline import EACH, NAME, Named, inlined, is_plain
-from .literal import Literal
-from .mixed import Mixed
-from .quotient_signs import with_signs
-from .shared_sums import SharedSums
+from .factoring import Factoring, Literal, Mixed, with_signs, without_exact_quotients
+from .names import EACH, NAME, GoodNames, Named, SharedSums, inlined, is_plain
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)

@@ -12,8 +12,7 @@ import sympy
 from ..graph.core import Graph
 from ..graph.sympy_raise import as_number, raise_operation
 from .atoms import SMALL, TURNS, Atoms, Monomial, Number, Poly
-from .factoring import Factoring
-from .quotient_signs import MADE
+from .factoring import MADE, Factoring
 
 
 class Raising:

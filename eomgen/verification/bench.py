@@ -17,7 +17,7 @@ from ..base.limits.numbers import TINY
 from ..codegen.collect import collect_terms
 from ..graph.core import Expr
 from .cases import Case
-from .rounding_sizes import FOLDED, UNIT, bounded
+from .digits import FOLDED, UNIT, bounded
 from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:

@@ -1,25 +1,186 @@
-"""Stage verification, check bodies: generated code against Newton's and Euler's equations of every body.
-
-What is expected comes from :mod:`.truth`, which shares no formula with the derivation but where the bodies are and what
-the force elements exert.
-"""
+"""Stage verification, bodies: generated code against joints and Newton's and Euler's equations of every body."""
 
 from __future__ import annotations
 
+from copy import copy
+from functools import partial
+
 import numpy as np
 
+from ..analysis.reactions import reactions
+from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.numbers import EPS, TINY
+from ..describe.mechanism import JointSpec
+from ..forces import ReactionFriction
+from ..forces.joint_reactions import reaction_symbol
+from ..frames import GROUND, Marker
+from ..graph.core import Expr
+from ..graph.substitute import substitute, symbols_of
+from ..joints import Continuous, Prismatic, Revolute
+from ..kinematics import Kinematics
 from . import bodies
 from .bench import Bench, numbers
-from .comparison import Comparison, pairs, size_of
-from .digits import Number
-from .finding import Finding
-from .rounding_sizes import FOLDED, UNIT
+from .digits import FOLDED, UNIT, Number
+from .finding import Comparison, Finding, pairs, size_of
 from .truth import Truth
 
+# -- joints ------------------------------------------------------------------------------------------------------------
 
-def check(bench: Bench) -> list[Finding]:
+
+PARTS = ("x", "y", "z", *["rotation"] * 9)  #: of a relative pose
+
+
+def check_joints(bench: Bench) -> list[Finding]:
+    """Rotations, placements at the joints, relative velocities."""
+    return [_rigid(bench), _joints(bench), _freedoms(bench)]
+
+
+def _rigid(bench: Bench) -> Finding:
+    """R^T R = 1 and det R = 1 for every body."""
+    check = "poses: rotation matrices are orthonormal"
+    if not bench.layout.n_bodies:
+        return Finding.skipped(check, "there are no bodies")
+    found = Comparison(check)
+    bounds = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    for k, case in enumerate(bench.cases):
+        poses = bench.call("poses", case)
+        error = 8.0 * bounds[:, k].reshape(-1, 4, 4)[:, :3, :3].max(axis=(1, 2)) + 8.0 * UNIT
+        R = poses[:, :3, :3]
+        gap = np.abs(np.einsum("bij,bik->bjk", R, R) - np.eye(3)).max(axis=(1, 2))
+        gap = np.maximum(gap, np.abs(np.linalg.det(R) - 1.0))
+        found.add(k, gap, error, 1.0, bench.layout.bodies)
+    return found.finding()
+
+
+def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
+    """A marker in ground axes, from the pose of its body."""
+    frame = marker.frame
+    flat = truth.system.evaluate(
+        f"marker {name}", lambda: [*frame.position, *(x for row in frame.rotation for x in row)], truth.values
+    )
+    position, rotation = flat[:3], [flat[3:6], flat[6:9], flat[9:12]]
+    if marker.body == GROUND:
+        return bodies.Pose(rotation, position)
+    body = truth.here[marker.body]
+    return bodies.Pose(
+        bodies.product(body.rotation, rotation), bodies.add(body.position, bodies.times(body.rotation, position))
+    )
+
+
+def _joints(bench: Bench) -> Finding:
+    """At every joint the successor stands, seen from the predecessor, where the joint's coordinates say.
+
+    Joints of the tree and cut ones alike, which tells whether loops have all the equations they need; joints without
+    coordinates by their own equations.
+    """
+    check = "joints: poses match their coordinates"
+    if not bench.mechanism.joints:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    cut = bench.kinematics.loop_coordinates
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    held = (
+        bench.bounds("constraints", lambda: bench.terms.constraints)[1]
+        if bench.terms.constraints
+        else np.zeros((0, len(bench.cases)))
+    )
+    for k, truth in enumerate(bench.truths):
+        measured = dict(zip(cut.names, truth.measured(truth.values), strict=True)) if cut.names else {}
+        gaps, labels = [], []
+        for spec in bench.mechanism.joints:
+            if not spec.joint.coordinates and spec.joint.role == "loop":
+                continue
+            outer = placed(truth, spec.predecessor, f"{spec.name} P")
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            symbols = [graph.symbol(name) for name in spec.coordinates]
+            rotation, position = spec.joint.pose(graph, symbols)
+            values = truth.values | {n: measured[n] for n in spec.coordinates if n in measured}
+            parts = [*position, *(x for row in rotation for x in row)]
+            flat = truth.system.evaluate(f"pose {spec.name}", partial(list, parts), values)
+            back = bodies.transpose(outer.rotation)
+            turn = bodies.product(back, inner.rotation)
+            place = bodies.times(back, bodies.sub(inner.position, outer.position))
+            own = [*place, *(x for row in turn for x in row)]
+            gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+            labels += [f"{spec.name} {what}" for what in PARTS]
+            plain = _textbook(spec, truth)
+            if plain is not None:
+                flat = [*plain.position, *(x for row in plain.rotation for x in row)]
+                gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+                labels += [f"{spec.name} {what}" for what in PARTS]
+        C = bench.module.kernels.constraint_jacobian(
+            truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all"
+        )
+        moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
+        length = max(1.0, bench.layout.length)
+        rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
+            np.abs(C).max(initial=0.0)
+        )
+        limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
+    """Joints of one degree, written out once more: S turned by q about z, or shifted by q along z, in P."""
+    if not isinstance(spec.joint, Revolute | Prismatic) or spec.coordinates[0] not in truth.values:
+        return None
+    mp, q, o = truth.mp, truth.values[spec.coordinates[0]], truth.zero
+    one = mp.mpf(1)
+    if isinstance(spec.joint, Prismatic):
+        return bodies.Pose([[one, o, o], [o, one, o], [o, o, one]], [o, o, q])
+    c, s = mp.cos(q), mp.sin(q)
+    return bodies.Pose([[c, -s, o], [s, c, o], [o, o, one]], [o, o, o])
+
+
+def _freedoms(bench: Bench) -> Finding:
+    """In a unit of one velocity, and q' = N v, the successor moves by the joint's column of it, all else at rest.
+
+    An angular velocity of a joint in Euler parameters is the relative one, in the successor's axes.
+    """
+    check = "joints: relative velocities"
+    if not bench.mechanism.joints or bench.mechanism.bare:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    names = bench.layout.v
+    for k, truth in enumerate(bench.truths):
+        gaps, labels = [], []
+        for spec in (bench.mechanism.joints[b.joint] for b in bench.kinematics.topology.branches):
+            columns = spec.joint.subspace(graph, [graph.symbol(name) for name in spec.coordinates])
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
+                flat = truth.system.evaluate(f"column {name}", lambda a=angular, l=linear: [*a, *l], truth.values)  # type: ignore[misc]
+                turn, shift = (bodies.times(inner.rotation, part) for part in (flat[:3], flat[3:]))
+                own = _relative(truth, spec, names.index(name), inner)
+                gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
+                labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
+        limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, bench.layout.length)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodies.Twist:
+    """Twist of S relative to P at S, ground axes, in a unit of velocity j."""
+    ends = []
+    for marker in (spec.successor, spec.predecessor):
+        if marker.body == GROUND:
+            ends.append(bodies.Twist([truth.zero] * 3, [truth.zero] * 3))
+            continue
+        w = truth.virtual[j][marker.body]
+        ends.append(bodies.Twist(w.angular, w.at(bodies.sub(inner.position, truth.here[marker.body].position))))
+    s, p = ends
+    return bodies.Twist(bodies.sub(s.angular, p.angular), bodies.sub(s.linear, p.linear))
+
+
+# -- equations of bodies -----------------------------------------------------------------------------------------------
+
+# What is expected comes from :mod:`.truth`, which shares no formula with the derivation but where the bodies are and
+# what the force elements exert.
+
+
+def check_bodies(bench: Bench) -> list[Finding]:
     """Equations of the tree, accelerations, energies, momenta and power."""
     found = [_tree(bench, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
     found += [_accelerations(bench), _energy(bench), _momentum(bench), _power(bench)]
@@ -215,3 +376,198 @@ def _energy_rate(bench: Bench, truth: Truth, a: Array) -> Number:
         lambda values: [sum(bench.system.evaluate("kernel energy", energies, values), truth.zero)],
         lambda s: truth.later(s, many, frozen=True),
     )[0]
+
+
+# -- reactions ---------------------------------------------------------------------------------------------------------
+
+# Reactions leave out what acts along a joint's coordinates (loads, inertias of drives); that is added here as the
+# torque or force about or along the joint's axis, between the two bodies.
+
+
+TURNING = (Revolute, Continuous)
+
+
+def check_reactions(bench: Bench) -> list[Finding]:
+    """One finding."""
+    return [_reactions(bench)]
+
+
+def _inapplicable(bench: Bench) -> str:
+    """Why the balance cannot be made up here, empty if it can."""
+    table = bench.layout.metadata.get("wrenches")
+    if table is None:
+        return "there are no joints between bodies"
+    if not bench.layout.projects:
+        return "derived with baumgarte="
+    if bench.mechanism.constraints:
+        return "constraint elements act on bodies too, and reactions contain only the joints"
+    plain = {s.coordinates[0] for s in bench.mechanism.joints if isinstance(s.joint, (*TURNING, Prismatic))}
+    loaded = {load.coordinate for terms in bench.kinematics.forces for load in terms.coordinate_loads}
+    loaded |= {s.coordinates[0] for s in bench.mechanism.joints if s.armature is not None}
+    if not loaded <= plain:
+        return f"forces act along {', '.join(sorted(loaded - plain))}, not about or along one fixed axis"
+    return ""
+
+
+def _reactions(bench: Bench) -> Finding:
+    """m a and the rate of angular momentum of each body against gravity, loads and what its joints exert on it."""
+    check, module = "reactions: every body in balance", bench.module
+    why = _inapplicable(bench)
+    if why:
+        return Finding.skipped(check, why)
+    found = Comparison(check)
+    labels = [f"{body} {part}" for body in bench.layout.bodies for part in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    for k, truth in enumerate(bench.truths):
+        case = truth.case
+        a = bench.rhs(case)[module.n_q :]
+        wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
+        missing, size = _unbalanced(bench, truth, a, wrenches)
+        found.add(k, missing, _limit(bench, k, truth, wrenches, size), size_of(size), labels)
+    return found.finding()
+
+
+def _limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
+    case, module = truth.case, bench.module
+    loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
+    grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)
+    limit = _inertia(truth) @ slack + grown * (size + np.repeat(loads, len(bench.layout.bodies), axis=0).ravel())
+    return np.asarray(limit)
+
+
+def force_limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray) -> float:
+    """What rounding allows the force in a joint at state k to be off by: it carries all bodies beyond it."""
+    a = bench.rhs(truth.case)[bench.module.n_q :]
+    _, size = _unbalanced(bench, truth, a, wrenches)
+    return float(_limit(bench, k, truth, wrenches, size).reshape(-1, 2, 3)[:, 0].sum())
+
+
+def _inertia(truth: Truth) -> np.ndarray:
+    """|wrench| (6 n_bodies, n_v) that a unit of each acceleration takes, about the bodies' origins."""
+    columns = []
+    for row in truth.virtual:
+        flat: list[float] = []
+        for body, w in zip(truth.bodies, row, strict=True):
+            force = bodies.scale(body.mass, w.at(body.arm))
+            moment = bodies.add(bodies.times(body.inertia, w.angular), bodies.cross(body.arm, force))
+            flat += [abs(float(x)) for x in (*force, *moment)]
+        columns.append(flat)
+    return np.array(columns).T.reshape(6 * len(truth.bodies), len(truth.virtual))
+
+
+def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about its origin that each body lacks (6 n_bodies,), and the size of the terms."""
+    rates = truth.body_rates([truth.mp.mpf(float(x)) for x in a])
+    total, size = np.zeros((len(truth.bodies), 6)), np.zeros((len(truth.bodies), 6))
+
+    def take(body: int, force: list[Number], moment: list[Number], arm: list[Number]) -> None:
+        whole = numbers([*force, *bodies.add(moment, bodies.cross(arm, force))])
+        total[body] += whole
+        parts = np.abs(whole).reshape(2, 3)
+        size[body] += np.repeat(parts.max(axis=1), 3)  # a vector turned from other axes is rounded as a whole
+
+    for k, (body, rate, w) in enumerate(zip(truth.bodies, rates, truth.twists, strict=True)):
+        acceleration = bodies.add(rate.at(body.arm), bodies.cross(w.angular, bodies.cross(w.angular, body.arm)))
+        spin = bodies.times(body.inertia, w.angular)
+        moment = bodies.add(bodies.times(body.inertia, rate.angular), bodies.cross(w.angular, spin))
+        take(k, bodies.scale(body.mass, acceleration), moment, body.arm)
+        take(k, bodies.scale(-body.mass, truth.gravity), [truth.zero] * 3, body.arm)
+    for body_index, arm, force, torque in truth.marker_loads():
+        take(body_index, bodies.scale(-1, force), bodies.scale(-1, torque), arm)
+    along = _along(truth, a)
+    for spec, wrench in zip(bench.mechanism.joints, wrenches, strict=True):
+        point = placed(truth, spec.successor, f"{spec.name} S").position
+        many = [truth.mp.mpf(float(x)) for x in wrench]
+        if spec.coordinates and spec.coordinates[0] in along:
+            axis = [row[2] for row in placed(truth, spec.predecessor, f"{spec.name} P").rotation]
+            own = bodies.scale(along[spec.coordinates[0]], axis)
+            many = bodies.add(
+                many, [*[truth.zero] * 3, *own] if isinstance(spec.joint, TURNING) else [*own, *[truth.zero] * 3]
+            )
+        for end, sign in ((spec.successor, -1), (spec.predecessor, 1)):
+            if end.body != GROUND:
+                arm = bodies.sub(point, truth.here[end.body].position)
+                take(end.body, bodies.scale(sign, many[:3]), bodies.scale(sign, many[3:]), arm)
+    return total.ravel(), _carried(truth, size).ravel()
+
+
+def _carried(truth: Truth, size: np.ndarray) -> np.ndarray:
+    """Sizes (n_bodies, 6) of the terms of all bodies about each origin: a joint carries what is beyond it."""
+    origins = np.array([numbers(pose.position) for pose in truth.here])
+    apart = np.linalg.norm(origins[:, None] - origins[None], axis=2)
+    forces, moments = size[:, :3].max(axis=1), size[:, 3:].max(axis=1)
+    whole = np.stack([np.full(len(size), forces.sum()), moments.sum() + apart @ forces], axis=1)
+    return np.repeat(whole, 3, axis=1)
+
+
+def _along(truth: Truth, a: Array) -> dict[str, Number]:
+    """Forces along joint coordinates, inertias of drives among them."""
+    total: dict[str, Number] = {}
+    for name, value in truth.coordinate_loads():
+        total[name] = total.get(name, truth.zero) + value
+    many = [truth.mp.mpf(float(x)) for x in a]
+    for name, inertia in truth.drives:
+        if name in truth.system.kinematics.velocity_labels:
+            bend = many[truth.system.kinematics.velocity_labels.index(name)]
+        else:
+            k = truth.system.kinematics.loop_coordinates.names.index(name)
+            bend = truth.bend(truth.measured, lambda s: truth.later(s, many))[k]
+        total[name] = total.get(name, truth.zero) - inertia * bend
+    return total
+
+
+# -- laws of reactions -------------------------------------------------------------------------------------------------
+
+# The forces are those that the equations of motion contain, in many digits.  They are held against their laws at the
+# reactions of :func:`~eomgen.analysis.reactions.reactions`, which are found from numbers, joint by joint.
+
+
+def check_reaction_laws(bench: Bench) -> list[Finding]:
+    """One finding, of models with such friction."""
+    laws = [terms for terms in bench.kinematics.forces if isinstance(terms.force, ReactionFriction)]
+    if not laws or bench.layout.metadata.get("wrenches") is None or not bench.layout.projects:
+        return []
+    found = Comparison("friction: laws at the joints' reactions")
+    specs = {spec.name: spec for spec in bench.mechanism.joints}
+    forces = [terms.force for terms in laws if isinstance(terms.force, ReactionFriction)]
+    loads = [load.value for terms in laws for load in terms.coordinate_loads]
+    for k, truth in enumerate(bench.truths):
+        case = truth.case
+        wrenches = reactions(bench.module, case.t, case.x, p=case.p, u=case.u)
+        carried = dict(zip(bench.layout.metadata["joint_names"], wrenches, strict=True))
+        loose = force_limit(bench, k, truth, wrenches)
+        acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
+        expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
+        limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(bench.layout.bodies)
+        found.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
+    return [found.finding()]
+
+
+def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndarray) -> tuple[float, float]:
+    """The force of a law at a reaction (ground axes), and how much it grows with that."""
+    axis = numbers([row[2] for row in placed(truth, spec.successor, f"{spec.name} S").rotation])
+    along = float(wrench[:3] @ axis)
+    across = float(np.linalg.norm(wrench[:3] - along * axis))
+    values = [_value(truth, force, *pair) for pair in ((across, along), (across + 1.0, along), (across, along + 1.0))]
+    grown = abs(values[1] - values[0]) + abs(values[2] - values[0])
+    return float(values[0]), float(grown)
+
+
+def _value(truth: Truth, force: ReactionFriction, across: float, along: float) -> Number:
+    kinematics, number = truth.system.kinematics, truth.mp.mpf
+    names = [reaction_symbol(kinematics.graph, force.joint, k).node[1] for k in range(3)]
+    carried = dict(zip(names, (number(across), truth.zero, number(along)), strict=True))
+    outputs = truth.system.evaluate(f"law of {force.name}", lambda: [_open(kinematics, force)], truth.values | carried)
+    return outputs[0]
+
+
+def _open(kinematics: Kinematics, force: ReactionFriction) -> Expr:
+    """The force of an element in terms of the state and of the joint's reaction."""
+    motion = copy(kinematics.motion)
+    motion.carried = {}
+    law = force.along(*force.path.measure(motion))
+    mapping = motion.derived_symbols(kinematics.mechanism, symbols_of([law]))
+    return substitute([law], mapping)[0] if mapping else law

@@ -28,8 +28,7 @@ from ..simulation.simulate import simulate
 from ..simulation.steppers import step
 from .bench import Bench
 from .cases import Case
-from .comparison import Comparison, size_of
-from .finding import RIGID, Finding
+from .finding import RIGID, Comparison, Finding, size_of
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -48,7 +47,7 @@ SMALLEST = 14  #: halvings of the step
 Reference = Callable[[float], Array]  #: h -> the state a time h later
 
 
-def check(bench: Bench) -> list[Finding]:
+def check_runs(bench: Bench) -> list[Finding]:
     """Orders of the steppers, methods against each other, energy and loops of a short run."""
     why = _inapplicable(bench)
     if why:

@@ -27,8 +27,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..kinematics.topology import Topology, find_topology
 from ..runtime.bound_model import BoundModel
 from .check_bodies import true_accelerations
-from .comparison import Comparison, failed
-from .finding import NOT_REACHED, Finding
+from .finding import NOT_REACHED, Comparison, Finding, failed
 
 if TYPE_CHECKING:
     from ..base.algebra import Array

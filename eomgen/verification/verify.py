@@ -19,10 +19,8 @@ from ..base.value_rules import read_count
 from ..errors import EomgenError, off_range
 from ..simulation.events import told_by_the_caller
 from .cases import random_cases
-from .comparison import failed
-from .finding import Finding, Verification
-from .identities import identities
-from .jacobians import jacobians
+from .finding import Finding, Verification, failed
+from .identities import identities, jacobians
 
 if TYPE_CHECKING:
     from ..derivation import Derivation
@@ -32,7 +30,12 @@ if TYPE_CHECKING:
 STATES = 6  #: random states
 SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
 #: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
-GROUPS = ("kernels", "bodies", "joints", "reactions", "reaction_laws", "constraints", "derivatives", "runs")
+GROUPS = (  #: group of checks -> the file with its function
+    dict.fromkeys(("kernels",), "check_kernels")
+    | dict.fromkeys(("bodies", "joints", "reactions", "reaction_laws"), "check_bodies")
+    | dict.fromkeys(("constraints", "derivatives"), "check_kernels")
+    | {"runs": "check_runs"}
+)
 KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 
@@ -143,7 +146,7 @@ def _with_equations(
         share = smallest_share(*parts)
         found.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
     for group in KINEMATIC if idle else GROUPS:
-        check = import_module(f"{__package__}.check_{group}").check
+        check = getattr(import_module(f"{__package__}.{GROUPS[group]}"), f"check_{group}")
         try:
             found += check(bench)
         except (EomgenError, ArithmeticError) as error:

@@ -27,7 +27,7 @@ from ..program import Block, KernelDriver, Program
 from ..statements import cut
 
 if TYPE_CHECKING:
-    from ...device.arrays_on_device import Device
+    from ...device.cuda_device import Device
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}

@@ -1,0 +1,551 @@
+"""Stage reading, writers: equations of motion -> text of 80 columns, HTML with MathML, or LaTeX."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from ..base.latex import SUPERSCRIPTS, read_latex, text_form
+from ..base.notation import Notation
+from ..base.texts import fold, html_text, visible
+from ..printing import given_mathml, latex, mathml, sums_in_lines, text
+from ..printing.formula import DIGITS, ROUNDED, Formula, MatrixOf, Name, is_group, times
+from ..printing.writers import TIGHT, fenced, row, sum_line
+from .printed import (
+    SAMPLED,
+    SHORT,
+    STILL,
+    PrintedEntry,
+    PrintedEquations,
+    PrintedGroup,
+    PrintedLine,
+    PrintedParts,
+    PrintedRow,
+    PrintedSentence,
+    plain,
+)
+from .readable import Readable
+
+# -- text --------------------------------------------------------------------------------------------------------------
+
+
+COLUMNS = 80
+HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a function and its argument
+LINES = 60  #: of formulas; how to get the others is said
+ENTRIES = (SHORT, 8, 5, 2)  #: characters of entries of a matrix, tried until the matrix fits
+DEEP = 9  #: parentheses in parentheses
+SHORT_GROUP = re.compile(r"\([^()]{1,16}\)")  #: parentheses that stay in one line
+#: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
+#: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
+BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
+
+
+def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES, digits: int = ROUNDED) -> str:
+    """Coordinates and equations, in matrix form where it fits, else entry by entry.
+
+    Parameters
+    ----------
+    equations : Readable
+    columns : int
+        Longest line.
+    lines : int
+        Of formulas; what is beyond is left out, and how to get it is said.
+    digits : int
+        Of long numbers.
+
+    Returns
+    -------
+    str
+    """
+    printed = PrintedEquations(equations, digits)
+    name = visible(equations.kinematics.mechanism.name, lines=False)
+    found = [f"equations of motion of {name}", f"  {printed.title}"]
+    found += [*_values(printed, columns), *_coordinates(printed, columns)]
+    if equations.mobility.n_dof == 0:
+        found.append(f"  {STILL}")
+    else:
+        shown = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
+        found += ["", *shown[:lines]]
+        if len(shown) > lines:
+            where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
+            rest = f"... and {len(shown) - lines} lines more: {where}"
+            found += [rest, "or in a shell: eomgen derive MODEL --format text"]
+        if told := printed.told:
+            found += ["", *fold(told, columns, "", "  ")]
+    if printed.states:
+        found += ["", "first-order states"]
+        found += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+    if printed.sampled:
+        found += ["", SAMPLED]
+        found += [x for a, f in printed.sampled for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+    found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
+    return "\n".join(found)
+
+
+def _values(printed: PrintedEquations, columns: int) -> list[str]:
+    """What was put in."""
+    shown = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
+    return [plain(line) for line in fold(shown, columns, "  with ", "    ")] if shown else []
+
+
+def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    rows = [(printed.names.text(c.name), c.name, c.joint, c.unit, c.role) for c in printed.coordinates]
+    if not rows:
+        return
+    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    yield "coordinates"
+    for symbol, name, joint, unit, role in rows[:20]:
+        of = f"of joint {joint:<{sizes[2]}}" if joint else ""
+        same = "" if symbol == name and all(entries[0] == entries[1] for entries in rows) else f"{name:<{sizes[1]}}  "
+        yield f"  {symbol:<{sizes[0]}}  {same}{of}  {unit:<{sizes[3]}}  {role}".rstrip()[:columns]
+    if len(rows) > 20:
+        yield f"  and {len(rows) - 20} more: eqs.q"
+
+
+def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    rates = [printed.text(x) for x in printed.accelerations]
+    M = [[printed.text(x) for x in entries] for entries in printed.mass_matrix]
+    f = [printed.text(x) for x in printed.force]
+    if printed.is_one_equation:
+        whole = f"  {printed.text(times(printed.mass_matrix[0][0], printed.accelerations[0]))} = {f[0]}"
+        if len(whole) <= columns:
+            yield plain(whole)
+            yield from _where(printed, columns)
+            return
+    whole_rows = [*_matrix_equation(M, rates, f)]
+    if len(rates) > 1 and max(map(len, whole_rows)) <= columns:
+        yield from map(plain, whole_rows)
+        yield from _where(printed, columns)
+        return
+    mass, v, right = (letter_text(letter) for letter in printed.letters)
+    short = f"{mass} {rates[0]} = {right}" if printed.is_one_equation else f"{mass} {v} = {right}"
+    listed = f"{short} with {v} = ({', '.join(rates)})"
+    yield short if printed.is_one_equation or len(listed) > columns else listed
+    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.letters_told):
+        yield from fold(f"{told}; the usual letters are names of the model", columns, "  ", "  ")
+    yield ""
+    rows = [*_matrix(M, f"{mass} = ")]
+    small = len(rates) > 1 and max(map(len, rows)) <= columns
+    if small:
+        yield from map(plain, rows)
+        yield ""
+    for entry in printed.entries():
+        if not (small and entry.letter == printed.letters.mass):
+            yield from _wrapped(f"{_label(entry, len(rates))} = ", printed.text(entry.formula), columns)
+    if not small and len(rates) > 1:
+        yield f"{mass} is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
+    yield from _where(printed, columns)
+
+
+def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+    for short in ENTRIES:
+        parts = PrintedParts(printed, short)
+        items = list(parts.items())
+        rows = [each for item in items if isinstance(item, PrintedRow) for x in item.lines for each in _rows(parts, x)]
+        if max(map(len, rows), default=0) <= columns:
+            break
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(x if isinstance(x, str) else text(x, parts.names) for x in sentence.pieces)
+
+    def equation(line: PrintedLine) -> Iterator[str]:
+        rows = _rows(parts, line)
+        if not isinstance(line.right, MatrixOf):
+            yield from _wrapped(f"{text(line.left, parts.names)} = ", text(line.right, parts.names), columns)
+        elif max(map(len, rows)) <= columns:
+            yield from ("", *map(plain, rows))
+        else:
+            size = f"{len(line.right.rows)} rows and {len(line.right.rows[0])} columns"
+            yield f"  {text(line.left, parts.names)} has {size}: eqs.tree_system"
+
+    mass, v, right = (letter_text(letter) for letter in printed.letters)
+    rates = ", ".join(map(printed.text, printed.accelerations))
+    one = printed.is_one_equation
+    yield from fold(
+        f"{mass} {rates} = {right}" if one else f"{mass} {v} = {right} with {v} = ({rates})", columns, "", "  "
+    )
+    for item in items[1:]:
+        match item:
+            case PrintedRow():
+                yield from (line for one in item.lines for line in equation(one))
+            case PrintedSentence():
+                yield from fold(words(item), columns, "", "  ")
+    groups = [item for item in items if isinstance(item, PrintedGroup)]
+    yield from (
+        "",
+        "In groups:",
+        *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
+    )
+    for group in groups:
+        yield from ("", *fold(words(group.title), columns, "", "  "))
+        yield from (line for one in group.lines for line in equation(one))
+
+
+def _rows(parts: PrintedParts, line: PrintedLine) -> list[str]:
+    """A matrix in rows; none of what is no matrix."""
+    if not isinstance(line.right, MatrixOf):
+        return []
+    before = f"  {text(line.left, parts.names)} = "
+    return _matrix([[text(x, parts.names) for x in entries] for entries in line.right.rows], before)
+
+
+def letter_text(latex: str) -> str:
+    """A letter of a display in text."""
+    return text_form(read_latex(latex))
+
+
+def _label(entry: PrintedEntry, n: int) -> str:
+    letter = letter_text(entry.letter)
+    if n == 1:
+        return letter
+    comma = "," if n > 9 else ""
+    return f"{letter}_{comma.join(map(str, entry.place))}"
+
+
+def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    if printed.intermediates:
+        yield "where"
+        for name, formula in printed.intermediates:
+            yield from _wrapped(f"{printed.names.text(name)} = ", printed.text(formula), columns)
+
+
+def _matrix(rows: Sequence[Sequence[str]], before: str = "") -> list[str]:
+    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    middle = (len(rows) - 1) // 2
+    found = []
+    for k, entries in enumerate(rows):
+        left, right = _brackets(k, len(rows))
+        cells = "  ".join(cell.center(size) for cell, size in zip(entries, sizes, strict=True))
+        found.append(f"{before if k == middle else ' ' * len(before)}{left}{cells}{right}")
+    return found
+
+
+def _brackets(k: int, n: int) -> tuple[str, str]:
+    if n == 1:
+        return "[", "]"
+    return ("⎡", "⎤") if k == 0 else ("⎣", "⎦") if k == n - 1 else ("⎢", "⎥")
+
+
+def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iterator[str]:
+    parts = (_matrix(M), _matrix([[x] for x in rates]), _matrix([[x] for x in f]))
+    middle = (len(f) - 1) // 2
+    for k, (a, b, c) in enumerate(zip(*parts, strict=True)):
+        yield f"  {a} {b} {'=' if k == middle else ' '} {c}"
+
+
+def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
+    """A formula in lines that end where ``BREAKS`` says."""
+    margin = " " * min(len(label) + 2, 12)
+    line = f"  {label}"
+    together = SHORT_GROUP.sub(lambda group: group[0].replace(" ", TIGHT), shown)
+    for part in _fitting(together, columns - len(margin), BREAKS):
+        if len(line) + len(part) > columns and line.strip():
+            yield plain(line.rstrip())
+            line = margin
+        line += part + " "
+    yield plain(line.rstrip())
+
+
+def _fitting(shown: str, room: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
+    """Parts between which a line may end, each cut no further than it has to be to fit."""
+    if not ways:
+        yield from (shown[k : k + room] for k in range(0, len(shown), room))
+        return
+    for part in _parts(shown, *ways[0]):
+        if len(part) <= room:
+            yield part
+        else:
+            yield from _fitting(part, room, ways[1:])
+
+
+def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
+    """The parts between spaces of one kind, a sign with what comes after it.
+
+    Spaces count within at most ``deep`` parentheses, ``in_calls`` of which are those of arguments.
+    """
+    piece, before = "", ""
+    opened: list[str] = []  # what each open parenthesis is
+    for word in shown.split(space):
+        for letter in word:
+            if letter == "|":
+                opened = opened[:-1] if opened[-1:] == ["bar"] else [*opened, "bar"]
+            elif letter in "({":
+                opened.append("call" if before.isalnum() or (before != "" and before in HIGH) else "group")
+            elif letter in ")}":
+                opened = opened[:-1]
+            before = letter
+        before = space
+        piece += word
+        if (
+            word in ("+", "-", "if", "otherwise")
+            or len(opened) > deep
+            or len(opened) - opened.count("group") > in_calls
+        ):
+            piece += TIGHT if word in ("+", "-", "if") else space
+        else:
+            yield piece
+            piece = ""
+    if piece:
+        yield piece.rstrip(space)
+
+
+# -- HTML --------------------------------------------------------------------------------------------------------------
+
+# MathML needs neither a script nor a network: a saved notebook shows the formulas too.
+
+
+FOLDED = 12  #: formulas more than which are folded up
+MOST = 1_000  #: intermediates that are shown
+LEFT = "style='text-align:left'"
+CELL = "style='text-align:left;padding:0.15em 1.2em 0.15em 0'"  #: of tables, on pages that do not space cells
+_STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
+_FLOW = "display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em"  #: short formulas side by side
+#: Fonts with brackets that grow, of the usual systems.
+_FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Termes Math,DejaVu Math TeX Gyre,math"
+
+
+def equations_html(equations: Readable) -> str:
+    """Formulas of the equations of motion."""
+    printed = PrintedEquations(equations, ROUNDED)
+    if equations.mobility.n_dof == 0:
+        return "".join([f"<p>{STILL.capitalize()}.</p>", *_states(printed)])
+    motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motions(printed), *_intermediates(printed)]
+    told = f"<p {LEFT}>{printed.told}</p>" if printed.told else ""
+    return "".join([*motion, *_states(printed), told])
+
+
+def facts_html(equations: Readable) -> str:
+    """What the equations are, their coordinates and the attributes to read next."""
+    printed = PrintedEquations(equations)
+    name = html_text(equations.kinematics.mechanism.name)
+    head = f"<p style='margin:0 0 0.6em 0'><b>{name}</b>: equations of motion, {html_text(printed.title)}</p>"
+    attributes = ", ".join(f"<code>eqs.{name}</code>" for name in printed.attributes)
+    further = f"<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+    return f"{head}{_html_values(printed)}{_html_coordinates(printed)}{further}"
+
+
+def _html_values(printed: PrintedEquations) -> str:
+    """What was put in."""
+    shown = [_math(mathml(x, printed.names)) for x in printed.values]
+    whole = f"with {', '.join(shown)}"
+    if not shown:
+        return ""
+    if len(shown) <= FOLDED:
+        return f"<p {LEFT}>{whole}</p>"
+    return f"<details><summary>with {len(shown)} values</summary><p {LEFT}>{whole}</p></details>"
+
+
+def _html_coordinates(printed: PrintedEquations) -> str:
+    shown = printed.coordinates
+    if not shown:
+        return ""
+    dependent = any(c.role for c in shown)
+    heads = ["coordinate", "name", "joint", "unit", *([""] if dependent else [])]
+    rows = "".join(
+        f"<tr><td {CELL}>{_math(printed.names.mathml(c.name))}</td><td {CELL}><code>{html_text(c.name)}</code></td>"
+        f"<td {CELL}>{html_text(c.joint)}</td><td {CELL}>{html_text(c.unit)}</td>"
+        + (f"<td {CELL}>{c.role}</td>" if dependent else "")
+        + "</tr>"
+        for c in shown
+    )
+    whole = f"<table><tr>{''.join(f'<th {CELL}>{head}</th>' for head in heads)}</tr>{rows}</table>"
+    return whole if len(shown) <= FOLDED else f"<details><summary>{len(shown)} coordinates</summary>{whole}</details>"
+
+
+def _math(inside: str) -> str:
+    return f"<math style='{_FONT}'>{inside}</math>"
+
+
+def _block(inside: str) -> str:
+    return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
+
+
+def _motions(printed: PrintedEquations) -> Iterator[str]:
+    def shown(formula: Formula) -> str:
+        return mathml(formula, printed.names)
+
+    rates = [shown(x) for x in printed.accelerations]
+    M, f = printed.mass_matrix, printed.force
+    equals = "<mo>=</mo>"
+    if printed.is_one_equation and printed.fits:
+        factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
+        yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
+        return
+    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
+    right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
+    if len(rates) > 1 and printed.fits:
+        yield _block(row(left, v, equals, right))
+        return
+    mass, _, force = map(given_mathml, printed.letters)
+    yield _block(row(mass, rates[0] if printed.is_one_equation else v, equals, force))
+    if told := ", ".join(f"{_math(given_mathml(letter))} is {what}" for letter, what in printed.letters_told):
+        yield f"<p {LEFT}>{told}; the usual letters are names of the model.</p>"
+    whole = len(rates) > 1 and printed.mass_matrix_fits
+    if whole:
+        yield _block(row(mass, equals, left))
+    elif len(rates) > 1:
+        zeros = "; entries that are not shown are 0" if printed.vanishing else ""
+        yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
+    entries = [
+        _line(printed.names, _html_label(entry, len(rates)), entry.formula)
+        for entry in printed.entries()
+        if not (whole and entry.letter == printed.letters.mass)
+    ]
+    if len(entries) <= FOLDED:
+        yield from entries
+    else:
+        yield f"<details><summary>the {len(entries)} entries of M and f</summary>{''.join(entries)}</details>"
+
+
+def _html_label(entry: PrintedEntry, n: int) -> str:
+    if n == 1:
+        return given_mathml(entry.letter)
+    comma = "," if n > 9 else ""
+    return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
+
+
+def _line(names: Notation, label: str, formula: Formula) -> str:
+    """A formula; a long sum in lines of its terms, below each other."""
+    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(formula, names))]
+    if len(lines) == 1:
+        return _block(row(label, "<mo>=</mo>", lines[0]))
+    cells = [
+        f"<mtr><mtd style='text-align:right;padding:0.2em 0'>{row(label, '<mo>=</mo>') if k == 0 else ''}</mtd>"
+        f"<mtd style='text-align:left;padding:0.2em 0 0.2em {0 if k == 0 else 1.5}em'>{row(line)}</mtd></mtr>"
+        for k, line in enumerate(lines)
+    ]
+    return _block(f"<mtable displaystyle='true'>{''.join(cells)}</mtable>")
+
+
+def _intermediates(printed: PrintedEquations) -> Iterator[str]:
+    if printed.intermediates:
+        yield f"<p {LEFT}>where</p>"
+        yield from (_line(printed.names, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
+
+
+def _states(printed: PrintedEquations) -> Iterator[str]:
+    if printed.states:
+        yield f"<p {LEFT}>first-order states</p>"
+        yield from (_line(printed.names, mathml(rate, printed.names), x) for rate, x in printed.states)
+    if printed.sampled:
+        yield f"<p {LEFT}>{SAMPLED}</p>"
+        yield from (_line(printed.names, mathml(state, printed.names), x) for state, x in printed.sampled)
+
+
+def parts_html(parts: PrintedParts) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, parts.names)) for x in sentence.pieces)
+
+    def equation(line: PrintedLine) -> str:
+        return row(mathml(line.left, parts.names), "<mo>=</mo>", mathml(line.right, parts.names))
+
+    for item in parts.items():
+        match item:
+            case PrintedRow():
+                yield _block("<mspace width='2em'></mspace>".join(map(equation, item.lines)))
+            case PrintedSentence():
+                yield f"<p {LEFT}>{words(item)}</p>"
+            case PrintedGroup():
+                lines = "".join(
+                    _line(parts.names, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
+                )
+                yield f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"
+
+
+# -- LaTeX -------------------------------------------------------------------------------------------------------------
+
+
+def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
+    """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
+    printed = PrintedEquations(equations, digits)
+    if equations.mobility.n_dof == 0:
+        lines = [_text(STILL)]
+    elif printed.is_long:
+        lines = [*_latex_parts(PrintedParts(printed))]
+    else:
+        lines = [
+            *_latex_motion(printed),
+            *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
+        ]
+    lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
+    if printed.sampled:
+        lines.append(_text(SAMPLED))
+        lines += [_broken(printed.names, latex(state, printed.names), x) for state, x in printed.sampled]
+    if told := printed.told:
+        lines.append(_text(told))
+    values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
+    return [*lines, rf"\text{{with }} {values}"] if values else lines
+
+
+def equations_latex(equations: Readable) -> str:
+    """The same as Jupyter prints it, each formula in a line of its own."""
+    lines = latex_lines(equations, ROUNDED)
+    if len(lines) == 1:
+        return f"$\\displaystyle {lines[0]}$"
+    return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
+
+
+def _text(words: str) -> str:
+    return rf"\text{{{words.replace('_', chr(92) + '_')}}}"
+
+
+def _latex_motion(printed: PrintedEquations) -> Iterator[str]:
+    def shown(formula: Formula) -> str:
+        return latex(formula, printed.names)
+
+    rates = [shown(x) for x in printed.accelerations]
+    if printed.is_one_equation and printed.fits:
+        M, f = printed.mass_matrix[0][0], printed.force[0]
+        factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
+        yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
+        return
+    left = shown(MatrixOf(tuple(map(tuple, printed.mass_matrix))))
+    right = shown(MatrixOf(tuple((x,) for x in printed.force)))
+    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
+    if len(rates) > 1 and printed.fits:
+        yield f"{left} {v} = {right}"
+        return
+    mass, _, right = printed.letters
+    yield rf"{mass}\, {rates[0] if printed.is_one_equation else v} = {right}"
+    whole = len(rates) > 1 and printed.mass_matrix_fits
+    if whole:
+        yield f"{mass} = {left}"
+    for entry in printed.entries():
+        if not (whole and entry.letter == mass):
+            comma = "," if len(rates) > 9 else ""
+            label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
+            yield _broken(printed.names, label, entry.formula)
+
+
+def _broken(names: Notation, label: str, formula: Formula) -> str:
+    """A formula; a long sum in lines of its terms."""
+    lines = sums_in_lines(formula, names)
+    shown = [latex(line, names) for line in lines]
+    if len(shown) == 1:
+        return f"{label} = {shown[0]}"
+    others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
+    body = r" \\ & \quad ".join([shown[0], *others])
+    return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
+
+
+def _latex_parts(parts: PrintedParts) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+
+    def shown(formula: Formula) -> str:
+        return latex(formula, parts.names)
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(_text(x) if isinstance(x, str) else shown(x) for x in sentence.pieces)
+
+    for item in parts.items():
+        match item:
+            case PrintedRow():
+                yield r" \qquad ".join(f"{shown(line.left)} = {shown(line.right)}" for line in item.lines)
+            case PrintedSentence():
+                yield words(item)
+            case PrintedGroup():
+                yield words(item.title)
+                yield from (_broken(parts.names, shown(line.left), line.right) for line in item.lines)
