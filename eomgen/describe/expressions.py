@@ -20,7 +20,6 @@ from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WRENCH, function_words, nearest
 from .reaction_texts import multiplier_in, reaction_in, wrench_in
-from .typing_slips import find_slip
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -146,6 +145,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
 
 def _refuse_slip(text: str) -> None:
     """Raise ExpressionError if a text that is no expression has a slip that is known, such as a decimal comma."""
+    from .typing_slips import find_slip  # rarely needed
+
     slip = find_slip(text)
     if slip is not None:
         raise ExpressionError(slip.message, slip.column, slip.remedy, text)

@@ -23,7 +23,6 @@ from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from ..kinematics.energies import potential_energy
 from ..kinematics.mobility import Mobility
-from ..simplify import WHOLE, joined_nodes, simplify
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -141,6 +140,8 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
         for j in range(3)
     ]
     values = [x for _, x in entries]
+    from ..simplify import joined_nodes  # nothing is simplified until equations are read
+
     joined, _ = joined_nodes([*expressions, *values], (), kinematics.euler_parameters)
     whole, values = joined[: len(expressions)], joined[len(expressions) :]
     if not entries:
@@ -235,6 +236,8 @@ def write(
     """
     if not expressions:
         return Written([], [])
+    from ..simplify import WHOLE, joined_nodes, simplify
+
     expressions, given = joined_nodes(expressions, given, unit)
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
     if form is None:

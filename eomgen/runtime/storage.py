@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -154,6 +153,8 @@ def _write_for_others(trajectory: TrajectoryLike, target: Path) -> Path:
 def write_netcdf(made: xarray.Dataset, target: Path) -> Path:
     """Write a Dataset to a file that is there whole, or not at all."""
     require("h5netcdf", "h5netcdf h5py", "a .nc file")
+    from tempfile import TemporaryDirectory
+
     with TemporaryDirectory() as folder, whole_file(target) as file:
         part = Path(folder, "part.nc")
         made.to_netcdf(part, engine="h5netcdf")
