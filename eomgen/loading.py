@@ -1,4 +1,4 @@
-"""From the suffix of a file, or the name of an example, to a Model: through describe, or through robots."""
+"""From the suffix of a file, or the name of an example, to a Model: through describe, or through importers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def load(
     **robot
         For robots: ``mimic`` ('coupling', the default, or 'independent'), ``limits`` ('note', the default, 'stop' or
         'off'), ``floating``, ``lock`` and the other fields of
-        :class:`eomgen.robots.RobotOptions`.
+        :class:`eomgen.importers.RobotOptions`.
 
     Returns
     -------
@@ -64,14 +64,14 @@ def load(
     path = as_name("path", path)
     suffix = os.path.splitext(path)[1].lower()
     if suffix in ROBOTS:
-        from .robots import describe_file  # only where it is needed: MJCF brings its own compiler
+        from .importers import describe_file  # only where it is needed: MJCF brings its own compiler
 
         checks = {} if check_inertia is None else {"check_inertia": check_inertia}
         return _with_notes(Model.from_description(describe_file(path, **checks, **robot)))
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
-        from .robots.robot import CONVERTED
+        from .importers.robot import CONVERTED
 
         if suffix in CONVERTED:
             raise bad_file(f"{path}: files with the ending {suffix} cannot be loaded; {CONVERTED[suffix]}")

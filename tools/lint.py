@@ -27,7 +27,7 @@ SMALL = 5e-4
 NO_LIMITS = {
     "numeric/closure.py": {1e-8},
     "codegen/loops/loop_blocks.py": {1e-100},
-    "robots/robot.py": {1e-11},
+    "importers/robot.py": {1e-11},
     "rotations/quaternions.py": {1e-4},
     "verification/digits.py": {1e-6},
 }
@@ -199,7 +199,7 @@ def keywords() -> Iterator[str]:
         "BuildOptions": arguments("compilation.compiler", "Options"),
         "StepOptions": bound | set(import_module("eomgen.ensembles.simulate_many").OPTIONS),
         "ReducedOptions": bound | set(import_module("eomgen.simulation.sensitivities").OPTIONS),
-        "RobotKeywords": arguments("robots", "RobotOptions", "check_inertia"),
+        "RobotKeywords": arguments("importers", "RobotOptions", "check_inertia"),
         "LoadOptions": arguments("loading", "load", "path", "robot") | robot,
         "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},
         "FilmOptions": arguments("show.animate", "animate_mode", "x", "shape", *shown),

@@ -97,7 +97,7 @@ MADE_BY_USERS = (
     "eomgen.Model",
     "eomgen.runtime.signals.Signal",
     "eomgen.compilation.compiler.Options",
-    "eomgen.robots.robot.RobotOptions",
+    "eomgen.importers.RobotOptions",
 )
 
 

@@ -24,7 +24,7 @@ from .sections import verb_command
 from .shared_options import json_option
 
 CORE = ("sympy", "numpy", "scipy", "threadpoolctl", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs",
-        "defusedxml", "pint")  # fmt: skip
+        "pint")  # fmt: skip
 #: extra -> (what it is for, its packages besides those that are always needed)
 EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),

@@ -84,7 +84,7 @@ class BuildOptions(TypedDict, total=False):
 
 
 class RobotKeywords(TypedDict, total=False):
-    """Fields of :class:`eomgen.robots.RobotOptions`, besides ``check_inertia``."""
+    """Fields of :class:`eomgen.importers.RobotOptions`, besides ``check_inertia``."""
 
     floating: bool
     rotation: str

@@ -92,12 +92,11 @@ SHARP = 1e-8
 
 
 # -- XML -------------------------------------------------------------------------------------------------------------
-SIZE = 20_000_000  #: bytes of one XML file, and of all that make one model
-ELEMENTS = 100_000  #: of one file, and of a model once its files are put together
-PIECE = 2_000_000  #: bytes between two ">": a tag with its attributes, a comment, a text
-DEPTH = 200  #: nesting, also of a model once its files are put together
+SIZE = 20_000_000  #: bytes of one XML file
+ELEMENTS = 100_000  #: of one file
+DEPTH = 200  #: nesting
 LONGEST = 200_000  #: characters of one attribute
-FILES = 200  #: XML files that a model may be made of
+FILES = 200  #: XML files of a model that are looked at for lines
 
 # -- numbers ---------------------------------------------------------------------------------------------------------
 #: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
@@ -110,13 +109,6 @@ IMPEDANCE = 1e-4
 FREEDOMS = 800  #: coordinates of its joints; checking a model of so many takes 10 s
 TIES = 800  #: joints that close loops, couplings, drives
 LAWS = 10_000_000  #: characters of the laws of all drives, which tendons of many joints multiply
-
-# -- MJCF ------------------------------------------------------------------------------------------------------------
-NAME = 1_000  #: characters of the name of a file
-COPIES = 10_000  #: bodies that <replicate>, <composite> and <flexcomp> may make, themselves counted, over all files
-PIXELS = 16_384  #: width or height of a texture, rows or columns of a height field
-ENTRIES = 1_000_000  #: any number in <size>: keys, numbers of users, contacts
-MESHES = 200_000_000  #: bytes of all meshes of a model
 
 # -- meshes of solids ------------------------------------------------------------------------------------------------
 MESH = 100_000_000  #: bytes of an STL file: two million triangles, which take 15 s and 1e9 bytes to measure

@@ -1,4 +1,4 @@
-"""Robots, URDF: the elements of a file -> a Robot.
+"""Importers, URDF: the elements of a file -> a Robot.
 
 The format is that of ROS (wiki.ros.org/urdf/XML): the frame of a link is the frame of the joint that carries it, axes
 are given in that frame (default x), angles are fixed-axis roll, pitch, yaw.  Meshes are named, never read.
@@ -16,10 +16,21 @@ from ..base.limits.numbers import LARGEST
 from ..base.value_rules import SWITCH
 from ..describe.joint_data import limits_nothing
 from ..errors import ModelError
-from .robot import CONVERTED, Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
-from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
-from .urdf_constructs import LOOPS, note_urdf
-from .xml_text import XmlElement
+from .robot import (
+    CONVERTED,
+    IDENTITY,
+    NOTHING,
+    Inertia,
+    Loop,
+    Mimic,
+    Placement,
+    Robot,
+    RobotJoint,
+    RobotLink,
+    RobotOptions,
+    placed,
+)
+from .xml_file import DATA, HARMLESS, LEFT, TAKEN, Constructs, XmlElement
 
 #: Type of a joint in URDF -> eomgen's.
 TYPES = {
@@ -33,6 +44,8 @@ TYPES = {
 #: Those of joints that close loops: also balls, and none that leaves all six directions free.
 LOOP_TYPES = {**TYPES, "spherical": "spherical", "ball": "spherical"}
 del LOOP_TYPES["floating"]
+#: Elements of joints that close loops: Drake's and Isaac Sim's, and those of others.
+LOOPS = ("loop_joint", "loop_constraint", "loop")
 #: Elements of the two links of such a joint, first and second, in Drake's dialect and others; each may have its frame
 #: as its own attributes, or as those of an element named so with ``_origin``.
 ENDS = (("link1", "parent", "predecessor"), ("link2", "child", "successor"))
@@ -42,6 +55,72 @@ LINKS = 5000  #: links of a robot
 UNEXPANDED = {f"xacro:{word}" for word in ("include", "macro", "if", "unless", "insert_block", "element")}
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.ASCII)
 _SPECIAL = {"inf", "-inf", "+inf", "infinity", "-infinity", "nan", "-nan"}
+
+_REASONS = {
+    "taken": (TAKEN, "becomes part of the model"),
+    "limits": (DATA, "limits; a note names the joints (option `limits`)"),
+    "friction": (DATA, "dry friction; it acts with the option `friction`, else a note names the joints"),
+    "contact": (LEFT, "shapes that touch, and contact"),
+    "drives": (LEFT, "drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor)"),
+    "control": (LEFT, "limits and reference positions of controllers"),
+    "loop": (LEFT, "limits, friction and couplings of joints that close loops"),
+    "xacro": (LEFT, "elements of xacro that it did not expand"),
+    "dialect": (LEFT, "words of other formats and simulators"),
+    "soft": (LEFT, "soft bodies"),
+    "looks": (HARMLESS, "what it looks like; shapes become `display`"),
+    "measure": (HARMLESS, "sensors"),
+    "label": (HARMLESS, "labels"),
+}
+
+
+def _path_of(parent: str, tag: str) -> str:
+    if not parent or tag.startswith("xacro:"):
+        return "xacro" if parent else "robot"
+    return tag if parent == "robot" else f"{parent}/{tag}"
+
+
+_ENDS = [f"{loop}/{end}" for loop in LOOPS for end in (*ENDS[0], *ENDS[1])]
+URDF = Constructs(
+    f"""
+    robot: taken name
+    robot: label version
+    link: taken name
+    link: label type
+    link: contact concave
+    link/inertial: taken
+    link/inertial/origin, joint/origin: taken xyz rpy
+    link/inertial/mass: taken value
+    link/inertial/inertia: taken ixx ixy ixz iyy iyz izz
+    joint: taken name type
+    joint: label dont_collapse
+    joint/parent, joint/child: taken link
+    joint/axis: taken xyz
+    joint/axis: dialect rpy
+    joint/mimic: taken joint multiplier offset
+    joint/dynamics: taken damping
+    joint/dynamics: friction friction
+    joint/dynamics: dialect D K mu_coulomb mu_viscous spring_reference spring_stiffness
+    joint/limit: limits lower upper velocity effort
+    joint/limit: control command_effort current gear_velocity twist
+    {", ".join(LOOPS)}: taken name type
+    {", ".join(f"{loop}/axis" for loop in LOOPS)}: taken xyz
+    {", ".join(_ENDS)}: taken link xyz rpy
+    {", ".join(f"{end}_origin" for end in _ENDS if "link" not in end)}: taken xyz rpy
+    {", ".join(f"{loop}/{tag}" for loop in LOOPS for tag in ("limit", "dynamics", "mimic"))}: loop **
+    joint/safety_controller, joint/calibration: control **
+    link/collision, link/contact, link/surface, link/self_filter, link/collision_checking: contact **
+    transmission, ros2_control: drives **
+    gazebo, mujoco, drake:collision_filter_group: dialect **
+    joint/joint_properties, link/gravity, link/kinematic, link/origin: dialect **
+    deformable: soft **
+    link/visual, material: looks **
+    sensor: measure **
+    xacro: xacro **
+    """,
+    _REASONS,
+    _path_of,
+    {},
+)
 
 
 def _color(material: XmlElement) -> str:
@@ -68,36 +147,53 @@ class _UrdfReader:
         self.colors = {m.attributes.get("name", ""): c for m in reversed(materials) if (c := _color(m))}
 
     def read(self) -> Robot:
-        robot = self.robot
-        for part in self.root.children:
+        robot, root = self.robot, self.root
+        for part in root.children:
             read = part.tag in ("link", "joint", *LOOPS)  # elsewhere, "${" may be of ROS or Gazebo
             for element in part.walk():
                 if element.tag in UNEXPANDED or (read and any("${" in x for x in element.attributes.values())):
                     raise ModelError([element.problem("robot", "is a xacro file", CONVERTED[".xacro"], code="EG-FILE")])
-        if len(self.root.children) > 20 * LINKS:
-            raise ModelError(
-                [self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}", code="EG-TOO-LARGE")]
-            )
-        for element in self.root.children:
+        if len(root.children) > 20 * LINKS:
+            message, most = "has too many elements", f"at most {20 * LINKS:,}"
+            raise ModelError([root.problem("robot", message, most, "EG-TOO-LARGE")])
+        for element in root.children:
             if element.tag == "link":
                 self._link(element)
             elif element.tag == "joint":
                 self._joint(element)
             elif element.tag in LOOPS:
                 self._loop(element)
-        robot.notes += note_urdf(self.root)
+        self._note_the_rest()
         if not robot.links:
-            robot.problems.append(
-                self.root.problem("robot", "has no links", "a URDF file has <link> elements", code="EG-MISSING")
-            )
+            self.fault(root, "robot", "has no links", "a URDF file has <link> elements", "EG-MISSING")
         if len(robot.links) > LINKS:
-            raise ModelError(
-                [self.root.problem("robot", f"has {len(robot.links)} links", f"at most {LINKS}", code="EG-TOO-LARGE")]
-            )
+            message = f"has {len(robot.links)} links"
+            raise ModelError([root.problem("robot", message, f"at most {LINKS}", "EG-TOO-LARGE")])
         return robot
 
+    def _note_the_rest(self) -> None:
+        """Notes on what a file has that the model has not."""
+        notes = self.robot.notes
+        notes += URDF.notes(self.root)
+        pairs = (("parent", "child"), ("predecessor", "successor"))
+        for child in self.root.children:
+            for element in child.walk() if child.tag not in ("link", "joint", *LOOPS) else ():
+                if element.tag.endswith(("constraint", "equality")) or any(
+                    element.find(a) is not None and element.find(b) is not None for a, b in pairs
+                ):
+                    what = " ".join([f"<{element.tag}>", element.attributes.get("name", "")]).strip()
+                    notes.append(
+                        f"left out: {what} in line {element.line}, which ties links or joints: the model may move more "
+                        "freely than the robot; <loop_joint> and <mimic> are read"
+                    )
+            for tag in dict.fromkeys(x.tag for x in child.children) if child.tag in ("link", "joint") else ():
+                row, count = URDF.find(f"{child.tag}/{tag}"), len(child.all(tag))
+                if count > 1 and row is not None and row.fate in (TAKEN, DATA):
+                    name = child.attributes.get("name", "")
+                    notes.append(f"{child.tag}.{name}: {count} <{tag}>; only the first is used")
+
     # -- values ---------------------------------------------------------------------------------------------------
-    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "", code: str = "") -> None:
+    def fault(self, element: XmlElement, path: str, message: str, remedy: str, code: str) -> None:
         self.robot.problems.append(element.problem(path, message, remedy, code))
 
     def number(
@@ -115,9 +211,8 @@ class _UrdfReader:
     def _finite(self, element: XmlElement, path: str, text: str, most: float = LARGEST) -> float:
         value = float(text) if _NUMBER.match(text.strip()) else math.nan
         if most < abs(value) < math.inf:
-            self.fault(
-                element, path, f"{value:g} is too large", f"at most {most:g}, so that products stay finite", "EG-RANGE"
-            )
+            remedy = f"at most {most:g}, so that products stay finite"
+            self.fault(element, path, f"{value:g} is too large", remedy, "EG-RANGE")
             return 0.0
         if not math.isfinite(value):
             shown = text if len(text) <= 40 else text[:37] + "..."
@@ -140,14 +235,12 @@ class _UrdfReader:
         x, y, z = (self._finite(element, f"{path}.{key}", part) for part in parts)
         return (x, y, z)
 
-    def origin(self, element: XmlElement, path: str) -> Placement:
-        """The placement that ``<origin xyz rpy>`` gives."""
-        origin = element.find("origin")
-        if origin is None:
+    def placement(self, element: XmlElement | None, path: str) -> Placement:
+        """The placement that ``xyz`` and ``rpy`` of an element give."""
+        if element is None:
             return IDENTITY
-        o = (0.0, 0.0, 0.0)
-        position = self.triple(origin, "xyz", f"{path}.origin", o)
-        return placed(position, self.triple(origin, "rpy", f"{path}.origin", o), self.options.snap)
+        position, rpy = (self.triple(element, key, path, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+        return placed(position, rpy, self.options.snap)
 
     def name(self, element: XmlElement) -> str | None:
         """The name of a link or joint, if it is given and new."""
@@ -177,7 +270,7 @@ class _UrdfReader:
         )
 
     def _inertial(self, element: XmlElement, path: str) -> Inertia:
-        frame = self.origin(element, path)
+        frame = self.placement(element.find("origin"), f"{path}.origin")
         weight, tensor = element.find("mass"), element.find("inertia")
         mass = 0.0
         if weight is None:
@@ -217,7 +310,7 @@ class _UrdfReader:
         else:
             return None
         own = "" if material is None else _color(material) or self.colors.get(material.attributes.get("name", ""), "")
-        return self.origin(element, path), shape | ({"color": own} if own else {})
+        return self.placement(element.find("origin"), f"{path}.origin"), shape | ({"color": own} if own else {})
 
     def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
@@ -260,7 +353,7 @@ class _UrdfReader:
             parent=ends["parent"],
             child=ends["child"],
             place=(element.file, element.line),
-            outer=self.origin(element, path),
+            outer=self.placement(element.find("origin"), f"{path}.origin"),
             axis=direction,
             limits=self._limits(element, path, given) if one_degree else {},
             damping=0.0 if dynamics is None else self.number(dynamics, "damping", f"{path}.dynamics", 0.0),
@@ -294,19 +387,11 @@ class _UrdfReader:
             end = next((found for word in words if (found := element.find(word)) is not None), None)
             link = end.attributes.get("link", "") if end is not None else ""
             if end is None or not link:
-                self.fault(
-                    element,
-                    f"{path}.{words[0]}",
-                    "is missing",
-                    f'give <{words[0]} link="..." xyz= rpy=/>',
-                    "EG-MISSING",
-                )
+                remedy = f'give <{words[0]} link="..." xyz= rpy=/>'
+                self.fault(element, f"{path}.{words[0]}", "is missing", remedy, "EG-MISSING")
                 return
-            at, o = element.find(f"{end.tag}_origin") or end, (0.0, 0.0, 0.0)
-            where = f"{path}.{at.tag}"
-            ends.append(
-                (link, placed(self.triple(at, "xyz", where, o), self.triple(at, "rpy", where, o), self.options.snap))
-            )
+            at = element.find(f"{end.tag}_origin") or end
+            ends.append((link, self.placement(at, f"{path}.{at.tag}")))
         axis = self._axis(element, path, kind)
         self.robot.loops.append(Loop(name, kind or "weld", ends[0], ends[1], (element.file, element.line), axis))
 

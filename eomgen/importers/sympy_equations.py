@@ -1,19 +1,31 @@
-"""Stage describe, equations that SymPy's mechanics formed: a method object -> Description with given equations."""
+"""Importers, equations that SymPy's mechanics formed: a method object -> Description with given equations."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..errors import ModelError, Problem, ill_typed
-from .description import Description
-from .names import nearest
-from .printed_names import give_latex
-from .scope import RATES
-from .sympy_auxiliary import put, solve_auxiliary
-from .sympy_face import function_name, is_sympy, name_of, named, names_of, one_or_several
-from .sympy_forms import Forms, read_forms
-from .sympy_names import SympyNames
+import numpy as np
+
+from ..base import algebra
+from ..base.limits.constraints import GIVEN as SMALL
+from ..base.limits.numbers import ROUNDED
+from ..describe.description import Description
+from ..describe.input_names import rate_of
+from ..describe.names import nearest
+from ..describe.printed_names import give_latex
+from ..describe.scope import RATES
+from ..describe.sympy_face import function_name, is_sympy, lower_sympy, name_of, named, names_of, one_or_several
+from ..describe.sympy_names import SympyNames
+from ..errors import ExpressionError, ModelError, Problem, ill_typed
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jacobian, jvp
+from ..graph.evaluate import evaluate
+from ..graph.rounding_bounds import with_bounds
+from ..graph.substitute import substitute, symbols_of
+from .sympy_mechanics import Forms, read_forms, replaced, solve_auxiliary
+
+TRIES = 5  #: places at which the rank of constraints is looked for
 
 
 def describe_method(
@@ -29,7 +41,7 @@ def describe_method(
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
-    if not isinstance(inputs, Mapping):
+    if listed := not isinstance(inputs, Mapping):
         inputs = one_or_several(inputs)
     arguments = (parameters, inputs, outputs, initial, specified, potential_energy, guess)
     renamed = SympyNames([vars(forms), *arguments], forms.q)
@@ -40,31 +52,28 @@ def describe_method(
     extra = named("outputs", outputs)
     if specified is not None and named("specified", specified):
         _specify(forms, extra, specified)
-    known = _Known(forms)
+    known = _Names(forms)
     given_parameters = named("parameters", parameters)
-    given_inputs = (
-        named("inputs", inputs)
-        if isinstance(inputs, Mapping)
-        else dict.fromkeys(names_of("inputs", inputs, "an input"), 0.0)
-    )
+    given_inputs = dict.fromkeys(names_of("inputs", inputs, "an input"), 0.0) if listed else named("inputs", inputs)
     forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
-    extra = {name: put(expression, forces) for name, expression in extra.items()}
+    extra = {name: replaced(expression, forces) for name, expression in extra.items()}
     noncontributing = {str(name_of(force)): value for force, value in forces.items()}
-    contents = [*_contents(forms), *forms.intermediates.values(), *extra.values(), *noncontributing.values()]
+    flat = [x for row in forms.mass_matrix for x in row]
+    contents = [*forms.rates.values(), *flat, *forms.forcing, *forms.configuration, *forms.motion, forms.kinetic]
+    contents += [forms.potential, *forms.intermediates.values(), *extra.values(), *noncontributing.values()]
     constants, functions = known.sort(contents, given_inputs)
     problems = known.problems
     for key in given_parameters:
         if key not in constants:
             near = nearest(str(key), constants, "constants")
-            problems.append(
-                Problem(f"parameters.{key}", f"the equations have no constant {key!r}", near, code="EG-NAME-UNKNOWN")
-            )
+            message = f"the equations have no constant {key!r}"
+            problems.append(Problem(f"parameters.{key}", message, near, code="EG-NAME-UNKNOWN"))
     if problems:
         raise ModelError(problems)
 
     taken = {*constants, *functions, *known.names}
-    configuration, motion, independent = _independent_rows(forms, constants, functions)
-    rows = [*configuration, *motion]
+    kept, independent = _independent_rows(forms, constants, functions)
+    rows = [*forms.configuration, *(forms.motion[k] for k in kept)]
     equations: dict[str, Any] = {
         "coordinates": [name_of(x) for x in forms.q],
         "velocities": [name_of(x) for x in forms.v],
@@ -104,14 +113,7 @@ def describe_method(
     return renamed.noted(description)
 
 
-def _contents(forms: Forms) -> list[Any]:
-    """Everything the equations are made of."""
-    flat = [x for row in forms.mass_matrix for x in row]
-    rest = [forms.kinetic, forms.potential]
-    return [*forms.rates.values(), *flat, *forms.forcing, *forms.configuration, *forms.motion, *rest]
-
-
-class _Known:
+class _Names:
     """Coordinates and speeds by name, and what else stands in expressions."""
 
     def __init__(self, forms: Forms) -> None:
@@ -121,13 +123,11 @@ class _Known:
         for k, x in enumerate([*forms.q, *forms.v]):
             name = name_of(x)
             if not isinstance(name, str):
-                self.problems.append(
-                    Problem("equations", f"{x} is not a function of the time t", "use dynamicsymbols", code="EG-TYPE")
-                )
+                message = f"{x} is not a function of the time t"
+                self.problems.append(Problem("equations", message, "use dynamicsymbols", code="EG-TYPE"))
             elif name in self.names:
-                self.problems.append(
-                    Problem("equations", f"the name {name!r} is given twice", "rename one", code="EG-NAME-TAKEN")
-                )
+                message = f"the name {name!r} is given twice"
+                self.problems.append(Problem("equations", message, "rename one", code="EG-NAME-TAKEN"))
             self.names[str(name) if isinstance(name, str) else f"?{k}"] = x
         motion = [f"{name_of(x)}{suffix}" for x in forms.q for suffix in RATES]
         self.motion = {*motion, *(f"{name_of(x)}_dot" for x in forms.v), *self.names}
@@ -164,10 +164,11 @@ class _Known:
         driven = [name for name in symbols if name in inputs]
         for name in inputs:
             if name not in functions and name not in symbols:
-                near = nearest(str(name), [*functions, *symbols], "known")
-                self.problems.append(
-                    Problem(f"inputs.{name}", f"the equations do not contain {name!r}", near, code="EG-NAME-UNKNOWN")
+                near, message = (
+                    nearest(str(name), [*functions, *symbols], "known"),
+                    f"the equations do not contain {name!r}",
                 )
+                self.problems.append(Problem(f"inputs.{name}", message, near, code="EG-NAME-UNKNOWN"))
         constants = [name for name in symbols if name not in self.names and name not in driven]
         return sorted(set(constants) - functions), sorted({*functions, *driven})
 
@@ -178,20 +179,83 @@ def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]
         if not is_sympy(key) or function_name(key) is None:
             raise ill_typed(f"specified takes functions of time f(t), not {key!r}")
 
-    vars(forms).update(put(vars(forms), specified))
-    outputs.update(put(outputs, specified))
+    vars(forms).update(replaced(vars(forms), specified))
+    outputs.update(replaced(outputs, specified))
 
 
-def _independent_rows(
-    forms: Forms, constants: Sequence[str], functions: Sequence[str]
-) -> tuple[list[Any], list[Any], bool]:
-    """Constraints without those of velocities that follow from the others, and whether the rest are independent.
+def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:
+    """Which rows of ``forms.motion`` are not derivatives of the configuration constraints nor follow from others.
 
     Judged on the graph at a generic place, where rows depend on each other only if they do everywhere.
-    """
-    from .constraint_rank import independent_rows
 
+    Returns
+    -------
+    kept : list of int
+    independent : bool
+        Whether those and the configuration constraints are independent of each other.
+
+    Raises
+    ------
+    ModelError
+        A constraint contradicts the others.
+    """
     if not forms.motion and not forms.configuration:
-        return [], [], True
-    kept, independent = independent_rows(forms, constants, functions)
-    return forms.configuration, [forms.motion[k] for k in kept], independent
+        return [], True
+    graph = Graph()
+    names = {name_of(x): graph.symbol(name_of(x)) for x in (*forms.q, *forms.v)}
+
+    def resolve(name: str) -> Expr:
+        return {**rates, **names}.get(name, graph.symbol(name))
+
+    rates: dict[str, Expr] = {}
+    try:
+        for symbol, part in forms.intermediates.items():
+            names[symbol.name] = lower_sympy(graph, part, resolve)
+        slopes = [lower_sympy(graph, rate, resolve) for rate in forms.rates.values()]
+        for x, rate in zip(forms.q, slopes, strict=True):
+            rates[f"{name_of(x)}_dot"] = rate
+        configuration = [lower_sympy(graph, row, resolve) for row in forms.configuration]
+        motion = [lower_sympy(graph, row, resolve) for row in forms.motion]
+    except ExpressionError:  # the check of the model tells what is wrong
+        return list(range(len(forms.motion))), False
+    along = {names[name_of(x)]: rate for x, rate in zip(forms.q, slopes, strict=True)}
+    along |= {graph.symbol(f): graph.symbol(rate_of(f)) for f in functions} | {graph.symbol("t"): graph.one}
+    rows = [*jvp(configuration, along), *motion]
+    v = [names[name_of(x)] for x in forms.v]
+    entries = jacobian(rows, v)
+    constant = substitute(rows, dict.fromkeys(v, graph.zero))
+    used = symbols_of([*constant, *entries.values()])
+    random = np.random.default_rng(0)
+    for _ in range(TRIES):  # a place may lie outside the domain of a root
+        values = {name: float(random.uniform(0.3, 1.2)) for name in sorted(used)}
+        matrix, rounding = np.zeros((len(rows), len(v))), np.zeros((len(rows), len(v)))
+        for place, value, bound in zip(entries, *with_bounds(list(entries.values()), values), strict=True):
+            matrix[place], rounding[place] = value, ROUNDED * bound
+        right = np.array(evaluate(constant, values), dtype=float)
+        if np.isfinite(matrix).all() and np.isfinite(right).all():
+            break
+    else:
+        return list(range(len(motion))), False
+    basis = np.empty((0, len(v)))
+    fresh: list[bool] = []
+    for row, noise in zip(matrix, rounding, strict=True):
+        length = np.linalg.norm(row)
+        left = row - basis.T @ (basis @ row)
+        left -= basis.T @ (basis @ left)
+        size = np.linalg.norm(left)
+        fresh.append(bool(size > SMALL * length and size > np.linalg.norm(noise)))
+        if fresh[-1]:
+            basis = np.vstack([basis, left / size])
+    h = len(configuration)
+    own = [k for k, new in enumerate(fresh) if new]
+    for k in [k for k, new in enumerate(fresh) if not new]:
+        factors = algebra.lstsq(matrix[own].T, matrix[k], rcond=None)
+        largest = max(1.0, float(abs(right[k])), float(np.abs(factors).max(initial=0)))
+        if abs(right[k] - factors @ right[own]) > SMALL * largest:
+            which = f"configuration constraint {k + 1}" if k < h else f"velocity constraint {k - h + 1}"
+            message = (
+                f"{which} contradicts the others: it has the same velocity terms as they have, but other "
+                "remaining terms"
+            )
+            raise ModelError([Problem("equations.constraints", message, f"check the {which}", code="EG-REDUNDANT")])
+    return [k for k in range(len(motion)) if fresh[h + k]], all(fresh[:h])

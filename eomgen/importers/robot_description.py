@@ -1,9 +1,9 @@
-"""Robots, the end: a Robot -> the Description that a model file would give."""
+"""Importers, the end: a Robot -> the Description that a model file would give."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,15 @@ import numpy as np
 from ..base.limits.numbers import FREEDOMS, LARGEST, LAWS, TIES
 from ..base.value_rules import EXCESS, fault_of_inertia
 from ..describe.description import GROUND_NAME, Description, Values
+from ..describe.names import LONGEST, clean_name, fault_of_model_name, unique
 from ..describe.placement import TURNS
+from ..describe.scope import RATES
 from ..errors import ModelError, Problem
 from ..joints import JOINTS
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
-from .link_names import RobotNames, clean_model_name
-from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies
-from .robot import Drive, Range, Robot, RobotJoint, RobotOptions, Sum, Tie, describe_tie
-from .robot_frames import IDENTITY, Inertia, Placement, numbers
+from .robot import IDENTITY, Drive, Inertia, Placement, Range, Robot, RobotJoint, RobotOptions, Sum, Tie, numbers
+from .robot_tree import GROUND, Bodies, RobotBody, build_bodies
+from .xml_file import some_of
 
 SHOWN = 8  #: joints that a note names
 #: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
@@ -39,39 +40,74 @@ def describe_robot(robot: Robot, options: RobotOptions) -> Description:
     return _Writer(robot, options, build_bodies(robot, options)).describe()
 
 
+class _Names:
+    """Names a model may use, of whatever a robot file calls its links and joints, and what became of each.
+
+    Characters other than letters, digits and underscores become underscores; a name that does not start with a letter
+    gets the prefix of its kind; words of Python, C and of expressions get an underscore after them; what is then not
+    unique gets a number.  Bodies and joints have a list each; coordinates, parameters and inputs share one.
+    """
+
+    def __init__(self) -> None:
+        self.taken = {"ground link"}  # names of bodies and of joints with their kind behind, and symbols
+        self.renamed: dict[str, dict[str, str]] = {}  # section of the model -> old name -> new
+
+    def link(self, name: str) -> str:
+        """The name of a body or marker."""
+        return self._note("bodies", name, self.made(name))
+
+    def joint(self, name: str, suffixes: Sequence[str], made: bool = False) -> str:
+        """The name of a joint whose coordinates are that name with these suffixes; ``made`` for one not in the file."""
+        symbols = (suffix + rate for suffix in suffixes for rate in RATES)
+        result = unique(name, "joint", self.taken, (" joint", *symbols))
+        return result if made else self._note("joints", name, result)
+
+    def symbol(self, name: str) -> str:
+        """The name of a parameter or an input."""
+        return self._note("inputs", name, unique(name, "symbol", self.taken))
+
+    def made(self, name: str) -> str:
+        """The name of an element that the file does not name, of which no note tells."""
+        return unique(name, "link", self.taken, (" link",))
+
+    def _note(self, section: str, name: str, result: str) -> str:
+        if result != name:
+            self.renamed.setdefault(section, {})[name] = result
+        return result
+
+
 class _Writer:
     """Fills one Description."""
 
     def __init__(self, robot: Robot, options: RobotOptions, found: Bodies) -> None:
         self.robot, self.options, self.found = robot, options, found
         gravity = robot.gravity if options.gravity is None else options.gravity
-        self.out = Description(
-            values={"name": clean_model_name(robot.name), "gravity": gravity}, lines={"": (robot.file, 1)}
-        )
+        name = clean_name(robot.name, "robot")[:LONGEST]
+        name = f"{name[: LONGEST - 6]}_model" if fault_of_model_name(name) else name
+        self.out = Description(values={"name": name, "gravity": gravity}, lines={"": (robot.file, 1)})
         self.out.notes = list(robot.notes)
         check = "note" if found.massless and options.check == "error" else options.check
         if check != "error":
             self.out.values["check_inertia"] = check
         if options.limits != "note":
             self.out.values["limits"] = "off"
-        self.names = RobotNames()
+        self.names = _Names()
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
-        self.tied = find_tied(robot, found)
-        self.carried = weigh_bodies(found)
+        self.tied = found.tied(robot)
+        self.loads = found.loads()
 
     def describe(self) -> Description:
-        moving = [body for body in self.found.bodies.values() if body.joint is not None]
-        self._bound(sum(len(self._suffixes(body.joint.type)) for body in moving if body.joint is not None))
-        for body in moving:
-            assert body.joint is not None
-            rates = ("_wx", "_wy", "_wz") if self._in_parameters(body.joint.type) else ()
-            self.joints[body.joint.name] = self.names.joint(body.joint.name, [*self._suffixes(body.joint.type), *rates])
+        moving = self.found.moving
+        self._bound(sum(len(self._suffixes(joint.type)) for _, joint in moving))
+        for _, joint in moving:
+            suffixes = [*self._suffixes(joint.type), *self._rates(joint.type)]
+            self.joints[joint.name] = self.names.joint(joint.name, suffixes)
         for body in self.found.bodies.values():
             self._body(body)
-        for body in moving:
-            self._joint(body)
+        for body, joint in moving:
+            self._joint(body, joint)
         self._loops()
         self._mimics()
         self._drives()
@@ -89,8 +125,8 @@ class _Writer:
             (len(robot.drives), TIES, "drives"),
         ):
             if count > most:
-                message = f"has {count:,} {what}"
-                robot.problem("robot", message, f"at most {most:,}; {remedy}", (robot.file, 1), code="EG-TOO-LARGE")
+                message, place = f"has {count:,} {what}", (robot.file, 1)
+                robot.problem("robot", message, f"at most {most:,}; {remedy}", place, "EG-TOO-LARGE")
         if robot.problems:
             raise ModelError(robot.problems)
 
@@ -143,55 +179,57 @@ class _Writer:
         return given
 
     # -- joints ---------------------------------------------------------------------------------------------------
-    def _in_parameters(self, joint_type: str) -> bool:
-        return self.options.rotation == "euler_parameters" and joint_type in ("free", "spherical")
+    def _turning(self, joint_type: str) -> Values:
+        """The key ``rotation`` of a joint that turns in Euler parameters."""
+        turns = self.options.rotation == "euler_parameters" and joint_type in ("free", "spherical")
+        return {"rotation": "euler_parameters"} if turns else {}
+
+    def _rates(self, joint_type: str) -> tuple[str, ...]:
+        """Suffixes of the velocities of such a joint."""
+        return ("_wx", "_wy", "_wz") if self._turning(joint_type) else ()
 
     def _suffixes(self, joint_type: str) -> list[str]:
         """Of the coordinates of a joint of the tree, as the options have them turn."""
-        kind = JOINTS[joint_type]
-        turning = {"rotation": self.options.rotation} if "rotation" in kind.options else {}
-        return [c.suffix for c in (kind(**turning) if turning else kind).coordinates]
+        return [c.suffix for c in JOINTS[joint_type](**self._turning(joint_type)).coordinates]
 
-    def _joint(self, body: RobotBody) -> None:
-        joint = body.joint
-        assert joint is not None
+    def _joint(self, body: RobotBody, joint: RobotJoint) -> None:
         name = self.joints[joint.name]
-        home, frame = self.found.home[joint.parent] if joint.parent else (GROUND, joint.outer)
-        outer = frame @ joint.outer if joint.parent else joint.outer
-        between = [outer.reference(self.bodies[home]), joint.inner.reference(self.bodies[body.name])]
-        values: Values = {"type": joint.type, "between": between}
-        kind = JOINTS[joint.type]
-        if kind.has_axis:
-            values["axis"] = _axis(joint.axis)
-        if self._in_parameters(joint.type):
-            values["rotation"] = self.options.rotation
+        home, frame = self.found.home[joint.parent] if joint.parent else (GROUND, IDENTITY)
+        parent, child = self.bodies[home], self.bodies[body.name]
+        between = [(frame @ joint.outer).reference(parent), joint.inner.reference(child)]
         names = [name + suffix for suffix in self._suffixes(joint.type)]
+        single = len(names) == 1
+        values: Values = {"type": joint.type, "between": between}
+        if JOINTS[joint.type].has_axis:
+            values["axis"] = _axis(joint.axis)
+        values |= self._turning(joint.type)
         if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
-            values |= {"coordinate": names[0]} if len(names) == 1 else {"coordinates": names}
+            values |= {"coordinate": names[0]} if single else {"coordinates": names}
         if joint.limits:
             values["limits"] = dict(joint.limits)
         if joint.dry_friction:
             values["dry_friction"] = joint.dry_friction
-        single = len(kind.coordinates) == 1
         if joint.armature and single:
             values["armature"] = joint.armature
         self._add("joints", name, values, joint.place)
         if joint.armature and not single:
             self._rotor(joint)
         if not single and (joint.damping or joint.stiffness):
-            self._resist(joint, between, (self.bodies[home], self.bodies[body.name]))
+            self._resist(joint, between, parent, child)
         rubbing = {"viscous": joint.damping} if joint.damping and single else {}
         if self.options.smoothing and joint.dry_friction:
             rubbing |= {"coulomb": joint.dry_friction, "smoothing": self.options.smoothing}
         if rubbing:
             self._force("friction", joint, "friction" if "coulomb" in rubbing else "damping", rubbing)
         if joint.stiffness and single:
-            self._spring(joint)
-        if self.options.limits == "stop":
-            self._stop(body)
+            kind, key = ("torsional_spring", "angle") if joint.type == "revolute" else ("joint_spring", "rest")
+            rest = {key: joint.rest} if joint.rest else {}
+            self._force(kind, joint, "spring", {"stiffness": joint.stiffness, **rest})
+        if self.options.limits == "stop" and single:
+            self._stop(body, joint)
         if joint.initial or joint.start:
             start = [joint.initial] if joint.start is None else self._start(joint.start)
-            reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
+            reference = [float(n.endswith("_e0") and bool(self._turning(joint.type))) for n in names]
             # what an equality moves only starts its assembly: the file's pose may not satisfy it
             known = self.out.values.setdefault("guess" if joint.name in self.tied else "initial", {})
             known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
@@ -202,27 +240,24 @@ class _Writer:
             self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
             self._force("actuator", joint, "drive", {"value": force})
 
-    def _stop(self, body: RobotBody) -> None:
+    def _stop(self, body: RobotBody, joint: RobotJoint) -> None:
         """Stops at the limits of a joint, which give way by a hundredth of its range under the drive's greatest effort.
 
         Where the file tells no effort, it is the weight that the joint carries, with the lever of what lies farthest.
         """
-        joint = body.joint
-        assert joint is not None
         limits = joint.limits
         # a finite limit beyond LARGEST gets no stop, as powers of its range overflow
         bounds = {key: x for key, x in limits.items() if key in ("lower", "upper") and abs(x) <= LARGEST}
-        if not bounds or len(JOINTS[joint.type].coordinates) != 1:
-            return
         span = bounds.get("upper", math.inf) - bounds.get("lower", -math.inf)
+        if not bounds:
+            return
         if span <= 0.0:
             self.out.notes.append(f"{self.joints[joint.name]} gets no stops, because its limits leave it no range")
             return
         span = span if math.isfinite(span) else 1.0
-        effort = limits.get("effort", 0.0)
+        effort, speed = limits.get("effort", 0.0), limits.get("velocity", 0.0)
         if not 0.0 < effort < math.inf:
-            effort = GRAVITY * self.carried[body.name].force(joint.type)
-        speed = limits.get("velocity", 0.0)
+            effort = GRAVITY * self.loads[body.name].size(joint.type)
         law = {
             "stiffness": effort / (GIVE * span) ** 1.5,
             "restitution": REBOUND,
@@ -233,37 +268,35 @@ class _Writer:
 
     def _rotor(self, joint: RobotJoint) -> None:
         """The armature of a ball joint: inertia without mass that turns in space as the child does on its parent."""
-        name = self.joints[joint.name]
-        suffixes = self._suffixes(joint.type)
-        turning = {"rotation": self.options.rotation} if self._in_parameters(joint.type) else {}
-        rates = ("_wx", "_wy", "_wz") if turning else ()
-        body, twin = self.names.made(f"{name}_rotor"), self.names.made_joint(f"{name}_rotor", [*suffixes, *rates])
+        name, suffixes, rates = self.joints[joint.name], self._suffixes(joint.type), self._rates(joint.type)
+        body = self.names.made(f"{name}_rotor")
+        rotor = self.names.joint(f"{name}_rotor", [*suffixes, *rates], made=True)
+        turns = {"type": joint.type, "between": [GROUND_NAME, body], **self._turning(joint.type)}
         self._add("bodies", body, {"mass": 0, "inertia": [joint.armature] * 3}, joint.place)
-        self._add("joints", twin, {"type": joint.type, "between": [GROUND_NAME, body], **turning}, joint.place)
+        self._add("joints", rotor, turns, joint.place)
         for suffix in rates or suffixes:  # Euler parameters may take any value: their rates alone are tied
-            law = {"type": "coupling", "equation": f"{twin}{suffix} - {name}{suffix}"}
-            self._add("constraints", self.names.made(f"{twin}{suffix}"), law, joint.place)
+            law = {"type": "coupling", "equation": f"{rotor}{suffix} - {name}{suffix}"}
+            self._add("constraints", self.names.made(f"{rotor}{suffix}"), law, joint.place)
 
-    def _resist(self, joint: RobotJoint, between: list[Any], bodies: tuple[str, str]) -> None:
+    def _resist(self, joint: RobotJoint, between: list[Any], parent: str, child: str) -> None:
         """Damping and stiffness of a ball or a free joint, on its child and on a parent that moves."""
         name, d, k = self.joints[joint.name], joint.damping, joint.stiffness
         rest = joint.start or IDENTITY
-        turn = _turn_texts(name, self._in_parameters(joint.type), rest.rotation)
+        turn = _turn_texts(name, bool(self._turning(joint.type)), rest.rotation)
         for axis, place in zip("xyz" if joint.start else "", numbers(rest.position), strict=False):
             on = f"{name}_{axis}"
-            for kind, law in (("damper", {"damping": d}), ("spring", {"stiffness": k, "rest": place})):
-                if d if kind == "damper" else k:
-                    given = {"type": f"joint_{kind}", "joint": on, **law}
-                    self._add("forces", self.names.made(f"{on}_{kind}"), given, joint.place)
-        parent, child = bodies
+            for kind, factor, law in (("damper", d, {"damping": d}), ("spring", k, {"stiffness": k, "rest": place})):
+                if factor:
+                    values = {"type": f"joint_{kind}", "joint": on, **law}
+                    self._add("forces", self.names.made(f"{on}_{kind}"), values, joint.place)
         for body, frame, sign in ((child, between[1], -1.0), (parent, between[0], 1.0)):
             # turned by the rotation about it, the rotation vector is itself: the same in the axes of both
             spring = [f"({sign * k!r})*{x}" for x in turn]
             damper = [f"({sign * d!r})*w{axis}({child}, from={parent}, in={body})" for axis in "xyz"]
             for factor, end, torque in ((k, frame, spring), (d, body, damper)):
                 if factor and body != GROUND_NAME:
-                    given = {"type": "torque", "body": end, "value": torque, "axes": "body"}
-                    self._add("forces", self.names.made(f"{name}_resistance"), given, joint.place)
+                    values = {"type": "torque", "body": end, "value": torque, "axes": "body"}
+                    self._add("forces", self.names.made(f"{name}_resistance"), values, joint.place)
 
     def _start(self, pose: Placement) -> list[float]:
         """Coordinates of a free joint."""
@@ -277,15 +310,10 @@ class _Writer:
         name = self.joints[joint.name]
         self._add("forces", self.names.made(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
 
-    def _spring(self, joint: RobotJoint) -> None:
-        kind, key = ("torsional_spring", "angle") if joint.type == "revolute" else ("joint_spring", "rest")
-        rest = {key: joint.rest} if joint.rest else {}
-        self._force(kind, joint, "spring", {"stiffness": joint.stiffness, **rest})
-
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
         for loop in self.robot.loops:
-            if not joints_around(loop, self.found):
+            if not self.found.around(loop):
                 self.out.notes.append(f"left out: {loop.name}, because no joint moves its two links against each other")
                 continue
             pair = []
@@ -305,17 +333,15 @@ class _Writer:
             if law is None:
                 continue
             if self.options.mimic == "coupling":
-                sums = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
-                ties.append(Tie(f"{joint.name}_mimic", *sums, (law.offset, law.factor), joint.place))
+                own, other = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
+                ties.append(Tie(f"{joint.name}_mimic", own, other, (law.offset, law.factor), joint.place))
             elif joint.type != "weld":
                 loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
         if loose:
-            remedy = "mimic='coupling' ties them"
-            self.out.notes.append(
-                f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}"
-            )
+            note = f"joints that mimic others keep coordinates of their own ({', '.join(loose)})"
+            self.out.notes.append(f"{note}; mimic='coupling' ties them")
         for tie in ties:
-            values = describe_tie(tie, self.joints, self.options.locked)
+            values = _describe_tie(tie, self.joints, self.options.lock)
             if values is None:
                 self.out.notes.append(f"left out: the coupling {tie.name}, all of whose joints are locked")
             else:
@@ -336,15 +362,8 @@ class _Writer:
                 law = _cut(law, drive.force)
             size += len(law) * len(drive.parts)
             if size > LAWS:
-                message = "the laws of the drives are too long"
-                problem = Problem(
-                    f"actuator.{name}",
-                    message,
-                    f"at most {LAWS:,} characters in all",
-                    *drive.place,
-                    code="EG-TOO-LARGE",
-                )
-                raise ModelError([problem])
+                message, remedy = "the laws of the drives are too long", f"at most {LAWS:,} characters in all"
+                raise ModelError([Problem(f"actuator.{name}", message, remedy, *drive.place, "EG-TOO-LARGE")])
             for joint, c in drive.parts if law else ():
                 q = self.joints.get(joint)
                 if q is None or not c:
@@ -364,7 +383,7 @@ class _Writer:
     def _law(self, k: int, drive: Drive) -> tuple[str, str]:
         """Name of a drive and its force, empty if there is none."""
         parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
-        fixed = sum(c * self.options.locked.get(joint, 0.0) for joint, c in drive.parts)
+        fixed = sum(c * self.options.lock.get(joint, 0.0) for joint, c in drive.parts)
         b0, b1, b2 = drive.bias
         terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
         name = f"tendon_{k}"
@@ -378,22 +397,15 @@ class _Writer:
 
     def _note_data(self) -> None:
         """Say of which joints limits and dry friction are data that do not act."""
-        moving = [body.joint for body in self.found.bodies.values() if body.joint is not None]
-        limited = [j for j in moving if any(key != "effort" or j.clamp is None for key in j.limits)]
+        moving = [joint for _, joint in self.found.moving]
+        limited = [self.joints[j.name] for j in moving if any(k != "effort" or j.clamp is None for k in j.limits)]
         if limited and self.options.limits == "note":
-            names = self._few(limited)
             remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
-            self.out.notes.append(f"the limits of joints stop nothing ({names}); {remedy}")
-        rubbing = [j for j in moving if j.dry_friction]
+            self.out.notes.append(f"the limits of joints stop nothing ({some_of(limited, SHOWN)}); {remedy}")
+        rubbing = [self.joints[j.name] for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
-            names = self._few(rubbing)
-            self.out.notes.append(
-                f"the dry friction of joints does not act ({names}); load with friction=0.01 to let it act"
-            )
-
-    def _few(self, joints: list[RobotJoint]) -> str:
-        names = [self.joints[joint.name] for joint in joints]
-        return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+            remedy = "load with friction=0.01 to let it act"
+            self.out.notes.append(f"the dry friction of joints does not act ({some_of(rubbing, SHOWN)}); {remedy}")
 
 
 def _cut(law: str, bounds: Range) -> str:
@@ -453,3 +465,53 @@ def _sum(factors: Sequence[float], terms: Sequence[str]) -> str:
     """The sum of the terms whose factors are not zero."""
     kept = [(f, x) for f, x in zip(factors, terms, strict=True) if f]
     return " + ".join(x if f == 1.0 else f"({f!r})*{x}" for f, x in kept) or "0"
+
+
+# -- couplings and laws as texts ---------------------------------------------------------------------------------------
+def _describe_tie(tie: Tie, coordinates: Mapping[str, str], locked: Mapping[str, float]) -> dict[str, Any] | None:
+    """The keys of a coupling, a linear one by its factors; None where no joint is left to tie.
+
+    Parameters
+    ----------
+    tie : Tie
+    coordinates : mapping
+        Joint -> coordinate, of joints that move.
+    locked : mapping
+        Joint -> value at which it is held.
+    """
+    (left, y), (right, x) = (_collect(s, coordinates, locked) for s in (tie.left, tie.right))
+    _, slope, *higher = (*tie.law, 0.0, 0.0)
+    if not any(higher) or not right:
+        value = 0.0
+        for a in reversed(tie.law):
+            value = a + x * value
+        factors = dict(left)
+        for q, c in right.items():
+            factors[q] = factors.get(q, 0.0) - slope * c
+        factors = {q: c for q, c in factors.items() if c}
+        if not factors:
+            return None
+        offset = value - y
+        return {"type": "coupling", "coordinates": factors} | ({"offset": offset} if offset else {})
+    inner, text = _text(right, x), ""
+    for a in reversed(tie.law):
+        text = f"({a!r})" + (f" + ({inner})*({text})" if text else "")
+    return {"type": "coupling", "equation": f"{_text(left, y)} - ({text})"}
+
+
+def _collect(side: Sum, coordinates: Mapping[str, str], locked: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Coordinate -> factor, and the constant with what locked joints add."""
+    factors: dict[str, float] = {}
+    constant = side.constant
+    for joint, factor in side.parts:
+        q = coordinates.get(joint)
+        if q is None:
+            constant += factor * locked.get(joint, 0.0)
+        elif factor:
+            factors[q] = factors.get(q, 0.0) + factor
+    return factors, constant
+
+
+def _text(factors: Mapping[str, float], constant: float) -> str:
+    terms = [q if c == 1.0 else f"({c!r})*{q}" for q, c in factors.items()]
+    return " + ".join(terms + [f"({constant!r})"] * bool(constant or not terms))

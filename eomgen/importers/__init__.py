@@ -1,0 +1,53 @@
+"""Importers: what others describe mechanisms in (URDF, MJCF, SymPy's mechanics) -> the Description of a model file."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from ..describe.description import Description
+from ..errors import ModelError
+from .robot import CONVERTED, RobotOptions, make_options
+from .robot_description import describe_robot
+from .urdf import read_urdf
+from .xml_file import read_xml
+
+__all__ = ["RobotOptions", "describe_file"]
+
+
+def describe_file(path: str | os.PathLike[str], **options: Any) -> Description:
+    """The raw data of a URDF or MJCF file, by its root element.
+
+    Parameters
+    ----------
+    path : str or path
+    **options
+        Fields of :class:`RobotOptions`.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    UsageError
+        An option that is not there, or not a value it takes.
+    ModelError
+        The file is no robot: every fault found, with its line.
+    MissingDependencyError
+        A package is needed.
+    """
+    chosen = make_options(options)
+    root = read_xml(path)
+    if root.tag == "robot":
+        return describe_robot(read_urdf(root, chosen), chosen)
+    if root.tag in ("mujoco", "mujocoinclude"):
+        from .mjcf import read_mjcf
+
+        return describe_robot(read_mjcf(root, chosen), chosen)
+    remedy = "a URDF file begins with <robot>, an MJCF file with <mujoco>"
+    if root.tag == "sdf":
+        remedy += f"; {CONVERTED['.sdf']}"
+    raise ModelError([root.problem(root.tag, "is not a robot", remedy, "EG-FILE-DAMAGED")])
