@@ -19,7 +19,7 @@ from .verification.cases import RECORDED, record_calls
 
 if TYPE_CHECKING:
     from .derivation import Derivation
-    from .describe.builder import Builder
+    from .describe.model import Builder
 
 
 @np.errstate(all="ignore")

@@ -31,7 +31,7 @@ from .targets import TARGETS, find_function, find_target
 
 if TYPE_CHECKING:
     from .codegen.program import Program
-    from .describe.builder import Builder
+    from .describe.model import Builder
     from .runtime.protocols import Core
 
 

@@ -15,7 +15,9 @@ from sphinx.util.docutils import SphinxDirective
 from eomgen.cli.command import VERBS, eomgen
 from eomgen.constraints import CONSTRAINTS
 from eomgen.describe import fields as table
-from eomgen.describe.fields import KINDS, Field, Fields, joint_type
+from eomgen.describe.fields import joint_type
+from eomgen.elements import kinds
+from eomgen.elements.kinds import Field, Fields
 from eomgen.forces import FORCES
 from eomgen.joints import JOINTS
 
@@ -40,7 +42,7 @@ def keys_table(fields: Fields) -> Iterator[str]:
     """The lines of a table of keys."""
     yield from ("| key | holds | default | |", "|---|---|---|---|")
     for key, field in fields.items():
-        holds = ", ".join(f"`{word}`" for word in field.choices) if field.choices else _cell(KINDS[field.kind])
+        holds = ", ".join(f"`{word}`" for word in field.choices) if field.choices else _cell(field.says)
         yield f"| `{key}` | {holds} | {_default(field)} | {_cell(field.doc)} |"
     yield ""
 
@@ -51,7 +53,7 @@ def _sentence(text: str) -> str:
 
 def _plain(name: str) -> Fields:
     """The keys of a section whose entries are all of one kind."""
-    found: Fields = getattr(table, name)
+    found: Fields = getattr(table, name, None) or getattr(kinds, name)
     return found
 
 

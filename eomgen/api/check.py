@@ -17,7 +17,7 @@ from ..runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
     from ..derivation import Derivation
-    from ..describe.builder import Builder
+    from ..describe.model import Builder
 
 #: Functions that the assembly of a state calls, and those for values of outputs.
 OF_STARTS = (

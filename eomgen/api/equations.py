@@ -15,7 +15,7 @@ from ..module import Module
 from ..runtime.near_names import find_lacking
 
 if TYPE_CHECKING:
-    from ..describe.builder import Builder
+    from ..describe.model import Builder
     from ..device.cuda_device import Device
     from ..device.device_module import DeviceModule
     from ..explain import Explanation

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..base.inline_pictures import picture_html, side_by_side
-from ..describe.builder import Builder
+from ..describe.model import Builder
 from ..errors import too_large
 from ..simulation.progress import waiting
 from .equations import Equations, derive

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
+LONGEST = 64  #: characters of a name
+
 #: What other programs and textbooks call it -> what eomgen does, of which those are suggested that there are.
 SYNONYMS = {
     # elements of a model (MuJoCo, Simscape, Modelica, Adams, PyDy, Pinocchio, textbooks)

@@ -15,7 +15,7 @@ from typing import ClassVar
 from ..elements.dimensions import LENGTH, NONE, REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import Choice, CoordinateName, Flag, JointReference, Latex, MarkerReference, Scalar
 from ..elements.looks import Contour, LiftCurve, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, cos, sin, sqrt
@@ -189,11 +189,11 @@ class FlatContact(_Contact):
 
 def _profile(e: Entry, key: str, turns: bool = True) -> Profile:
     local = e.graph.symbol(f"{CAM_ANGLE} of {e.name}")
-    return Profile(e.law(key, {CAM_ANGLE: local}, exclusive=False), local, e.flag("periodic") and turns)
+    return Profile(e.law(key, {CAM_ANGLE: local}, exclusive=False), local, e["periodic"] and turns)
 
 
 def _cam(e: Entry) -> CamLift | None:
-    turning, follower = e.coordinate("cam"), e.coordinate("follower")
+    turning, follower = e["cam"], e["follower"]
     if turning is None or follower is None:
         return None
     if turning.name == follower.name:
@@ -215,11 +215,11 @@ def _cam(e: Entry) -> CamLift | None:
     if e.at_fault():
         return None
     lift = _profile(e, "lift", turning.kind == "angle")
-    return CamLift(e.name, e.symbol(turning), e.symbol(follower), lift, e.law("phase"), follower.kind)
+    return CamLift(e.name, e.symbol(turning), e.symbol(follower), lift, e["phase"], follower.kind)
 
 
 def _cam_contact(e: Entry) -> Constraint | None:
-    shape, axis, follower = e.choice("shape"), e.marker("cam"), e.marker("follower")
+    shape, axis, follower = e["shape"], e["cam"], e["follower"]
     if axis is not None and follower is not None and axis.body == follower.body:
         e.fault("follower", f"{axis.label} and {follower.label} are on the same body", "name another", "EG-REFERENCE")
     if e.at_fault("shape"):
@@ -248,30 +248,27 @@ def _cam_contact(e: Entry) -> Constraint | None:
     return FlatContact(e.name, axis, follower, profile, *contact)
 
 
-_TURN = {CAM_ANGLE: Field("expression", "", dimension=NONE)}
-_PERIODIC = Field(
-    "flag", "whether the profile repeats every turn; if so, value and slope at 2 pi must equal those at 0", default=True
+_TURN = {CAM_ANGLE: Scalar("", dimension=NONE)}
+_PERIODIC = Flag(
+    "whether the profile repeats every turn; if so, value and slope at 2 pi must equal those at 0", default=True
 )
-_JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
+_JOINT = JointReference("a joint of one degree, or a coordinate", required=True)
 
 TYPES = table(
     ElementType(
         "cam",
         "a cam with a given lift: the follower's coordinate is a function of the cam's angle.",
         {
-            "cam": _JOINT._replace(doc="joint of the cam"),
-            "follower": _JOINT._replace(doc="joint of the follower"),
-            "lift": Field(
-                "expression",
+            "cam": _JOINT.replace(doc="joint of the cam"),
+            "follower": _JOINT.replace(doc="joint of the follower"),
+            "lift": Scalar(
                 "the follower's coordinate as an expression of theta, the cam's angle minus the phase (0 to 2 pi)",
                 required=True,
                 dimension=REACH,
                 along="follower",
-                local={CAM_ANGLE: Field("expression", "", dimension=REACH, along="cam")},
+                local={CAM_ANGLE: Scalar("", dimension=REACH, along="cam")},
             ),
-            "phase": Field(
-                "expression", "the cam's angle where theta is 0 (rad)", default=0, dimension=REACH, along="cam"
-            ),
+            "phase": Scalar("the cam's angle where theta is 0 (rad)", default=0, dimension=REACH, along="cam"),
             "periodic": _PERIODIC,
         },
         _cam,
@@ -280,31 +277,26 @@ TYPES = table(
         "cam_contact",
         "a follower that stays in contact with the contour of a plane cam.",
         {
-            "cam": Field("marker", "marker on the cam: z is its axis, polar angles count from x", required=True),
-            "follower": Field(
-                "marker",
+            "cam": MarkerReference("marker on the cam: z is its axis, polar angles count from x", required=True),
+            "follower": MarkerReference(
                 "marker at the tip, at the centre of the roller, or on the flat face with z away from the cam",
                 required=True,
             ),
-            "shape": Field(
-                "choice", "shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")
-            ),
-            "contour": Field(
-                "expression",
+            "shape": Choice("shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")),
+            "contour": Scalar(
                 "radius r(theta) of the contour at the polar angle theta (m)",
                 dimension=LENGTH,
                 local=_TURN,
             ),
-            "support": Field(
-                "expression",
+            "support": Scalar(
                 "for a flat face: support function h(theta), distance of the axis from the tangent whose normal points "
                 "at theta (m)",
                 dimension=LENGTH,
                 local=_TURN,
             ),
-            "radius": Field("expression", "radius of the roller (m)", dimension=LENGTH),
-            "coordinate": Field("name", "name of the polar angle of the contact point (<name>_contact)"),
-            "latex": Field("latex", "how formulas and plots print that angle, in LaTeX (from its name unless given)"),
+            "radius": Scalar("radius of the roller (m)", dimension=LENGTH),
+            "coordinate": CoordinateName("name of the polar angle of the contact point (<name>_contact)"),
+            "latex": Latex("how formulas and plots print that angle, in LaTeX (from its name unless given)"),
             "periodic": _PERIODIC,
         },
         _cam_contact,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import OUTPUT, Field
+from ..elements.kinds import OUTPUT, Factors, Scalar
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import symbols_of
@@ -63,15 +63,15 @@ def _coupling(e: Entry) -> Linear | Equation | None:
     if "equation" in e.values:
         e.refuse("offset", "offset belongs to coordinates, not to an equation")
         return _equation(e)
-    terms = e.factors("coordinates")
+    terms = e["coordinates"]
     if terms is None:
         return None
     kind = "length" if any(found.kind == "length" for found, _ in terms) else "angle"
-    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e.law("offset"), kind)
+    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e["offset"], kind)
 
 
 def _equation(e: Entry) -> Equation | None:
-    expression = e.law("equation")
+    expression = e["equation"]
     used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
     for name, meant in used.items():
         if meant.level == 2:
@@ -101,12 +101,11 @@ TYPES = table(
         "coupling",
         "a relation between coordinates: a linear one, or any equation.",
         {
-            "coordinates": Field(
-                "factors", "mapping of coordinates to factors: the sum of factor times coordinate equals the offset"
+            "coordinates": Factors(
+                "mapping of coordinates to factors: the sum of factor times coordinate equals the offset"
             ),
-            "offset": Field("expression", "value of that sum, an expression of parameters", default=0),
-            "equation": Field(
-                "expression",
+            "offset": Scalar("value of that sum, an expression of parameters", default=0),
+            "equation": Scalar(
                 "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, "
                 "places and velocities of markers; with velocities the constraint is nonholonomic and must be linear "
                 "in them",

@@ -12,7 +12,7 @@ from typing import ClassVar
 from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field
+from ..elements.kinds import MOTION, Axis, JointReference, MarkerReference, Pair, Scalar
 from ..elements.looks import ROUND_ARROW, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -110,13 +110,13 @@ def _driver(e: Entry) -> Driver | None:
         for key in ("axis", "on"):
             e.refuse(key, "only a driver of a marker takes this key")
     if "coordinate" in e.values:
-        found = e.coordinate("coordinate")
+        found = e["coordinate"]
         if found is not None and found.kind == "parameter":
             message = f"{found.name!r} is an Euler parameter, which cannot move on its own"
             e.fault("coordinate", message, "drive an angle or markers, or use Euler angles", "EG-REFERENCE")
         return None if found is None else CoordinateDriver(e.name, value, e.symbol(found), found.kind)
     if "marker" in e.values:
-        marker, on, axis = e.marker("marker"), e.marker("on"), e.axis("axis")
+        marker, on, axis = e["marker"], e["on"], e["axis"]
         if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
             return None
         return PlaceDriver(e.name, value, marker, axis, on)
@@ -129,7 +129,8 @@ def _driver(e: Entry) -> Driver | None:
 
 def _value(e: Entry) -> Expr:
     """The motion: an expression of t, parameters, inputs and functions that are smooth enough."""
-    value, graph = e.law("value"), e.graph
+    value: Expr = e["value"]
+    graph = e.graph
     for name in sorted(symbols_of([value])):
         kind = e.meaning(name).kind
         if kind not in ("", "time", "parameter", "input"):
@@ -151,9 +152,8 @@ TYPES = table(
         "driver",
         "a motion prescribed over time: of a coordinate, a distance, an angle or the place of a marker.",
         {
-            "coordinate": Field("joint", "a joint of one degree, or a coordinate, that is driven"),
-            "value": Field(
-                "expression",
+            "coordinate": JointReference("a joint of one degree, or a coordinate, that is driven"),
+            "value": Scalar(
                 "the motion over time (rad or m), an expression of t, parameters, inputs and functions; its second "
                 "derivative should be continuous",
                 required=True,
@@ -161,16 +161,13 @@ TYPES = table(
                 dimension=REACH,
                 along="coordinate",
             ),
-            "between": Field("pair", "two markers whose distance is driven; the distance must not become 0"),
-            "angle": Field(
-                "pair",
+            "between": Pair("two markers whose distance is driven; the distance must not become 0"),
+            "angle": Pair(
                 "two markers whose z axes stay in line; the angle of the second about z of the first is driven",
             ),
-            "marker": Field("marker", "a marker whose position along axis is driven"),
-            "axis": Field(
-                "axis", "direction in which the marker's position is measured, in the axes of on", default="x"
-            ),
-            "on": Field("marker", "body or marker from which the marker's position is measured", default="ground"),
+            "marker": MarkerReference("a marker whose position along axis is driven"),
+            "axis": Axis("direction in which the marker's position is measured, in the axes of on", default="x"),
+            "on": MarkerReference("body or marker from which the marker's position is measured", default="ground"),
         },
         _driver,
         one_of=("coordinate", "between", "angle", "marker"),

@@ -7,8 +7,8 @@ from typing import ClassVar
 from ..base.value_rules import POSITIVE
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.entry import Entry, Found
+from ..elements.kinds import Flag, JointPair, JointReference, Scalar, Two
 from ..elements.looks import PitchCircles, RackAndPinion, Seen
 from ..graph.core import Expr, sin
 from ..records import dataclass
@@ -81,7 +81,7 @@ class Rack(Constraint):
 def _ratio(e: Entry) -> Expr | None:
     """Second size over the first, by radii, teeth or sines of cone angles."""
     key = next((key for key in ("radii", "teeth", "cones") if key in e.values), "radii")
-    sizes = e.several(key, 2)
+    sizes = e[key]
     for k, size in enumerate(sizes or ()):
         e.require(f"{key}[{k}]", size, POSITIVE, "give a size greater than 0")
     if sizes is None or e.at_fault(key):
@@ -90,38 +90,46 @@ def _ratio(e: Entry) -> Expr | None:
     return b / a
 
 
+def _angles(e: Entry) -> tuple[Found, Found] | None:
+    """Two angles whose axes are carried by one part."""
+    pair: tuple[Found, Found] | None = e["joints"]
+    if pair is not None:
+        e.require_one_carrier("joints", *pair)
+    return pair
+
+
 def _gear(e: Entry) -> Gear | None:
-    pair, ratio = e.two_coordinates("joints", "angle"), _ratio(e)
+    pair, ratio = _angles(e), _ratio(e)
     if pair is None or ratio is None:
         return None
-    ratio = -ratio if e.flag("internal") else ratio
-    return Gear(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"))
+    ratio = -ratio if e["internal"] else ratio
+    return Gear(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e["phase"])
 
 
 def _belt(e: Entry) -> Belt | None:
-    pair, ratio = e.two_coordinates("joints", "angle"), _ratio(e)
+    pair, ratio = _angles(e), _ratio(e)
     if pair is None or ratio is None:
         return None
-    ratio = ratio if e.flag("crossed") else -ratio
-    radii = e.several("radii", 2) if "radii" in e.values else None
-    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"), radii[0] if radii else None)
+    ratio = ratio if e["crossed"] else -ratio
+    radii = e["radii"]
+    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e["phase"], radii[0] if radii else None)
 
 
 def _rack(e: Entry) -> Rack | None:
-    pinion, travel = e.coordinate("pinion", "angle"), e.coordinate("rack", "length")
+    pinion, travel = e["pinion"], e["rack"]
     if pinion is None or travel is None:
         return None
     e.require_one_carrier("", pinion, travel)
-    return Rack(e.name, e.symbol(pinion), e.symbol(travel), e.law("radius"), e.law("offset"))
+    return Rack(e.name, e.symbol(pinion), e.symbol(travel), e["radius"], e["offset"])
 
 
-_JOINTS = Field(
-    "joints", "two joints of one degree, or coordinates, whose axes are carried by the same part", required=True
+_JOINTS = JointPair(
+    "two joints of one degree, or coordinates, whose axes are carried by the same part", required=True, measure="angle"
 )
-_RADII = Field("two", "base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
-_TEETH = Field("two", "numbers of teeth", dimension=NONE)
-_PHASE = Field("expression", "first angle at which the second angle is 0 (rad)", default=0, dimension=NONE)
-_JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
+_RADII = Two("base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
+_TEETH = Two("numbers of teeth", dimension=NONE)
+_PHASE = Scalar("first angle at which the second angle is 0 (rad)", default=0, dimension=NONE)
+_JOINT = JointReference("a joint of one degree, or a coordinate", required=True)
 
 TYPES = table(
     ElementType(
@@ -131,13 +139,12 @@ TYPES = table(
             "joints": _JOINTS,
             "radii": _RADII,
             "teeth": _TEETH,
-            "cones": Field(
-                "two",
+            "cones": Two(
                 "pitch cone angles of a bevel pair (rad); both z axes point away from their intersection, or both to "
                 "it",
                 dimension=NONE,
             ),
-            "internal": Field("flag", "whether one gear is internal, so that both turn the same way", default=False),
+            "internal": Flag("whether one gear is internal, so that both turn the same way", default=False),
             "phase": _PHASE,
         },
         _gear,
@@ -147,14 +154,10 @@ TYPES = table(
         "rack",
         "a pinion that rolls on a rack: s = radius angle + offset (m).",
         {
-            "pinion": _JOINT._replace(doc="joint of the pinion"),
-            "rack": _JOINT._replace(doc="joint of the rack"),
-            "radius": Field(
-                "expression", "radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH
-            ),
-            "offset": Field(
-                "expression", "travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH
-            ),
+            "pinion": _JOINT.replace(doc="joint of the pinion", measure="angle"),
+            "rack": _JOINT.replace(doc="joint of the rack", measure="length"),
+            "radius": Scalar("radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH),
+            "offset": Scalar("travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH),
         },
         _rack,
     ),
@@ -165,9 +168,7 @@ TYPES = table(
             "joints": _JOINTS,
             "radii": _RADII,
             "teeth": _TEETH,
-            "crossed": Field(
-                "flag", "whether the belt crosses, so that the pulleys turn in opposite directions", default=False
-            ),
+            "crossed": Flag("whether the belt crosses, so that the pulleys turn in opposite directions", default=False),
             "phase": _PHASE,
         },
         _belt,

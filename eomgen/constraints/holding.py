@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import Choice, Pair
 from ..elements.looks import CROSS, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -46,7 +46,7 @@ class Hold(Constraint):
 
 
 def _hold(e: Entry) -> Constraint | None:
-    pair, axes, turning = e.pair(), e.choice("axes"), e.choice("turning")
+    pair, axes, turning = e.pair(), e["axes"], e["turning"]
     if not {"closes", "opens", "closed"} & e.values.keys():
         remedy = "give closes, opens or closed; for good a joint holds bodies"
         e.fault("", "is neither closed nor opened", remedy, "EG-MISSING")
@@ -60,12 +60,11 @@ TYPES = table(
         "hold",
         "a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch.",
         {
-            "between": Field("pair", "marker whose body holds, and the marker that is held", required=True),
-            "axes": Field(
-                "choice", "axes of the first marker along which the second does not move", default="xyz", choices=AXES
+            "between": Pair("marker whose body holds, and the marker that is held", required=True),
+            "axes": Choice(
+                "axes of the first marker along which the second does not move", default="xyz", choices=AXES
             ),
-            "turning": Field(
-                "choice",
+            "turning": Choice(
                 "axes of the first marker about which the second does not turn",
                 default="none",
                 choices=("none", *AXES),

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import JointReference
 from ..graph.core import Expr
 from ..records import dataclass
 from .constraint import VELOCITY, Condition, Constraint, ConstraintView
@@ -37,7 +37,7 @@ TYPES = table(
     ElementType(
         "lock",
         "a joint whose coordinates stay where they are while it is closed: a clutch, a brake, the latch of a door.",
-        {"joint": Field("joint", "joint that is locked, or one of its coordinates", required=True)},
+        {"joint": JointReference("joint that is locked, or one of its coordinates", required=True)},
         _lock,
     )
 )

@@ -9,14 +9,11 @@ from ..base.value_rules import WHEELS as WHEELS_FIT
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry, Found
-from ..elements.field import Field
+from ..elements.kinds import JointReference, Scalar, Wheels
 from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
-
-#: The gears of a planetary set.
-WHEELS = ("sun", "planet", "ring")
 
 
 @dataclass(frozen=True)
@@ -87,8 +84,8 @@ class Planetary(Constraint):
 def _planetary(e: Entry) -> Planetary | None:
     """Angles are measured from the frame; the planet's from the frame or the carrier."""
     key = "radii" if "radii" in e.values else "teeth"
-    sizes = e.sizes(key, WHEELS)
-    found = {part: e.coordinate(part, "angle") for part in ("sun", "ring", "carrier", "planet") if part in e.values}
+    sizes = e[key]
+    found = {part: e[part] for part in ("sun", "ring", "carrier", "planet") if part in e.values}
     if sizes is not None:
         e.judge(key, WHEELS_FIT, [*sizes.values()], ([*sizes],))
     if any(x is None for x in found.values()) or sizes is None or e.at_fault():
@@ -104,7 +101,7 @@ def _planetary(e: Entry) -> Planetary | None:
     if not outer or ("planet" not in parts and len(outer) < 2):
         e.fault(key, "these wheels do not determine a ratio", "give sun and ring, or planet and one more", "EG-MISSING")
     if "planet" in parts and len(sizes) < 2:
-        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(WHEELS)}", "EG-MISSING")
+        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(Wheels.names)}", "EG-MISSING")
     if len(parts) < (2 if "planet" in parts else 1) or not main:
         e.fault(
             "", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet", "EG-MISSING"
@@ -113,7 +110,7 @@ def _planetary(e: Entry) -> Planetary | None:
         return None
     sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
     r_s, r_r, r_p = (sizes.get(wheel) for wheel in ("sun", "ring", "planet"))
-    return Planetary(e.name, sun, ring, carrier, _planet(e, parts, carrier), r_s, r_r, r_p, e.law("phase"))
+    return Planetary(e.name, sun, ring, carrier, _planet(e, parts, carrier), r_s, r_r, r_p, e["phase"])
 
 
 def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
@@ -137,14 +134,13 @@ TYPES = table(
         "planetary",
         "a planetary gear set: its meshing wheels follow Willis' equation.",
         {
-            **{part: Field("joint", _FIXED.format(part)) for part in ("sun", "ring", "carrier")},
-            "planet": Field(
-                "joint", "joint of a planet on the carrier or on the frame, needed only if a planet is a body"
+            **{part: JointReference(_FIXED.format(part), measure="angle") for part in ("sun", "ring", "carrier")},
+            "planet": JointReference(
+                "joint of a planet on the carrier or on the frame, needed only if a planet is a body", measure="angle"
             ),
-            "radii": Field("wheels", "radii of the wheels that exist: sun, planet, ring (m)", dimension=LENGTH),
-            "teeth": Field("wheels", "numbers of teeth of the wheels that exist: sun, planet, ring", dimension=NONE),
-            "phase": Field(
-                "expression",
+            "radii": Wheels("radii of the wheels that exist: sun, planet, ring (m)", dimension=LENGTH),
+            "teeth": Wheels("numbers of teeth of the wheels that exist: sun, planet, ring", dimension=NONE),
+            "phase": Scalar(
                 "phase in (r_s sun + r_r ring) / (r_s + r_r) = carrier + phase (rad); with a planet, that of its mesh "
                 "with the sun",
                 default=0,

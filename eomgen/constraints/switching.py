@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from ..elements.dimensions import SPIN
 from ..elements.element_type import ElementType, Types
-from ..elements.field import LAW, Field, Fields
+from ..elements.kinds import LAW, ConstraintNames, Fields, Flag, Scalar
 
 #: Of any constraint that may close and open in a run.
 SWITCHING: Fields = {
-    "closes": Field(
-        "expression",
+    "closes": Scalar(
         "where it falls to 0 the constraint closes: a plastic impact, after which it holds",
         level=LAW,
     ),
-    "opens": Field("expression", "where it falls to 0 while the constraint holds, it lets go", level=LAW),
-    "closed": Field("flag", "whether it holds at the start of a run; false if closes is given, else true"),
-    "releases": Field("some_names", "one or several other constraints that let go as it closes, before the impact"),
-    "stabilisation": Field(
-        "expression",
+    "opens": Scalar("where it falls to 0 while the constraint holds, it lets go", level=LAW),
+    "closed": Flag("whether it holds at the start of a run; false if closes is given, else true"),
+    "releases": ConstraintNames("one or several other constraints that let go as it closes, before the impact"),
+    "stabilisation": Scalar(
         "rate (1/s), greater than 0, at which an error of the equation dies away while it holds",
         default=10,
         dimension=SPIN,

@@ -1,9 +1,9 @@
 """Stage describe: what the user says, in Python or in a file -> Mechanism, the frozen value every later stage reads."""
 
-from .builder import Builder
 from .description import Description
 from .handles import BodyHandle, JointHandle, MarkerHandle
 from .mechanism import Mechanism
+from .model import Builder
 from .schema import model_schema
 from .yaml_file import describe_yaml_file
 

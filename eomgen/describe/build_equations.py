@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..base.limits.numbers import TENSOR
+from ..elements import kinds
+from ..elements.kinds import MOTION
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
@@ -14,7 +16,7 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import substitute, symbols_of
 from .checks import check_keys
 from .description import Faults, items
-from .fields import EQUATIONS, MOTION
+from .fields import EQUATIONS
 from .mechanism import GivenEquations, Output
 from .names import fault_of_name, nearest
 from .printed_names import take_coordinates_latex
@@ -32,7 +34,7 @@ def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str,
     if given is None:
         return None
     if not isinstance(given, Mapping):
-        reader.wrong(PATH, given, "table")
+        reader.wrong(PATH, given, kinds.Table)
         return {}
     if has_others:
         remedy = "describe only one: bodies, a Lagrangian, equations"
@@ -66,7 +68,7 @@ def _names(reader: Reader, values: Mapping[str, Any], key: str, default: Sequenc
         return list(default)
     listed = items(given)
     if listed is None:
-        reader.wrong(f"{PATH}.{key}", given, "names")
+        reader.wrong(f"{PATH}.{key}", given, kinds.Names)
         return list(default)
     return [str(name_of(item)) for item in listed]
 
@@ -80,7 +82,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     local: dict[str, Expr] = {}
     parts = values.get("intermediates", {})
     if not isinstance(parts, Mapping):
-        reader.wrong(f"{PATH}.intermediates", parts, "rates")
+        reader.wrong(f"{PATH}.intermediates", parts, kinds.Rates)
         parts = {}
     for name, part in parts.items():
         fault = fault_of_name(name, symbol=True)
@@ -102,7 +104,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         path, given = f"{PATH}.{key}", values.get(key, ())
         parts = items(given)
         if parts is None:
-            reader.wrong(path, given, "expressions")
+            reader.wrong(path, given, kinds.Scalars)
             return ()
         if size is not None and len(parts) != size and key in values:
             faults.add(
@@ -114,7 +116,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     given = values.get("mass_matrix", ())
     lines = items(given)
     if lines is None or any(items(line) is None for line in lines):
-        reader.wrong(f"{PATH}.mass_matrix", given, "matrix")
+        reader.wrong(f"{PATH}.mass_matrix", given, kinds.Matrix)
         lines = []
     for i, line in enumerate(lines):
         parts = items(line) or []
@@ -169,7 +171,7 @@ def _rates(
         symbols = [reader.graph.symbol(name) for name in v[: len(q)]]
         return (*symbols, *(reader.stand_in,) * (len(q) - len(symbols)))
     if not isinstance(given, Mapping):
-        reader.wrong(path, given, "rates")
+        reader.wrong(path, given, kinds.Rates)
         return (reader.stand_in,) * len(q)
     named = {name_of(key): value for key, value in given.items()}
     for name in named:

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..base.operations import CONDITION, operations_with
+from ..elements import kinds
+from ..elements.kinds import OUTPUT
 from ..graph.core import Expr
 from ..graph.shown import shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import DescribedEntry, items
-from .fields import EVENT, OUTPUT
+from .fields import EVENT
 from .mechanism import Clock, Event, Switched
 from .names import nearest
 from .scope import late_names
@@ -79,7 +81,7 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     names = [slip] if isinstance(slip, str) else items(slip)
     outputs = [*reader.names.of("output")]
     if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
-        reader.wrong(f"{path}.slip", slip, "some_names")
+        reader.wrong(f"{path}.slip", slip, kinds.SomeNames)
         return None, ()
     for name in names:
         if name not in outputs:
@@ -97,7 +99,7 @@ def _times(reader: Reader, path: str, value: Any) -> int:
         return int(bool(value))
     if isinstance(value, int) and value > 0:
         return value
-    reader.wrong(path, value, "times")
+    reader.wrong(path, value, kinds.Times)
     return 0
 
 
@@ -135,7 +137,7 @@ def instant(reader: Reader, path: str, value: Any) -> Expr:
 
 def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...]:
     if not isinstance(given, Mapping):
-        reader.wrong(path, given, "rates")
+        reader.wrong(path, given, kinds.Rates)
         return ()
     known = list(reader.names.of("coordinate", "velocity", "state"))
     result = []

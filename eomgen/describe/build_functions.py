@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.limits.numbers import APART, PERIODIC
+from ..elements import kinds
 from ..graph.functions import Function
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
 from ..numeric.user_functions import Curve, Surface, Twin
@@ -145,7 +146,7 @@ def _numbers(reader: Reader, path: str, given: Any) -> Array | None:
     """A list of finite numbers; a text such as ``pi/2`` counts as one."""
     listed = items(given)
     if listed is None:
-        reader.wrong(path, given, "numbers")
+        reader.wrong(path, given, kinds.Numbers)
         return None
     if len(listed) > POINTS:
         reader.faults.add(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points", "EG-TOO-LARGE")
@@ -162,7 +163,7 @@ def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | 
     """Values on a grid, a row for each x."""
     rows = items(given)
     if rows is None:
-        reader.wrong(path, given, "grid")
+        reader.wrong(path, given, kinds.Grid)
         return None
     if len(rows) != n_x:
         reader.faults.add(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x", "EG-SHAPE")

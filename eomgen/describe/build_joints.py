@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..base.value_rules import NOT_NEGATIVE
 from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.kinds import Scalar
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.shown import quoted, shown
-from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
-from ..joints import JOINTS, Joint, Shape
+from ..joints import JOINTS, Joint
 from ..records import dataclass
 from .checks import check_names, unknown_key
 from .description import DescribedEntry, items
-from .fields import KINDS, Field, joint_fields
+from .fields import joint_fields
 from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
@@ -163,7 +162,7 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             reader.faults.add(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in entry.values and key != "type":
-            reader.faults.missing(f"{entry.path}.{key}", f"give {KINDS[field.kind]}")
+            reader.faults.missing(f"{entry.path}.{key}", f"give {field.says}")
     if {"coordinate", "coordinates"} <= entry.values.keys():
         reader.faults.add(
             f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT"
@@ -171,59 +170,22 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
     kind = JOINTS[type_name]
     options: dict[str, Any] = {}
     for option in kind.options:
-        if fields[option].kind in _LATER:  # its names are not all known yet
-            options[option] = _LATER[fields[option].kind](reader)
+        if isinstance(fields[option], Scalar):  # its names are not all known yet
+            options[option] = fields[option].absent(reader)
         elif option in entry.values:
-            options[option] = _option(reader, f"{entry.path}.{option}", entry.values[option], fields[option])
+            options[option] = fields[option].read(reader, f"{entry.path}.{option}", entry.values[option])
     if options.get("rotation") == "euler_parameters" and "sequence" in options:
         remedy = "leave out sequence, or choose rotation: euler_angles"
         reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
     return kind(**options)
 
 
-def _option(reader: Reader, path: str, value: Any, field: Field) -> str:
-    return reader.choice(path, value, field) if field.kind == "choice" else reader.text(path, value)
-
-
-#: Kinds of options that hold expressions, and what stands in for them until the names they use are declared.
-_LATER: dict[str, Callable[[Reader], Any]] = {
-    "expression": lambda reader: reader.stand_in,
-    "shape": lambda reader: Shape((reader.stand_in,) * 3, ()),
-}
-
-
 def _with_expressions(reader: Reader, declared: Declared) -> Joint:
     """The joint with those of its options that are expressions."""
-    joint, entry = declared.joint, declared.entry
-    found: dict[str, Any] = {}
-    for option, field in joint.options.items():
-        path = f"{entry.path}.{option}"
-        if field.kind not in _LATER or option not in entry.values:
-            continue
-        if field.kind == "shape":
-            found[option] = _shape(reader, path, entry.values[option], field, declared.coordinates[: field.own])
-            continue
-        found[option] = reader.expression(path, entry.values[option])
-        if field.not_zero:
-            reader.requirements.not_zero(path, found[option], f"{field.doc}; {field.not_zero}")
-        if option == "length":
-            reader.requirements.inside(path, found[option], NOT_NEGATIVE, "give a length greater than 0")
+    joint, values = declared.joint, declared.entry.values
+    found = {
+        option: field.read(reader, f"{declared.entry.path}.{option}", values[option], declared.coordinates[: field.own])
+        for option, field in joint.options.items()
+        if isinstance(field, Scalar) and option in values
+    }
     return replace(joint, **found)
-
-
-def _shape(reader: Reader, path: str, value: Any, field: Field, own: tuple[str, ...]) -> Shape:
-    """A point as expressions of parameters of the model and of the joint's own first coordinates."""
-    point = reader.vector(path, value, field.level)
-    allowed = {*reader.names.of("parameter"), *own}
-    shown = " and ".join(own)
-    for name in sorted(symbols_of(point) - allowed):
-        if name in reader.names.kinds:
-            kind = reader.names.kinds[name]
-            reader.faults.add(
-                path, f"the {kind} {name!r} cannot be used here", f"allowed are parameters and {shown}", "EG-REFERENCE"
-            )
-    if not symbols_of(point) & set(own) and not reader.faults.under(path):
-        reader.faults.add(
-            path, f"does not depend on {shown}", f"use the joint's own {shown} in the expressions", "EG-EXPRESSION"
-        )
-    return Shape(point, tuple(reader.graph.symbol(name) for name in own))

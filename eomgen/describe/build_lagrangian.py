@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..elements import kinds
+from ..elements.kinds import MOTION
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
-from .fields import LAGRANGIAN, MOTION
+from .fields import LAGRANGIAN
 from .mechanism import Lagrangian
 from .names import nearest
 from .printed_names import MULTIPLIERS, numbered, take_coordinates_latex
@@ -25,7 +27,7 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
     if given is None:
         return None
     if not isinstance(given, Mapping):
-        reader.wrong("lagrangian", given, "table")
+        reader.wrong("lagrangian", given, kinds.Table)
         return {}
     if has_bodies:
         remedy = "describe only one of them: bodies or a Lagrangian"
@@ -34,7 +36,7 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
     values = dict(given)
     listed = items(values.get("coordinates", ()))
     if listed is None:
-        reader.wrong("lagrangian.coordinates", given["coordinates"], "names")
+        reader.wrong("lagrangian.coordinates", given["coordinates"], kinds.Names)
         listed = []
     elif not listed and "coordinates" in given:
         faults.add("lagrangian.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
@@ -63,7 +65,7 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
     dissipation = reader.expression(f"{path}.dissipation", values.get("dissipation", 0), MOTION)
     constraints = items(values.get("constraints", ()))
     if constraints is None:
-        reader.wrong(f"{path}.constraints", values["constraints"], "expressions")
+        reader.wrong(f"{path}.constraints", values["constraints"], kinds.Scalars)
         constraints = []
     return Lagrangian(
         tuple(names),
@@ -117,7 +119,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
         return tuple(result.values())
     listed = items(given)
     if listed is None:
-        reader.wrong(path, given, "forces")
+        reader.wrong(path, given, kinds.CoordinateForces)
     elif listed and len(listed) != len(names):
         reader.faults.add(
             path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order", "EG-SHAPE"

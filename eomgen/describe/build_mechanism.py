@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from ..base.names import place_of_marker
 from ..constraints import CONSTRAINTS
+from ..elements import kinds
 from ..errors import ModelError
 from ..forces import FORCES, Force
 from ..frames import GROUND, Frame, Marker
@@ -40,6 +42,7 @@ from .mass_properties import read_body
 from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
+from .read_shapes import read_shapes as read_contact_shapes
 from .scope import Namespace
 from .sympy_face import in_order, name_of
 from .values import Reader
@@ -82,7 +85,7 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
     reader.requirements.declare({p.name: p.value for p in parameters})
     build_functions(reader, sections["functions"])
-    specs = declare_coordinates(reader, sections["joints"])
+    reader.joints = specs = declare_coordinates(reader, sections["joints"])
     contacts = declare_contacts(reader, sections["constraints"])
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
@@ -96,8 +99,9 @@ def build(description: Description) -> Mechanism:
     switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
-    bodies = _bodies(reader, sections["bodies"])
+    reader.mass_data = bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
+    reader.shapes = partial(read_contact_shapes, reader)
     around = Surroundings(reader, specs, joints, bodies, contacts)
     forces = build_elements(around, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
@@ -112,9 +116,9 @@ def build(description: Description) -> Mechanism:
     check_resets(reader, own_events, clocks, switched)
     events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, switched, events, outputs)
-    kinds = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
-    starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
-    moving = set(reader.names.of(*kinds))
+    moves = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
+    starts = _initial(reader, "initial", values.get("initial", {}), (*moves, "output"))
+    moving = set(reader.names.of(*moves))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
@@ -228,7 +232,7 @@ def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntr
     if isinstance(given, Mapping):
         given = list(given.items())
     if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
-        reader.wrong(path, given, "markers")
+        reader.wrong(path, given, kinds.Markers)
         return []
     return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
 
@@ -278,12 +282,12 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
             reader.faults.add(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
 
 
-def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
+def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -> dict[str, Expr]:
     """Values by coordinate (or rate, or output): expressions in parameters."""
     if not isinstance(given, Mapping):
-        reader.wrong(section, given, "table")
+        reader.wrong(section, given, kinds.Table)
         return {}
-    known = list(dict.fromkeys(reader.names.of(*kinds)))
+    known = list(dict.fromkeys(reader.names.of(*whats)))
     result: dict[str, Expr] = {}
     for name, value in in_order(given, known):
         path = f"{section}.{name}"
@@ -293,8 +297,8 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
             result[f"{place[0]}({place[1]})"] = reader.expression(path, value)
             _check_place(reader, path, *place)
         else:
-            remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
-            reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            remedy = nearest(shown(name), known, _listed([_PLURAL[what] for what in whats], "and"))
+            reader.faults.add(path, f"no {_listed(whats, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
     return result
 
 
@@ -321,7 +325,7 @@ _PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "stat
 def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
-        reader.wrong("independent", given, "names")
+        reader.wrong("independent", given, kinds.Names)
         return ()
     coordinates = list(reader.names.of("coordinate"))
     rates = [name + "_dot" for name in coordinates]
@@ -343,18 +347,14 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
 
 def _simulation(reader: Reader, given: Any) -> Simulation:
     if not isinstance(given, Mapping):
-        reader.wrong("simulation", given, "table")
+        reader.wrong("simulation", given, kinds.Table)
         return Simulation()
     check_keys("simulation", given, SIMULATION, reader.faults)
     settings: dict[str, Any] = {}
     for key, field in SIMULATION.items():
         if key not in given:
             continue
-        path = f"simulation.{key}"
-        if field.kind == "choice":
-            settings[key] = reader.choice(path, given[key], field)
-        else:
-            settings[key] = reader.number(path, given[key], positive=True)
+        settings[key] = field.read(reader, f"simulation.{key}", given[key])
     if (settings.get("method") in FIXED_STEP) != ("step" in settings):
         remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
         told = "only methods RK4 and moreau take steps of one size, and they need their size"

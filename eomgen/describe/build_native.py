@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.files import open_plain
+from ..elements import kinds
 from ..errors import UsageError
 from ..graph.functions import Function, NativeCode
 from ..numeric.user_functions import Orders, Twin, up_to
@@ -116,7 +117,7 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
         return []
     listed = items(given)
     if listed is None:
-        reader.wrong(path, given, "functions")
+        reader.wrong(path, given, kinds.Functions)
         return []
     if len(listed) != length:
         what = f"with that many arguments it needs {length}, null where the source has none"

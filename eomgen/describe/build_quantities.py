@@ -8,12 +8,13 @@ from dataclasses import replace
 
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import NONE
+from ..elements.kinds import MOTION, OUTPUT, Fields
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .checks import check_keys
 from .description import DescribedEntry
-from .fields import INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, Fields
+from .fields import INPUT, OUTPUT_FIELDS, PARAMETER
 from .marker_quantities import marker_quantity
 from .mechanism import Input, Output, Parameter
 from .names import QUANTITIES, VELOCITIES

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..elements.kinds import LAW
 from ..graph.core import Expr
 from .build_clocks import Timing, build_clocks, group_by_clock
 from .build_quantities import in_si, read_described
 from .description import DescribedEntry
-from .fields import LAW, STATE
+from .fields import STATE
 from .mechanism import Clock, Event, FirstOrderState
 from .values import Reader, is_number
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..constraints import Constraint
+from ..elements import kinds
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted
 from ..graph.substitute import symbols_of
@@ -66,7 +67,7 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
         return []
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
-        reader.wrong(path, given, "some_names")
+        reader.wrong(path, given, kinds.SomeNames)
         return []
     for k, name in enumerate(listed):
         if name not in names or name == entry.name:

@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 from ..base.names import place_of_marker
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
+from ..elements.kinds import Field
 from ..graph.core import Expr, Graph
 from ..graph.traverse import reachable
 from .description import DescribedEntry, Description
-from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
+from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
 from .mechanism import TURNING, JointSpec, Output
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
@@ -36,7 +37,6 @@ _RATIOS = frozenset(
     sign * a / b * turn for sign in (1, -1) for a in (1, 2, 3, 4, 6, 8, 12) for b in (1, 2, 3, 4, 6, 8, 12)
     for turn in (1.0, math.pi, 1 / math.pi)
 )  # fmt: skip
-_NESTED = ("markers", "solids", "points", "marker", "pair", "via", "display", "shapes")
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 
 
@@ -180,12 +180,7 @@ def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tupl
         key = steps[0] if own is None else steps[1] if len(steps) > 1 else ""
         return (MODEL if own is None else own).get(key.partition("[")[0]), {}
     row = fields_of(section, entry.values).get(steps[0])
-    if row is not None and row.kind in _NESTED:
-        parts = part_fields()
-        words = [step for step in steps[1:] if isinstance(step, str) and step in parts]
-        # a marker that is written as its position alone
-        row = parts[words[-1]] if words else parts["at"] if row.kind == "markers" else None
-    return row, entry.values
+    return None if row is None else row.part([step for step in steps[1:] if isinstance(step, str)]), entry.values
 
 
 def _plain_mass(entry: DescribedEntry | None) -> float:

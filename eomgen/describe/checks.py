@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ..elements.kinds import Fields
 from ..frames import GROUND
 from .description import DescribedEntry, Faults
-from .fields import KINDS, Fields
 from .mechanism import Body, JointSpec
 from .names import fault_of_name, nearest
 
@@ -19,7 +19,7 @@ def check_keys(path: str, values: Mapping[str, Any], fields: Fields, faults: Fau
             faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields), "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
-            faults.missing(f"{path}.{key}", f"give {KINDS[field.kind]}")
+            faults.missing(f"{path}.{key}", f"give {field.says}")
 
 
 def unknown_key(key: object, fields: Iterable[str]) -> str:

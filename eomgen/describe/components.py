@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..elements import kinds
 from ..errors import UsageError
 from .checks import unknown_key
 from .description import GROUND_NAME, Description, Faults
 from .dotted_names import undotted
-from .fields import ADDED, COMPONENT, KINDS
+from .fields import ADDED, COMPONENT
 from .instance import Component, Instance, add_instance, size_of
 from .names import fault_of_name, nearest
 from .repetition import Fault, put_in, rounds_of
@@ -42,7 +43,9 @@ class Components:
         self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
         self.given: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
         if given is not None and not isinstance(given, Mapping):
-            faults.add("components", f"is not {KINDS['table']}", "write the names of the components as keys", "EG-TYPE")
+            faults.add(
+                "components", f"is not {kinds.Table.says}", "write the names of the components as keys", "EG-TYPE"
+            )
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
 
@@ -74,7 +77,7 @@ class Components:
         if wrong:
             self.fault(path, *wrong, "EG-NAME-FORM")
         if not isinstance(given, Mapping):
-            self.fault(path, f"is not {KINDS['table']}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
+            self.fault(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
             return None
         for key in given:
             if key not in COMPONENT:
@@ -94,7 +97,7 @@ class Components:
 
     def _read_file(self, name: str, file: Any, path: str) -> Component | None:
         if not isinstance(file, str):
-            self.fault(f"{path}.file", f"{file!r} is not {KINDS['file']}", "", "EG-TYPE")
+            self.fault(f"{path}.file", f"{file!r} is not {kinds.File.says}", "", "EG-TYPE")
             return None
         try:
             description = self.open_file(file)
@@ -124,7 +127,7 @@ class Components:
         listed = given.get("attachments") or []
         listed = [listed] if isinstance(listed, str) else listed
         if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
-            self.fault(f"{start}attachments", f"{listed!r} is not {KINDS['names']}", "such as [foot, top]", "EG-TYPE")
+            self.fault(f"{start}attachments", f"{listed!r} is not {kinds.Names.says}", "such as [foot, top]", "EG-TYPE")
             return ()
         return tuple(listed)
 
@@ -134,7 +137,9 @@ class Components:
         if given is None:
             return
         if not isinstance(given, Mapping):
-            self.fault(f"{start}add", f"is not {KINDS['table']}", "write the names of the instances as keys", "EG-TYPE")
+            self.fault(
+                f"{start}add", f"is not {kinds.Table.says}", "write the names of the instances as keys", "EG-TYPE"
+            )
             return
         for name, keys in given.items():
             self._add_one(name, keys, f"{start}add.{name}", target)
@@ -145,7 +150,7 @@ class Components:
             self.fault(path, *wrong, "EG-NAME-FORM")
             return
         if not isinstance(keys, Mapping):
-            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and its other keys", "EG-TYPE")
+            self.fault(path, f"is not {kinds.Table.says}", "write component: NAME and its other keys", "EG-TYPE")
             return
         for key in keys:
             if key not in ADDED:
@@ -180,7 +185,7 @@ class Components:
         for key in ("parameters", "inputs", "initial", "guess"):
             given = put_in(keys.get(key) or {}, variables)
             if not isinstance(given, Mapping):
-                self.fault(f"{path}.{key}", f"is not {KINDS['table']}", "write names as keys", "EG-TYPE")
+                self.fault(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
                 return None
             tables[key] = given
         at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")

@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from ..elements.kinds import is_zero as is_zero
+from ..elements.kinds import items as items
 from ..errors import Problem, cannot
 from ..graph.shown import NO_TEXT, shortened, shown
 
@@ -208,26 +210,6 @@ def _in_instances(names: Sequence[str]) -> str:
     return f" (in {shown} and {len(names) - 3} more)" if len(names) > 3 else f" (in {shown})"
 
 
-def items(value: Any) -> list[Any] | None:
-    """The items of a list, tuple, array or SymPy matrix (a column counts as a plain list); None for anything else."""
-    if isinstance(value, list | tuple):
-        return list(value)
-    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "tolist"):
-        return None
-    listed = value.tolist()
-    if not isinstance(listed, list):
-        return None
-    if listed and all(isinstance(x, list) and len(x) == 1 for x in listed):
-        return [x[0] for x in listed]
-    return listed
-
-
-def is_zero(value: Any) -> bool:
-    """Whether a value is three plain zeros."""
-    listed = items(value)
-    return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
-
-
 def text_of(value: Any) -> str:
     """A value as it is shown in labels: numbers exactly, expressions as written."""
     if isinstance(value, float):
@@ -256,12 +238,3 @@ def label_of(reference: Mapping[str, Any]) -> str:
             "marker"
         )
     return f"{reference.get('body')}.at{text}"
-
-
-def without_defaults(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
-    """Values that are neither None nor their default; arrays, which do not compare as a whole, are no default."""
-
-    def left_out(key: str, value: Any) -> bool:
-        return value is None or (isinstance(value, str | int) and key in defaults and value == defaults[key])
-
-    return {key: value for key, value in values.items() if not left_out(key, value)}

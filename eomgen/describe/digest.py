@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.operations import OPERATIONS
+from ..elements.kinds import Field
 from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, reachable
 
@@ -41,6 +42,13 @@ ASIDE = frozenset(
         "requirements",
     }
 )
+
+
+#: What counts of a key of a joint's own, and how its kind is spelled: digests are compared over versions.
+_OF_A_KEY = (
+    *("doc", "required", "default", "level", "choices", "own", "not_zero", "dimension", "along", "exponent", "local"),
+)
+_KINDS = {"Choice": "choice", "Scalar": "expression", "GuidePoint": "shape"}
 
 
 def model_digest(mechanism: Mechanism) -> str:
@@ -90,6 +98,9 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
         array = np.ascontiguousarray(value)
         return ["array", array.shape, array.dtype.str, hashlib.sha256(array.tobytes()).hexdigest()]
     kind = type(value)
+    if isinstance(value, Field):
+        parts = [getattr(value, name) for name in _OF_A_KEY]
+        return ["list", _KINDS[kind.__name__], *(_spell(one, graph, known) for one in parts)]
     if kind.__module__.startswith("eomgen."):
         fields = [(name, one) for name, one in sorted(_fields(value).items()) if name not in ASIDE]
         return [kind.__qualname__, *((name, _spell(one, graph, known)) for name, one in fields)]

@@ -9,11 +9,9 @@ from ..constraints import CONSTRAINTS
 from ..elements.element_type import ElementType
 from ..forces import FORCES
 from ..joints import JOINTS
-from .described import Described
 from .fields import joint_type
-from .handles import JointHandle
+from .handles import Described, JointHandle, References
 from .methods import method_of
-from .references import marker_reference
 
 
 def tables() -> dict[str, dict[str, ElementType]]:
@@ -45,7 +43,7 @@ class ElementMethods(Described):
         -------
         JointHandle
         """
-        between = [marker_reference(self, predecessor), marker_reference(self, successor)]
+        between = [References(self).marker(end) for end in (predecessor, successor)]
         given = {key: value for key, value in keys.items() if value is not None}
         return JointHandle(self, self._add("joints", name, {"type": type, "between": between, **given}))
 

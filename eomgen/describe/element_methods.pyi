@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
-from .described import Described
-from .element_handles import ConstraintHandle, ForceHandle
-from .handles import JointHandle
+from .handles import ConstraintHandle, Described, ForceHandle, JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 

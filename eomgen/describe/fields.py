@@ -7,307 +7,270 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from functools import cache
 from typing import Any
 
 from ..constraints import CONSTRAINTS
 from ..constraints.switching import SWITCHING
+from ..elements import kinds as k
 from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REACH, TIME, Dimension
 from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
 from ..elements.element_type import ElementType
-from ..elements.field import CONSTANT as CONSTANT
-from ..elements.field import LAW as LAW
-from ..elements.field import MOTION as MOTION
-from ..elements.field import NUMBER as NUMBER
-from ..elements.field import OUTPUT as OUTPUT
-from ..elements.field import Field as Field
-from ..elements.field import Fields as Fields
+from ..elements.kinds import LIMITS as LIMITS
+from ..elements.kinds import MARKER, Fields
+from ..elements.kinds import PLACED as PLACED
 from ..forces import FORCES
-from ..forces.contact_shape_fields import SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
-from .kinds import KINDS as KINDS
 from .mechanism import Simulation
 
-INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
-AXES = ("x", "y", "z", "-x", "-y", "-z")
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4", "moreau")
 FIXED_STEP = ("RK4", "moreau")  #: methods whose steps are of one size
 
-_UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
-_DOC = Field("text", "one sentence, shown in reports", default="")
-_LATEX = Field("latex", "how formulas and plots print it, in LaTeX (from its name unless given)", default="")
-_LATEXES = Field(
-    "latexes", "how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=()
-)
-_NAME = Field("name", "name of the model and of the generated module", required=True)
+_UNIT = k.Unit("unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
+_DOC = k.Text("one sentence, shown in reports", default="")
+_LATEX = k.Latex("how formulas and plots print it, in LaTeX (from its name unless given)", default="")
+_LATEXES = k.Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
+_NAME = k.Name("name of the model and of the generated module", required=True)
 
 PARAMETER: Fields = {
-    "value": Field("number", "value; needed when the model is compiled"),
+    "value": k.Number("value; needed when the model is compiled"),
     "unit": _UNIT,
     "doc": _DOC,
     "latex": _LATEX,
 }
 INPUT: Fields = {
-    "value": Field("number", "value as long as a call gives none", default=0.0),
-    "signal": Field(
-        "expression", "value over time, in runs that give none: of t, coordinates, velocities, parameters", level=MOTION
+    "value": k.Number("value as long as a call gives none", default=0.0),
+    "signal": k.Scalar(
+        "value over time, in runs that give none: of t, coordinates, velocities, parameters", level=k.MOTION
     ),
     "unit": _UNIT,
     "doc": _DOC,
     "latex": _LATEX,
 }
 OUTPUT_FIELDS: Fields = {
-    "expression": Field(
-        "expression", "the result: of t, parameters, inputs, coordinates, rates, markers", required=True, level=OUTPUT
+    "expression": k.Scalar(
+        "the result: of t, parameters, inputs, coordinates, rates, markers", required=True, level=k.OUTPUT
     ),
     "unit": _UNIT,
     "doc": _DOC,
     "latex": _LATEX,
 }
 STATE: Fields = {
-    "rate": Field(
-        "expression",
+    "rate": k.Scalar(
         "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
-        level=LAW,
+        level=k.LAW,
     ),
-    "sampled": Field(
-        "expression",
+    "sampled": k.Scalar(
         "instead of rate: its new value at each sampling time, held in between; without it a run's controllers give it",
-        level=LAW,
+        level=k.LAW,
     ),
-    "period": Field("expression", "time from one sampling time to the next (s)", dimension=TIME),
-    "offset": Field("expression", "a sampling time (s)", default=0, dimension=TIME),
-    "initial": Field("expression", "its value where a run begins", default=0),
-    "unit": Field("unit", "unit of the state; an initial value that is a number is converted to SI", default=""),
+    "period": k.Scalar("time from one sampling time to the next (s)", dimension=TIME),
+    "offset": k.Scalar("a sampling time (s)", default=0, dimension=TIME),
+    "initial": k.Scalar("its value where a run begins", default=0),
+    "unit": k.Unit("unit of the state; an initial value that is a number is converted to SI", default=""),
     "doc": _DOC,
     "latex": _LATEX,
 }
 EVENT: Fields = {
-    "expression": Field(
-        "expression",
+    "expression": k.Scalar(
         "the event is where it is 0: of t, parameters, inputs, coordinates, rates, positions, velocities of markers",
         required=True,
-        level=OUTPUT,
+        level=k.OUTPUT,
     ),
-    "terminal": Field("times", "whether the event ends the run, or how many do", default=False),
-    "direction": Field("sign", "1: only where it rises, -1: only where it falls, 0: both", default=0),
-    "reset": Field("rates", "new coordinates and velocities, from those before the event", default=(), level=OUTPUT),
-    "restitution": Field("number", "for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
-    "friction": Field("number", "beside a restitution: Coulomb's coefficient of friction in the impact"),
-    "slip": Field("some_names", "beside friction: the output that is the sliding velocity; in space two of them"),
+    "terminal": k.Times("whether the event ends the run, or how many do", default=False),
+    "direction": k.Sign("1: only where it rises, -1: only where it falls, 0: both", default=0),
+    "reset": k.Rates("new coordinates and velocities, from those before the event", default=(), level=k.OUTPUT),
+    "restitution": k.Number("for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
+    "friction": k.Number("beside a restitution: Coulomb's coefficient of friction in the impact"),
+    "slip": k.SomeNames("beside friction: the output that is the sliding velocity; in space two of them"),
     "doc": _DOC,
 }
 FUNCTION: dict[str, Fields] = {
     "table": {
-        "x": Field("numbers", "points, strictly increasing", required=True),
-        "y": Field("numbers", "values at the points; with z, points along the second argument", required=True),
-        "z": Field("grid", "values on the grid of x and y, for a function of two arguments"),
-        "kind": Field("choice", "interpolation between the points", default="cubic", choices=tuple(TABLES)),
-        "extrapolation": Field(
-            "choice", "beyond the points: keep the slope or the value", default="linear", choices=("linear", "constant")
+        "x": k.Numbers("points, strictly increasing", required=True),
+        "y": k.Numbers("values at the points; with z, points along the second argument", required=True),
+        "z": k.Grid("values on the grid of x and y, for a function of two arguments"),
+        "kind": k.Choice("interpolation between the points", default="cubic", choices=tuple(TABLES)),
+        "extrapolation": k.Choice(
+            "beyond the points: keep the slope or the value", default="linear", choices=("linear", "constant")
         ),
     },
     "native": {
-        "source": Field("text", "C source file, relative to the model file; needs --allow-native", required=True),
-        "function": Field("name", "C function double f(double, ...) (the name of the entry unless given)"),
-        "arguments": Field("count", "number of arguments (that of derivatives unless given, or 1)"),
-        "derivatives": Field("functions", "C functions of the derivative along each argument"),
-        "second_derivatives": Field("functions", "C functions of the second derivatives, along 11, 12, .., 22, .."),
-        "python": Field("text", "Python file with functions of the same names, for evaluation without C"),
+        "source": k.Text("C source file, relative to the model file; needs --allow-native", required=True),
+        "function": k.Name("C function double f(double, ...) (the name of the entry unless given)"),
+        "arguments": k.Count("number of arguments (that of derivatives unless given, or 1)"),
+        "derivatives": k.Functions("C functions of the derivative along each argument"),
+        "second_derivatives": k.Functions("C functions of the second derivatives, along 11, 12, .., 22, .."),
+        "python": k.Text("Python file with functions of the same names, for evaluation without C"),
     },
 }
-MARKER: Fields = {
-    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
-    "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
-    "axes": Field(
-        "frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy", dimension=NONE
-    ),
-    "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy", dimension=NONE),
-}
-CYLINDER: Fields = {
-    "around": Field("marker", "marker whose z axis is the axis of the cylinder", required=True),
-    "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
-    "sense": Field("choice", "sense of the path about the axis", default="positive", choices=("positive", "negative")),
-    "friction": Field(
-        "expression", "coefficient of friction of a rope or belt on it; give smoothing too", dimension=NONE
-    ),
-    "smoothing": Field(
-        "expression", "slip velocity (m/s) below which this friction is smoothed", dimension=LENGTH.times(TIME, -1)
-    ),
-}
-PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
-SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
-DISPLAY: Fields = {
-    "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
-    "file": Field("text", "file of a mesh (STL, OBJ or DAE), read when the model is drawn"),
-    "scale": Field("vector", "scale of a mesh"),
-    "size": Field("vector", "edges of a box (m)", dimension=LENGTH),
-    "radius": Field("expression", "radius (m)", dimension=LENGTH),
-    "length": Field("expression", "length along z (m)", dimension=LENGTH),
-    "color": Field("text", 'color "#rrggbb" in pictures; that of the body unless given'),
-    **MARKER,
-}
-LIMITS: Fields = {
-    "lower": Field("number", "least value (rad or m)"),
-    "upper": Field("number", "greatest value (rad or m)"),
-    "velocity": Field("number", "greatest speed (rad/s or m/s)"),
-    "effort": Field("number", "greatest torque or force of the drive (N m or N)"),
-}
-BODY: Fields = {
-    "mass": Field("expression", "mass (kg); 0 for a body without mass", dimension=MASS),
-    "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
-    "inertia": Field(
-        "inertia",
-        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say",
-        default=(0, 0, 0),
-        dimension=MOMENT_OF_INERTIA,
-    ),
-    "markers": Field("markers", "named frames fixed in the body", default=()),
-    "principal": Field("vector", "principal moments (kg m^2), instead of inertia", dimension=MOMENT_OF_INERTIA),
-    "first_moment": Field(
-        "vector", "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
-    ),
-    "about": Field("about", "point of the inertia; a marker gives its axes too", default="com", dimension=LENGTH),
-    "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
-    "solids": Field("solids", "solids of uniform density, which give mass, com, inertia", default=()),
-    "points": Field("points", "point masses that are added", default=()),
-    "check_inertia": Field("check", "a mass and inertia that no body can have: as in the model, unless given"),
-    "display": Field("display", "shapes for pictures, in body axes", default=()),
-}
-POINT: Fields = {
-    "mass": Field("expression", "mass (kg)", required=True, dimension=MASS),
-    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
-}
-_MASS = Field("expression", "mass (kg), instead of a density", dimension=MASS)
-_DENSITY = Field("expression", "density (kg/m^3)", dimension=Dimension(-3, 1))
-_SUBTRACT = Field("flag", "whether the solid is a hole", default=False)
+_MASS = k.Scalar("mass (kg), instead of a density", dimension=MASS)
+_DENSITY = k.Scalar("density (kg/m^3)", dimension=Dimension(-3, 1))
+_SUBTRACT = k.Flag("whether the solid is a hole", default=False)
 #: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
 SOLID: dict[str, Fields] = {
-    name: {key: Field(d.kind, d.doc, required=True, dimension=LENGTH) for key, d in solid.dimensions.items()}
-    | ({"axis": Field("axis", "direction of its z axis in the body", default="z")} if solid.has_axis else {})
+    name: dict(solid.dimensions)
+    | ({"axis": k.Axis("direction of its z axis in the body", default="z")} if solid.has_axis else {})
     | {
         solid.content_key: _DENSITY
         if solid.content_key == "density"
-        else Field("expression", "mass per length (kg/m)", dimension=Dimension(-1, 1))
+        else k.Scalar("mass per length (kg/m)", dimension=Dimension(-1, 1))
     }
     for name, solid in SOLIDS.items()
 } | {
     "mesh": {
-        "file": Field("file", "STL file; its path from the folder of the model file", required=True),
-        "scale": Field("expression", "metres in one unit of the file", default=1, dimension=LENGTH),
+        "file": k.File("STL file; its path from the folder of the model file", required=True),
+        "scale": k.Scalar("metres in one unit of the file", default=1, dimension=LENGTH),
         "density": _DENSITY,
     }
+}
+
+
+def solid_fields(type_name: str) -> Fields:
+    """The keys of one type of solid."""
+    kind = k.Choice("type of the solid", required=True, choices=tuple(SOLID))
+    return {"type": kind, **SOLID[type_name], "mass": _MASS, **MARKER, "subtract": _SUBTRACT}
+
+
+SOLID_KEYS = frozenset(key for name in SOLID for key in solid_fields(name))
+
+
+class Solids(k.BodyParts):
+    """A list of solids {type, ...}."""
+
+    schema, defines = k.define("solids", lambda: k.array({"oneOf": [_solid_schema(name) for name in SOLID]}))
+    parts = {key: field for fields in SOLID.values() for key, field in fields.items()} | MARKER
+
+
+def _solid_schema(name: str) -> k.Schema:
+    density = "line_density" if "line_density" in SOLID[name] else "density"
+    schema = k.typed_schema(solid_fields(name), name)
+    return {**schema, "oneOf": [{"required": ["mass"]}, {"required": [density]}]}
+
+
+BODY: Fields = {
+    "mass": k.Scalar("mass (kg); 0 for a body without mass", dimension=MASS),
+    "com": k.Vector("centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
+    "inertia": k.Inertia(
+        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say",
+        default=(0, 0, 0),
+        dimension=MOMENT_OF_INERTIA,
+    ),
+    "markers": k.Markers("named frames fixed in the body", default=()),
+    "principal": k.Vector("principal moments (kg m^2), instead of inertia", dimension=MOMENT_OF_INERTIA),
+    "first_moment": k.Vector(
+        "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
+    ),
+    "about": k.About("point of the inertia; a marker gives its axes too", default="com", dimension=LENGTH),
+    "axes": k.Vector("roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
+    "solids": Solids("solids of uniform density, which give mass, com, inertia", default=()),
+    "points": k.Points("point masses that are added", default=()),
+    "check_inertia": k.Check("a mass and inertia that no body can have: as in the model, unless given"),
+    "display": k.Display("shapes for pictures, in body axes", default=()),
 }
 GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
 JOINT: Fields = {
-    "type": Field("choice", "type of the joint", required=True, choices=tuple(JOINTS)),
-    "between": Field(
-        "pair",
+    "type": k.Choice("type of the joint", required=True, choices=tuple(JOINTS)),
+    "between": k.Pair(
         "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P",
         required=True,
     ),
 }
-AXIS = Field("axis", "axis of the joint, in both markers", default="z")
-AXIS_PAIR = Field("axes", "axes of the cross in the markers: the first stays with P, the second with S")
-COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
-COORDINATES = Field("names", "names of the coordinates, in order")
+AXIS = k.Axis("axis of the joint, in both markers", default="z")
+AXIS_PAIR = k.TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
+COORDINATE = k.CoordinateName("name of the coordinate (the joint's name unless given)")
+COORDINATES = k.CoordinateNames("names of the coordinates, in order")
 #: Data of a joint that has coordinates; the last only where it has one.
 JOINT_DATA: Fields = {
-    "limits": Field("limits", "limits of the coordinate; a run that passes one warns, but nothing stops there"),
-    "dry_friction": Field("number", "Coulomb friction (N m or N); stored, but it does not act"),
-    "armature": Field(
-        "expression",
+    "limits": k.Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
+    "dry_friction": k.Number("Coulomb friction (N m or N); stored, but it does not act"),
+    "armature": k.Scalar(
         "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
         dimension=ENERGY.times(TIME, 2).times(REACH, -2),
     ),
 }
 LAGRANGIAN: Fields = {
-    "coordinates": Field("names", "generalized coordinates, in order", required=True),
-    "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION, dimension=ENERGY),
-    "forces": Field("forces", "generalized forces", default=(), level=MOTION),
-    "dissipation": Field(
-        "expression", "Rayleigh's dissipation function", default=0, level=MOTION, dimension=ENERGY.times(TIME, -1)
+    "coordinates": k.CoordinateNames("generalized coordinates, in order", required=True),
+    "expression": k.Scalar("L(q, q_dot, t) = T - V", required=True, level=k.MOTION, dimension=ENERGY),
+    "forces": k.CoordinateForces("generalized forces", default=(), level=k.MOTION),
+    "dissipation": k.Scalar(
+        "Rayleigh's dissipation function", default=0, level=k.MOTION, dimension=ENERGY.times(TIME, -1)
     ),
-    "constraints": Field(
-        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    "constraints": k.Scalars(
+        "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=k.MOTION
     ),
     "latex": _LATEXES,
 }
 EQUATIONS: Fields = {
-    "coordinates": Field("names", "generalized coordinates q, in order", required=True),
-    "velocities": Field("names", "generalized velocities v, in order (<coordinate>_dot unless given)"),
-    "rates": Field("rates", "q' of q, v, t, linear in v (q' = v unless given)", level=MOTION),
-    "intermediates": Field("rates", "named parts of the expressions; each may use those before", level=MOTION),
-    "mass_matrix": Field("matrix", "M in M v' = f, of q and t, symmetric", required=True, level=MOTION),
-    "forcing": Field("expressions", "f, of q, v, t and inputs", required=True, level=MOTION),
-    "constraints": Field(
-        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    "coordinates": k.CoordinateNames("generalized coordinates q, in order", required=True),
+    "velocities": k.CoordinateNames("generalized velocities v, in order (<coordinate>_dot unless given)"),
+    "rates": k.Rates("q' of q, v, t, linear in v (q' = v unless given)", level=k.MOTION),
+    "intermediates": k.Rates("named parts of the expressions; each may use those before", level=k.MOTION),
+    "mass_matrix": k.Matrix("M in M v' = f, of q and t, symmetric", required=True, level=k.MOTION),
+    "forcing": k.Scalars("f, of q, v, t and inputs", required=True, level=k.MOTION),
+    "constraints": k.Scalars(
+        "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=k.MOTION
     ),
-    "multipliers": Field("names", "names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
-    "kinetic_energy": Field("expression", "kinetic energy (J)", default=0, level=MOTION, dimension=ENERGY),
-    "potential_energy": Field("expression", "potential energy (J)", default=0, level=MOTION, dimension=ENERGY),
+    "multipliers": k.Names("names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
+    "kinetic_energy": k.Scalar("kinetic energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
+    "potential_energy": k.Scalar("potential energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
     "latex": _LATEXES,
 }
 SIMULATION: Fields = {
-    "end": Field("positive", "end time (s)", default=Simulation.end),
-    "method": Field("choice", "integrator", default=Simulation.method, choices=SOLVERS),
-    "rtol": Field("positive", "relative tolerance", default=Simulation.rtol),
-    "atol": Field("positive", "absolute tolerance", default=Simulation.atol),
-    "step": Field("positive", "step size (s), for RK4 and moreau only"),
+    "end": k.PositiveNumber("end time (s)", default=Simulation.end),
+    "method": k.Choice("integrator", default=Simulation.method, choices=SOLVERS),
+    "rtol": k.PositiveNumber("relative tolerance", default=Simulation.rtol),
+    "atol": k.PositiveNumber("absolute tolerance", default=Simulation.atol),
+    "step": k.PositiveNumber("step size (s), for RK4 and moreau only"),
 }
 MODEL: Fields = {
     "name": _NAME,
     "doc": _DOC,
-    "gravity": Field(
-        "vector", "acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0), dimension=ACCELERATION
-    ),
-    "parameters": Field("table", "constants that can change between runs"),
-    "inputs": Field("table", "quantities given from outside over time"),
-    "functions": Field("table", "functions for use in expressions: tables, and C code"),
-    "bodies": Field("table", "rigid bodies"),
-    "joints": Field("table", "joints between bodies"),
-    "forces": Field("table", "force elements"),
-    "contacts": Field("table", "contact between groups of shapes: forces of type contacts"),
-    "constraints": Field("table", "equations between coordinates or markers"),
-    "states": Field("table", "first-order states: names of quantities with their rates"),
-    "outputs": Field("table", "named results"),
-    "events": Field("table", "events to find during a run, and what they do"),
-    "components": Field("table", "parts of mechanisms that can be added several times"),
-    "add": Field("table", "instances of components"),
-    "attachments": Field("names", "names for markers of the model to which this one is added"),
-    "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
-    "equations": Field("table", "equations of motion M v' = f, instead of bodies and joints"),
-    "independent": Field("names", "independent coordinates of a mechanism with loops", default=()),
-    "initial": Field("table", "initial values by coordinate, <coordinate>_dot, output or place of a marker"),
-    "guess": Field("table", "rough values of coordinates, from which loops are closed"),
-    "simulation": Field("table", "defaults of a simulation"),
-    "limits": Field(
-        "choice", "whether a run that passes a limit of a joint warns", default="note", choices=("note", "off")
-    ),
-    "check_inertia": Field("check", "masses and inertias that no body can have: refused or noted", default=True),
+    "gravity": k.Vector("acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0), dimension=ACCELERATION),
+    "parameters": k.Table("constants that can change between runs"),
+    "inputs": k.Table("quantities given from outside over time"),
+    "functions": k.Table("functions for use in expressions: tables, and C code"),
+    "bodies": k.Table("rigid bodies"),
+    "joints": k.Table("joints between bodies"),
+    "forces": k.Table("force elements"),
+    "contacts": k.Table("contact between groups of shapes: forces of type contacts"),
+    "constraints": k.Table("equations between coordinates or markers"),
+    "states": k.Table("first-order states: names of quantities with their rates"),
+    "outputs": k.Table("named results"),
+    "events": k.Table("events to find during a run, and what they do"),
+    "components": k.Table("parts of mechanisms that can be added several times"),
+    "add": k.Table("instances of components"),
+    "attachments": k.Names("names for markers of the model to which this one is added"),
+    "lagrangian": k.Table("a bare Lagrangian, instead of bodies and joints"),
+    "equations": k.Table("equations of motion M v' = f, instead of bodies and joints"),
+    "independent": k.Names("independent coordinates of a mechanism with loops", default=()),
+    "initial": k.Table("initial values by coordinate, <coordinate>_dot, output or place of a marker"),
+    "guess": k.Table("rough values of coordinates, from which loops are closed"),
+    "simulation": k.Table("defaults of a simulation"),
+    "limits": k.Choice("whether a run that passes a limit of a joint warns", default="note", choices=("note", "off")),
+    "check_inertia": k.Check("masses and inertias that no body can have: refused or noted", default=True),
 }
 
 #: Keys of a model file that hold parts of mechanisms and their use; what they bring stands in the sections then.
 PARTS = ("components", "add")
 COMPONENT: Fields = {
     "doc": _DOC,
-    "file": Field("file", "model file of the component (path from this file's folder), instead of all other keys"),
+    "file": k.File("model file of the component (path from this file's folder), instead of all other keys"),
     "attachments": MODEL["attachments"],
     **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
     **{key: MODEL[key] for key in ("constraints", "states", "outputs", "events", "initial", "guess", "add")},
 }
 ADDED: Fields = {
-    "component": Field("name", "name of a component", required=True),
-    "prefix": Field("prefix", "text before each name of the component (the entry's name and _ unless given)"),
-    "for": Field("loops", "variables and their lists of values; one instance for each value, numbered 1, 2, ..."),
-    "at": Field("attached", "a marker for each attachment, or one for the only attachment or for its ground"),
-    "parameters": Field("measured", "its parameters: numbers, {value, unit}, or expressions that replace them"),
-    "inputs": Field("measured", "its inputs: numbers, {value, unit}, or expressions that replace them"),
-    "initial": Field("values", "initial values, by names within the component"),
-    "guess": Field("values", "rough coordinates, by names within the component"),
+    "component": k.Name("name of a component", required=True),
+    "prefix": k.Prefix("text before each name of the component (the entry's name and _ unless given)"),
+    "for": k.Loops("variables and their lists of values; one instance for each value, numbered 1, 2, ..."),
+    "at": k.AttachedTo("a marker for each attachment, or one for the only attachment or for its ground"),
+    "parameters": k.Measured("its parameters: numbers, {value, unit}, or expressions that replace them"),
+    "inputs": k.Measured("its inputs: numbers, {value, unit}, or expressions that replace them"),
+    "initial": k.Values("initial values, by names within the component"),
+    "guess": k.Values("rough coordinates, by names within the component"),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
@@ -356,17 +319,7 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     return own.get(section, {})
 
 
-@cache
-def part_fields() -> Fields:
-    """Keys of the parts of an entry: placements, cylinders of paths, point masses and solids."""
-    return {
-        key: field
-        for own in (*SHAPE_FIELDS.values(), *SOLID.values(), POINT, CYLINDER, MARKER)
-        for key, field in own.items()
-    }
-
-
-def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_length: Callable[[str], bool]) -> bool:
+def acts_on_length(section: str, values: Mapping[str, Any], field: k.Field, is_length: Callable[[str], bool]) -> bool:
     """Whether an entry acts on a length rather than an angle, where the dimension of a field depends on it.
 
     Parameters
@@ -380,16 +333,7 @@ def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_len
     return "between" in values or "marker" in values or "first" in values
 
 
-def solid_fields(type_name: str) -> Fields:
-    """The keys of one type of solid."""
-    kind = Field("choice", "type of the solid", required=True, choices=tuple(SOLID))
-    return {"type": kind, **SOLID[type_name], "mass": _MASS, **MARKER, "subtract": _SUBTRACT}
-
-
-SOLID_KEYS = frozenset(key for name in SOLID for key in solid_fields(name))
-
-
 def function_fields(type_name: str) -> Fields:
     """The keys of one type of function, ``type`` among them."""
     choices = tuple(FUNCTION)
-    return {"type": Field("choice", "type of the function", required=True, choices=choices), **FUNCTION[type_name]}
+    return {"type": k.Choice("type of the function", required=True, choices=choices), **FUNCTION[type_name]}

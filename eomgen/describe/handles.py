@@ -3,22 +3,184 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-from ..errors import at_odds, ill_placed, ill_typed, no_choice
+from ..base import texts
+from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
-from .described import Described
-from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
-from .element_handles import JointReaction, noted
-from .marker_quantities import MarkerQuantity
+from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
+from .marker_quantities import ElementQuantity, MarkerQuantity
 from .mechanism import velocity_names
-from .names import REACTION
+from .names import MULTIPLIER, REACTION, WRENCH
 from .scope import RATES
-from .sympy_face import names_of, symbol
+from .sympy_face import names_of, require_name, symbol
 
 Triple = tuple[Any, Any, Any]
+
+
+class Described:
+    """A mechanism under description."""
+
+    _description: Description
+
+    @property
+    def description(self) -> Description:
+        """The description of the model, with the same structure as a model file."""
+        return self._description
+
+    def _add(self, section: str, name: str, values: dict[str, Any]) -> DescribedEntry:
+        """Append an entry to a section, with the file and line of the call."""
+        entry = self._description.add(section, require_name(section, name), values)
+        self._description.lines[entry.path] = calling_line()
+        return entry
+
+    def _note_line(self, *paths: str) -> None:
+        """Note the file and line of the user's call for what was said there."""
+        self._description.lines.update(dict.fromkeys(paths, calling_line()))
+
+    @property
+    def name(self) -> Any:
+        """Name of the model."""
+        return shown(self._description.values.get("name", ""))
+
+
+class Wrench(NamedTuple):
+    """Force and moment of an element, as SymPy symbols.
+
+    Of a joint they are what its predecessor exerts on its successor, at the successor's marker; of a force element what
+    it exerts on the body of the marker ``on``, about that marker's origin. ``axes`` is the label of the marker along
+    whose axes the components are, empty for ground.
+    """
+
+    function: str
+    element: str
+    axes: str = ""
+    on: str = ""
+
+    @property
+    def force(self) -> tuple[Any, Any, Any]:
+        """Components of the force (N)."""
+        return (self._part("x"), self._part("y"), self._part("z"))
+
+    @property
+    def moment(self) -> tuple[Any, Any, Any]:
+        """Components of the moment (N m)."""
+        return (self._part("mx"), self._part("my"), self._part("mz"))
+
+    @property
+    def size(self) -> Any:
+        """Size of the force (N)."""
+        return self._replace(axes="")._part("size")
+
+    def _part(self, part: str) -> Any:
+        return symbol(str(ElementQuantity(self.function, self.element, part, self.axes, self.on)))
+
+
+class JointReaction(Wrench):
+    """What the predecessor of a joint exerts on the successor, at the successor's marker, as SymPy symbols."""
+
+    __slots__ = ()
+
+    @property
+    def normal(self) -> Any:
+        """Size of the force across the axis of the joint (N)."""
+        return self._replace(axes="")._part("normal")
+
+
+class Labelled(Protocol):
+    """A marker as texts call it."""
+
+    label: str
+
+    def note(self) -> None: ...
+
+
+def noted(marker: Labelled) -> str:
+    """The label of a marker whose motion an expression uses; UsageError if it is none."""
+    if not hasattr(marker, "note"):
+        raise ill_typed(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {texts.shown(marker)}")
+    marker.note()
+    return marker.label
+
+
+class ForceHandle:
+    """A force element of the model; what it does can stand in outputs, events and other laws.
+
+    Attributes
+    ----------
+    model : Model
+        The model it belongs to.
+    name : str
+        Name of the element.
+    """
+
+    def __init__(self, model: Described, entry: DescribedEntry) -> None:
+        self.model, self.name, self._entry = model, entry.name, entry
+
+    def __repr__(self) -> str:
+        return f"<ForceHandle {self.name}: {self._entry.values.get('type')}>"
+
+    @property
+    def force(self) -> Any:
+        """Force along its path (N or N m), positive where it increases it; of a contact the normal force."""
+        return symbol(f"force({self.name})")
+
+    @property
+    def length(self) -> Any:
+        """Length or angle of its path (m or rad), or penetration of a contact (m)."""
+        return symbol(f"length({self.name})")
+
+    @property
+    def rate(self) -> Any:
+        """Rate of :attr:`length` (m/s or rad/s)."""
+        return symbol(f"rate({self.name})")
+
+    @property
+    def power(self) -> Any:
+        """Power of everything that it exerts (W): positive where it drives the mechanism."""
+        return symbol(f"power({self.name})")
+
+    def on(self, marker: Labelled, axes: Labelled | None = None) -> Wrench:
+        """Force and moment that it exerts on the body of a marker, in ground axes or along those of another marker.
+
+        Parameters
+        ----------
+        marker : BodyHandle or MarkerHandle
+            On whose body it acts; moments are about its origin.
+        axes : BodyHandle or MarkerHandle, optional
+            Along whose axes the components are; ground unless given.
+        """
+        return Wrench(WRENCH, self.name, "" if axes is None else noted(axes), noted(marker))
+
+
+class ConstraintHandle:
+    """A constraint element of the model; its multipliers can stand in outputs, events and laws.
+
+    Attributes
+    ----------
+    model : Model
+        The model it belongs to.
+    name : str
+        Name of the element.
+    """
+
+    def __init__(self, model: Described, entry: DescribedEntry) -> None:
+        self.model, self.name, self._entry = model, entry.name, entry
+
+    def __repr__(self) -> str:
+        return f"<ConstraintHandle {self.name}: {self._entry.values.get('type')}>"
+
+    def multiplier(self, row: str = "") -> Any:
+        """The Lagrange multiplier of an equation, as a SymPy symbol.
+
+        Parameters
+        ----------
+        row : str, optional
+            Which equation, such as ``height`` of a rolling wheel; not needed where there is one.
+        """
+        return symbol(str(ElementQuantity(MULTIPLIER, f"{self.name}.{row}" if row else self.name)))
 
 
 class MarkerHandle:
@@ -357,3 +519,75 @@ class Names(list[Any]):
     def __call__(self, *names: Any) -> None:
         """Replace the list by the given names, or by one list of names."""
         self[:] = names_of("independent", names[0] if len(names) == 1 else names, "a coordinate")
+
+
+class InstanceHandle:
+    """A component that was added to a model; names are those of the component.
+
+    Attributes
+    ----------
+    name : str
+        Of the instance, as in ``leg1.hip``.
+    prefix : str
+        What stands before its names in the model: ``leg1_``.
+    """
+
+    def __init__(self, model: Described, name: str, prefix: str) -> None:
+        self.model, self.name, self.prefix = model, name, prefix
+
+    def __repr__(self) -> str:
+        return f"<InstanceHandle {self.name}>"
+
+    @property
+    def bodies(self) -> dict[str, BodyHandle]:
+        """Handles of its bodies, by their names in the component."""
+        return {name: BodyHandle(self.model, entry.name, entry) for name, entry in self._entries("bodies").items()}
+
+    @property
+    def joints(self) -> dict[str, JointHandle]:
+        """Handles of its joints, by their names in the component."""
+        return {name: JointHandle(self.model, entry) for name, entry in self._entries("joints").items()}
+
+    def symbol(self, name: str) -> Any:
+        """The SymPy symbol of a parameter, input or coordinate of the component, or of a rate."""
+        return symbol(self.prefix + require_name("symbol", name))
+
+    def marker(self, label: str) -> MarkerHandle:
+        """A named marker of one of its bodies: ``foot.tip``."""
+        return MarkerHandle(self.model, self.prefix + require_name("marker", label))
+
+    def _entries(self, section: str) -> dict[str, Any]:
+        made = self.model.description.origins
+        return {
+            entry.name.removeprefix(self.prefix): entry
+            for entry in self.model.description.sections[section]
+            if (origin := made.get(f"{section}.{entry.name}")) is not None
+            and origin.instance.partition(".")[0] == self.name
+        }
+
+
+class References(NamedTuple):
+    """How a model file refers to what calls of a model are given."""
+
+    model: Described
+
+    def marker(self, value: Any) -> Any:
+        """A marker, body or name as a model file refers to it; raises UsageError for a handle of another model."""
+        if isinstance(value, JointHandle):
+            raise ill_placed(f"{value.name} is a joint; a body or a marker is expected")
+        return self._own(value).reference if isinstance(value, MarkerHandle) else value
+
+    def joint(self, value: Any) -> Any:
+        """A joint, coordinate or name as a model file refers to it; raises UsageError for a handle of another model."""
+        if isinstance(value, MarkerHandle):
+            raise ill_placed(f"{value.label} is a body or marker; a joint or a coordinate is expected")
+        return self._own(value).name if isinstance(value, JointHandle) else value
+
+    def _own(self, handle: Any) -> Any:
+        if handle.model is self.model:
+            return handle
+        name = handle.label if isinstance(handle, MarkerHandle) else handle.name
+        other = f"the model {handle.model.name!r}, not to {self.model.name!r}"
+        if handle.model.name == self.model.name:
+            other = f"another model that is called {self.model.name!r} too"
+        raise ill_placed(f"{name} belongs to {other}; use a handle of this model")

@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..base.value_rules import NOT_NEGATIVE
+from ..elements import kinds
+from ..elements.kinds import DISPLAY, LIMITS
 from ..graph.core import Expr
 from .checks import check_keys
 from .description import items
-from .fields import DISPLAY, LIMITS
 from .values import Reader
 
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -32,7 +33,7 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
     A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
     """
     if not isinstance(given, Mapping):
-        reader.wrong(path, given, "limits")
+        reader.wrong(path, given, kinds.Limits)
         return tuple(() for _ in coordinates)
     check_keys(path, given, LIMITS, reader.faults)
     result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
@@ -79,31 +80,22 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
     """Note faults of the shapes of a body; the files they name are not looked for."""
     listed = items(given)
     if listed is None:
-        reader.wrong(path, given, "display")
+        reader.wrong(path, given, kinds.Display)
         return
     for k, shape in enumerate(listed):
         place = f"{path}[{k}]"
         if not isinstance(shape, Mapping):
-            reader.wrong(place, shape, "display")
+            reader.wrong(place, shape, kinds.Display)
             continue
         check_keys(place, shape, DISPLAY, reader.faults)
         for key, value in shape.items():
-            field = DISPLAY.get(key)
-            if field is None:
+            if key not in DISPLAY:
                 continue
-            if field.kind == "choice":
-                reader.choice(f"{place}.{key}", value, field)
-            elif field.kind == "vector":
-                factors = reader.vector(f"{place}.{key}", value)
-                if key == "scale" and any(x.is_zero for x in factors):
-                    what = "leaves nothing of the mesh"
-                    remedy = "give three numbers other than 0; negative ones mirror"
-                    reader.faults.add(f"{place}.{key}", f"a scale of 0 {what}", remedy, "EG-RANGE")
-            elif field.kind == "expression":
-                reader.expression(f"{place}.{key}", value)
-            else:
-                reader.text(f"{place}.{key}", value)
-                if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
-                    reader.faults.add(
-                        f"{place}.{key}", f"{value!r} is no color", 'give six hexadecimal digits: "#1f77b4"', "EG-TYPE"
-                    )
+            found = DISPLAY[key].read(reader, f"{place}.{key}", value)
+            if key == "scale" and any(x.is_zero for x in found):
+                remedy = "give three numbers other than 0; negative ones mirror"
+                message = "a scale of 0 leaves nothing of the mesh"
+                reader.faults.add(f"{place}.{key}", message, remedy, "EG-RANGE")
+            if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
+                remedy = 'give six hexadecimal digits: "#1f77b4"'
+                reader.faults.add(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")

@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..elements import kinds
 from ..graph import vectors as vec
 from ..graph.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..graph.vectors import Mat3, Vec3
 from ..solids import MassProperties, combine
 from .description import DescribedEntry, items
-from .fields import KINDS
+from .fields import BODY
 from .mechanism import Body
 from .names import nearest
 from .parts import read_parts
@@ -46,7 +47,7 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
             remedy = "leave it out, or add points"
             faults.add(f"{path}.{key}", "is given beside solids, which already determine it", remedy, "EG-CONFLICT")
     elif "mass" not in values and (own or not ("solids" in values or "points" in values or faults.under(path))):
-        faults.missing(f"{path}.mass", f"give {KINDS['expression']}, solids or points")
+        faults.missing(f"{path}.mass", f"give {kinds.Scalar.says}, solids or points")
     if "solids" in values or not own:
         o = vec.zero(graph)
         whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
@@ -111,9 +112,9 @@ def _tensor(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[Mat3,
         given = values[key]
         parts = items(given)
         if key == "principal" and (parts is None or any(items(part) is not None for part in parts)):
-            reader.wrong(f"{path}.{key}", given, "vector")
+            reader.wrong(f"{path}.{key}", given, kinds.Vector)
         else:
-            tensor = reader.inertia(f"{path}.{key}", given)
+            tensor = BODY["inertia"].read(reader, f"{path}.{key}", given)
     if "axes" not in values:
         return tensor, reader.identity
     return tensor, rpy_rotation(reader.graph, reader.vector(f"{path}.axes", values["axes"]))
@@ -136,7 +137,7 @@ def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | 
             return None
         return marker.frame.position, marker.frame.rotation
     if items(about) is None:
-        reader.wrong(place, about, "about")
+        reader.wrong(place, about, kinds.About)
         return None
     return reader.vector(place, about), None
 

@@ -5,52 +5,22 @@ Arguments, defaults and their documentation are those of the type's keys, so tha
 
 from __future__ import annotations
 
+import functools
+import inspect
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, Signature
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
+from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import ElementType
-from ..elements.field import Field
-from ..errors import UsageError, at_odds, ill_typed
-from .described import Described
-from .description import items
-from .element_handles import ConstraintHandle, ForceHandle
-from .handles import JointHandle, MarkerHandle
-from .keywords import check_keywords
-from .references import joint_reference, marker_reference
+from ..elements.kinds import Field, Law, items
+from ..errors import UsageError, at_odds, ill_typed, no_such
+from ..joints import JOINTS
+from .handles import ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
+from .names import nearest
 
-#: Kind of a key -> what its argument is called in documentation, and its annotation.
-ARGUMENTS = {
-    "marker": ("handle or str", "Any"),
-    "pair": ("handles or str", "Sequence[Any]"),
-    "joint": ("handle or str", "Any"),
-    "joints": ("handles or str", "Sequence[Any]"),
-    "name": ("str or symbol", "Any"),
-    "body": ("handle or str", "Any"),
-    "names": ("sequence of str", "Sequence[Any]"),
-    "some_names": ("str or sequence of str", "Any"),
-    "vector": ("sequence of three", "Sequence[Value]"),
-    "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
-    "via": ("sequence", "Sequence[Any]"),
-    "matrix6": ("sequence", "Sequence[Any]"),
-    "shapes": ("sequence of mapping", "Sequence[Mapping[str, Any]] | Mapping[str, Any]"),
-    "law": ("mapping", "Mapping[str, Any]"),
-    "radii": ("sequence of two", "Sequence[Value]"),
-    "two": ("sequence of two", "Sequence[Value]"),
-    "wheels": ("mapping", "Mapping[str, Value]"),
-    "factors": ("mapping", "Mapping[Any, Value]"),
-    "flag": ("bool", "bool"),
-    "choice": ("str", "str"),
-    "shape": ("sequence of three", "Sequence[Value]"),
-    "limits": ("mapping", "Mapping[str, float]"),
-    "latex": ("str", "str"),
-    "latexes": ("str, sequence or mapping of str", "str | Sequence[str] | Mapping[str, str]"),
-    "number": ("float", "float"),
-    "axes": ("two of str or three floats", "Sequence[Any]"),
-    "axis": ("str or three floats", "str | Sequence[float]"),
-}
-_SCALAR = ("scalar", "Value")
+Method = TypeVar("Method", bound=Callable[..., Any])
 #: Section -> what its methods return.
 _HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
 _WIDTH = 108  #: of the text of a method's documentation
@@ -77,9 +47,7 @@ def arguments_of(found: ElementType) -> list[Argument]:
 
 
 def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[Argument]:
-    kind, annotation = ARGUMENTS.get(field.kind, _SCALAR)
-    if field.kind == "choice":
-        kind = "{" + ", ".join(f'"{word}"' for word in field.choices) + "}"
+    kind, annotation = field.described, field.annotation
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
     default: Any = field.default if type(field.default) in (int, float) else None
     if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
@@ -94,9 +62,8 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
         if key == "joint":
             return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
         return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
-    if field.required and field.kind in ("pair", "joints"):
-        single = ARGUMENTS["marker"]
-        return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in found.ends]
+    if field.required and field.joins:
+        return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in found.ends]
     return [Argument(key, key, kind, annotation, default, doc)]
 
 
@@ -196,23 +163,26 @@ def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, 
 
 def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:
     """What a model file would write."""
-    entry, kinds = dict[str, Any](), {key: field.kind for key, field in found.keys.items()}
-    if "on" in given and "on" not in kinds:
+    entry, refer = dict[str, Any](), References(model)
+    if "on" in given and "on" not in found.keys:
         on = given.pop("on")
         several = items(given.get("value")) is not None
         given["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
     first, second = found.ends
-    if first in given and first not in kinds:
-        key = next(key for key, kind in kinds.items() if kind in ("pair", "joints"))
-        entry[key] = [_reference(model, kinds[key], part) for part in (given.pop(first), given.pop(second))]
+    if first in given and first not in found.keys:
+        key = next(key for key, field in found.keys.items() if field.joins)
+        entry[key] = found.keys[key].reference([given.pop(first), given.pop(second)], refer)
     elif {"joint", "between"} <= {*found.one_of}:
-        entry |= _where(model, given.pop("between", ()), given.pop("joint", None))
-    law = given.pop("law", None) if kinds.get("law") == "law" else None
+        entry |= _where(refer, given.pop("between", ()), given.pop("joint", None))
+    law = given.pop("law", None) if isinstance(found.keys.get("law"), Law) else None
     if law is not None:
         given = {**given, **_law(found, name, law, given)}
-    for key in [key for key in kinds if key in given]:
-        if not _is_default(given[key], found.keys[key]):
-            entry[key] = _converted(model, found, name, key, given[key])
+    for key, field in found.keys.items():
+        if key in given and not _is_default(given[key], field):
+            if isinstance(given[key], JointHandle) and key in found.remedies:
+                told = f"{given[key]!r} is not a marker; {found.remedies[key]}"
+                raise ill_typed(f"{found.name} {name!r} acts at a marker, and {told}")
+            entry[key] = field.reference(given[key], refer)
     return {key: value for key, value in entry.items() if value is not None}
 
 
@@ -220,7 +190,9 @@ def _law(found: ElementType, name: Any, law: Any, given: Mapping[str, Any]) -> M
     """The keys of a law that is given as a mapping."""
     if not isinstance(law, Mapping):
         raise ill_typed(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
-    check_keywords(f"the law of {found.name}", dict(law), [key for key in found.keys if found.keys[key].kind != "law"])
+    check_keywords(
+        f"the law of {found.name}", dict(law), [key for key in found.keys if not isinstance(found.keys[key], Law)]
+    )
     twice = sorted(law.keys() & given.keys())
     if twice:
         raise at_odds(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
@@ -233,50 +205,43 @@ def _is_default(value: Any, field: Field) -> bool:
     return numbers and bool(value == field.default)
 
 
-def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, Any]:
+def _where(refer: References, between: Sequence[Any], joint: Any) -> dict[str, Any]:
     if joint is not None and not between:
-        return {"joint": joint_reference(model, joint)}
+        return {"joint": refer.joint(joint)}
     between = items(between) or ()
     if joint is None and len(between) == 1:
-        return {"joint": joint_reference(model, between[0])}
+        return {"joint": refer.joint(between[0])}
     if joint is None and len(between) == 2:
-        return {"between": [marker_reference(model, marker) for marker in between]}
+        return {"between": [refer.marker(marker) for marker in between]}
     raise ill_typed("give one joint or two markers first, and then the values by keyword")
 
 
-def _reference(model: Described, kind: str, value: Any) -> Any:
-    return joint_reference(model, value) if kind in ("joint", "joints", "factors") else marker_reference(model, value)
+# -- keywords ----------------------------------------------------------------------------------------------------------
+def checked_keywords(method: Method) -> Method:
+    """A method that raises UsageError for a keyword it does not have, naming those it has."""
+    parameters = list(inspect.signature(method).parameters.values())[1:]
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return method
+    allowed = [p.name for p in parameters if p.kind is not p.VAR_POSITIONAL]
+
+    @functools.wraps(method)
+    def checked(*args: Any, **keys: Any) -> Any:
+        check_keywords(method.__name__, keys, allowed)
+        return method(*args, **keys)
+
+    return cast("Method", checked)
 
 
-def _converted(model: Described, found: ElementType, name: Any, key: str, value: Any) -> Any:
-    kind = found.keys[key].kind
-    if kind == "marker" and isinstance(value, JointHandle) and key in found.remedies:
-        raise ill_typed(f"{found.name} {name!r} acts at a marker, and {value!r} is not a marker; {found.remedies[key]}")
-    if kind in ("marker", "joint", "body"):
-        return _reference(model, kind, value)
-    if kind in ("pair", "joints"):
-        return [_reference(model, kind, part) for part in items(value) or [value]]
-    if kind == "factors" and isinstance(value, Mapping):
-        return {_reference(model, kind, part): factor for part, factor in value.items()}
-    if kind == "shapes":
-        listed = [value] if isinstance(value, Mapping) else items(value)
-        return value if listed is None else [_on(model, part) for part in listed]  # reading tells what is no list
-    if kind == "via":
-        return [_stop(model, stop) for stop in value] or None
-    return value
+def keywords_of(function: Callable[..., Any]) -> list[str]:
+    """Arguments of a function that are given by keyword only."""
+    parameters = inspect.signature(function).parameters.values()
+    return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
 
 
-def _stop(model: Described, stop: Any) -> Any:
-    """A marker, or a cylinder as a mapping of around, radius, sense."""
-    if not (isinstance(stop, Mapping) and "around" in stop):
-        return marker_reference(model, stop)
-    return {key: marker_reference(model, x) if key == "around" else x for key, x in stop.items()}
-
-
-def _on(model: Described, shape: Any) -> Any:
-    """A shape whose markers are as a model file refers to them."""
-    if not isinstance(shape, Mapping) or "on" not in shape:
-        return shape
-    on, many = shape["on"], items(shape["on"])
-    placed = marker_reference(model, on) if many is None else [marker_reference(model, one) for one in many]
-    return {**shape, "on": placed}
+def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> None:
+    """Raise UsageError for the first keyword that a method does not have."""
+    for key in given:
+        if key not in allowed:
+            if name in JOINTS and key in SWITCHING:
+                raise no_such(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")
+            raise no_such(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")

@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Collection, Iterable
 
+from ..base.names import LONGEST as LONGEST
 from ..base.names import hint, joined
 from ..base.operations import OPERATIONS
 from ..graph.shown import quoted
@@ -75,7 +76,6 @@ _NEEDED |= {"errors", "limits", "numeric", "runtime"}
 _HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
 _STRANGE = re.compile(r"[^A-Za-z0-9_]")
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
-LONGEST = 64  #: characters of a name
 
 IDENTIFIER_RULE = "a name must start with a letter and contain only letters a to z, digits and underscores"
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from ..base.files import beside
 from ..base.value_rules import NOT_NEGATIVE
+from ..elements import kinds
+from ..elements.kinds import POINT, Vector
 from ..errors import UsageError
 from ..frames import Frame
 from ..graph import vectors as vec
@@ -16,7 +18,7 @@ from ..solids import SOLIDS, MassProperties, point
 from ..solids.mesh import measure_mesh
 from .checks import check_keys, unknown_key
 from .description import items, place_of
-from .fields import KINDS, POINT, SOLID, SOLID_KEYS, solid_fields
+from .fields import BODY, SOLID, SOLID_KEYS, solid_fields
 from .names import nearest
 from .placement import TURNS, turn_matrix
 from .values import Reader
@@ -30,12 +32,12 @@ def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[Mas
             continue
         listed = items(values[key])
         if listed is None:
-            reader.wrong(f"{path}.{key}", values[key], key)
+            reader.wrong(f"{path}.{key}", values[key], BODY[key])
             continue
         for k, given in enumerate(listed):
             place = f"{path}.{key}[{k}]"
             if not isinstance(given, Mapping):
-                reader.wrong(place, given, "table")
+                reader.wrong(place, given, kinds.Table)
                 continue
             part = read(reader, place, given)
             if part is not None:
@@ -67,7 +69,7 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
             faults.add(f"{path}.{key}", message, unknown_key(key, fields), "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
-            faults.missing(f"{path}.{key}", f"give {KINDS[field.kind]}: {field.doc}")
+            faults.missing(f"{path}.{key}", f"give {field.says}: {field.doc}")
     density = "line_density" if "line_density" in fields else "density"
     if ("mass" in values) == (density in values):
         wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
@@ -101,7 +103,7 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
         if key not in values:
             return None
         place = f"{path}.{key}"
-        if dimension.kind == "vector":
+        if isinstance(dimension, Vector):
             lengths[key] = reader.vector(place, values[key])
         else:
             lengths[key] = (reader.expression(place, values[key]),) * 3

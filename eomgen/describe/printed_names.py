@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..base.latex import NotationError, read_latex, spaced
+from ..elements import kinds
 from ..graph.shown import quoted, shown
 from .description import Description, items
 from .names import nearest
@@ -61,7 +62,7 @@ def take_coordinates_latex(
         return
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
-        reader.wrong(path, given, "latexes")
+        reader.wrong(path, given, kinds.Latexes)
     elif listed and len(listed) != len(coordinates):
         message = f"{len(listed)} texts for {len(coordinates)} coordinates"
         reader.faults.add(path, message, f"give one for each: {', '.join(coordinates) or 'none'}", "EG-SHAPE")

@@ -9,8 +9,9 @@ from functools import reduce
 from typing import Any
 
 from ..base.value_rules import BELOW, OUTLINE, RISING, Flaw, sense_of_outline
+from ..elements import kinds
 from ..forces.contact_fields import PLACES
-from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
+from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS, ContactShapes
 from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
 from ..graph.core import Expr
@@ -29,7 +30,7 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ..
     """The shapes of a group; None if anything is wrong with them, which is noted."""
     listed = [value] if isinstance(value, Mapping) else items(value)
     if listed is None:
-        reader.wrong(path, value, "shapes")
+        reader.wrong(path, value, ContactShapes)
         return None
     if not listed:
         remedy = "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
@@ -43,7 +44,7 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ..
 
 def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
     if not isinstance(given, Mapping):
-        reader.wrong(path, given, "shapes")
+        reader.wrong(path, given, ContactShapes)
         return []
     kind = given.get("shape")
     if not isinstance(kind, str) or kind not in SHAPE_FIELDS:
@@ -167,7 +168,7 @@ def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
     listed = items(value)
     if listed is None or len(listed) != count:
-        reader.wrong(path, value, "two" if count == 2 else "vector")
+        reader.wrong(path, value, kinds.Two if count == 2 else kinds.Vector)
         return None
     return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
 

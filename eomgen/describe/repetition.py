@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from decimal import Decimal
 from typing import Any
 
-from .description import items
+from ..elements.kinds import ROUNDS, items
 from .names import fault_of_name
 from .rewritten_texts import in_brackets, rewritten
 
 Fault = Callable[[str, str, str, str], None]
 Round = dict[str, Any]
 
-ROUNDS = 1000  #: most instances of one entry
 _REMEDY = "give a list of numbers or expressions, a count n for 1 to n, or {from, to, step}"
 
 

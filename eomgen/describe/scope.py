@@ -6,12 +6,12 @@ import keyword
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from ..base.names import joined
+from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from ..errors import ExpressionError
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
 from .description import Faults
-from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity
 from .names import ACCELERATIONS, COM, CONSTANTS, QUANTITIES, TOTALS, fault_of_name, nearest

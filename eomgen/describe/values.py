@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ..base.files import usable_name
@@ -17,6 +17,9 @@ from ..base.limits.numbers import PERPENDICULAR
 from ..base.names import hint
 from ..base.texts import WHOLE, join_surrogates, lone_surrogate
 from ..base.value_rules import ROTATION, word_of_check
+from ..elements import kinds
+from ..elements.entry import Found
+from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
 from ..errors import ExpressionError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
@@ -26,15 +29,16 @@ from ..graph.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
-from .fields import CONSTANT, INERTIA, KINDS, LAW, MARKER, NUMBER, PLACED, Field
 from .marker_quantities import ElementQuantity
-from .mechanism import Quantity
+from .mechanism import Body, Quantity
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .requirements import Requirements
 from .scope import Namespace, Scope
-from .sympy_face import is_sympy, lower_sympy
+from .sympy_face import is_sympy, lower_sympy, name_of
 from .units import Unit
+
+_A = {"length": "a length", "angle": "an angle"}
 
 
 def is_number(value: object) -> bool:
@@ -70,6 +74,9 @@ class Reader:
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
         self.latex: dict[str, str] = {}  # by name, where it is given
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
+        self.shapes: Callable[[str, Any], Any] = lambda path, value: None  # of contacts between groups
+        self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
+        self.mass_data: Sequence[Body] = ()  # bodies whose masses are read
 
     def ask(self, quantity: ElementQuantity, path: str) -> None:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
@@ -105,12 +112,23 @@ class Reader:
         found = self.requirements.known([expression])
         return None if found is None else float(found[0])
 
-    def wrong(self, path: str, value: object, kind: str, code: str = "EG-TYPE") -> None:
+    def wrong(self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE") -> None:
         """Note that a value is not of a kind."""
         if value is None:
-            self.faults.add(path, "has no value", f"give {KINDS[kind]}", "EG-MISSING")
+            self.faults.add(path, "has no value", f"give {kind.says}", "EG-MISSING")
         else:
-            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}", code=code)
+            self.faults.add(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
+
+    def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
+        """Note keys that a table does not know, and required ones that are missing."""
+        check_keys(path, values, fields, self.faults)
+
+    def check_names(self, path: str, given: Iterable[Any], names: Sequence[str]) -> None:
+        """Note names that are none of these."""
+        for name in given:
+            if name not in names:
+                remedy = nearest(str(name), names, "allowed")
+                self.faults.add(f"{path}.{name}", "unknown key", remedy, "EG-NAME-UNKNOWN")
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -147,12 +165,12 @@ class Reader:
         except OverflowError:
             self.faults.add(path, f"{quoted(value)} is not a finite number", code="EG-NUMBER")
             return self.stand_in
-        self.wrong(path, value, "expression")
+        self.wrong(path, value, kinds.Scalar)
         return self.stand_in
 
     def number(self, path: str, value: Any, positive: bool = False) -> float | None:
         """A number; a text or SymPy expression without names counts as one."""
-        kind = "positive" if positive else "number"
+        kind = kinds.PositiveNumber if positive else kinds.Number
         result = value
         if isinstance(value, str) or is_sympy(value):
             result = self.expression(path, value, NUMBER).value
@@ -169,7 +187,7 @@ class Reader:
     def text(self, path: str, value: Any) -> str:
         """A text, pairs of surrogates as the characters that they mean."""
         if not isinstance(value, str):
-            self.wrong(path, value, "text")
+            self.wrong(path, value, kinds.Text)
             return ""
         half = lone_surrogate(value)
         if half:
@@ -180,7 +198,7 @@ class Reader:
     def file(self, path: str, value: Any) -> str | None:
         """The name of a file; None where no file can have it."""
         if not isinstance(value, str | os.PathLike):
-            self.wrong(path, value, "file")
+            self.wrong(path, value, kinds.File)
             return None
         name = usable_name(value)
         if name is None:
@@ -192,17 +210,17 @@ class Reader:
         """True or false; True when it is neither."""
         if isinstance(value, bool):
             return value
-        self.wrong(path, value, "flag")
+        self.wrong(path, value, kinds.Flag)
         return True
 
     def check_word(self, path: str, value: Any) -> str:
         """What becomes of an impossible inertia: error, note or off; true and false mean error and off."""
         word = word_of_check(value)
         if word is None:
-            self.wrong(path, value, "check")
+            self.wrong(path, value, kinds.Check)
         return word or "error"
 
-    def choice(self, path: str, value: Any, field: Field) -> str:
+    def choice(self, path: str, value: Any, field: kinds.Field) -> str:
         """One of the words of a field; the default when it is another."""
         if isinstance(value, str) and value in field.choices:
             return value
@@ -216,34 +234,10 @@ class Reader:
         """Three scalars."""
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.wrong(path, value, "vector")
+            self.wrong(path, value, kinds.Vector)
             return (self.stand_in,) * 3
         x, y, z = (self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts))
         return (x, y, z)
-
-    def inertia(self, path: str, value: Any) -> Mat3:
-        """A symmetric tensor from three moments, a 3 x 3 tensor or a mapping of ``xx`` .. ``yz``."""
-        zero = self.graph.zero
-        if isinstance(value, Mapping):
-            for key in value:
-                if key not in INERTIA:
-                    self.faults.add(
-                        f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"), "EG-NAME-UNKNOWN"
-                    )
-            given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
-            xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
-            return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-        parts = items(value)
-        if parts is not None and len(parts) == 3:
-            rows = [items(part) for part in parts]
-            if all(row is not None and len(row) == 3 for row in rows):
-                a, b, c = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
-                return (a, b, c)
-            if all(row is None for row in rows):
-                a = self.vector(path, parts)
-                return ((a[0], zero, zero), (zero, a[1], zero), (zero, zero, a[2]))
-        self.wrong(path, value, "inertia")
-        return tuple((self.stand_in,) * 3 for _ in range(3))  # type: ignore[return-value]
 
     # -- frames and markers ---------------------------------------------------------------------------------------
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
@@ -264,7 +258,7 @@ class Reader:
     def turn_of_axes(self, path: str, value: Any) -> Mat3:
         """The rotation whose columns are a frame's axes, two of which are given."""
         if not isinstance(value, Mapping) or len(value) != 2 or not {*value} <= {*"xyz"}:
-            self.wrong(path, value, "frame_axes")
+            self.wrong(path, value, kinds.FrameAxes)
             return self.identity
         (first, a), (second, b) = ((key, self.axis(f"{path}.{key}", one)[2]) for key, one in value.items())
         if self.faults.under(path):
@@ -280,7 +274,7 @@ class Reader:
         """A rotation matrix of numbers and expressions, as far as declared values tell orthogonal and right-handed."""
         rows = [items(row) for row in items(value) or ()]
         if len(rows) != 3 or any(row is None or len(row) != 3 for row in rows):
-            self.wrong(path, value, "matrix")
+            self.wrong(path, value, kinds.Matrix)
             return self.identity
         x, y, z = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
         self.requirements.judge(path, ROTATION, [*x, *y, *z])
@@ -315,9 +309,9 @@ class Reader:
                 self.faults.add(path, message, remedy, "EG-NAME-UNKNOWN")
             return found
         if not isinstance(value, Mapping):
-            self.wrong(path, value, "marker")
+            self.wrong(path, value, kinds.MarkerReference)
             return None
-        check_keys(path, value, PLACED, self.faults)
+        self.check_keys(path, value, PLACED)
         if "body" not in value:
             return None
         body = value["body"]
@@ -334,7 +328,7 @@ class Reader:
     def named_frame(self, path: str, value: Any) -> Frame:
         """The placement of a named marker: a position, or a mapping of at and rpy."""
         if isinstance(value, Mapping):
-            check_keys(path, value, MARKER, self.faults)
+            self.check_keys(path, value, MARKER)
             return self.frame(path, value)
         return Frame(self.identity, self.vector(path, value))
 
@@ -342,7 +336,7 @@ class Reader:
         """Two markers; None if either is unknown."""
         parts = items(value)
         if parts is None or len(parts) != 2:
-            self.wrong(path, value, "pair")
+            self.wrong(path, value, kinds.Pair)
             return None
         first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
         return None if first is None or second is None else (first, second)
@@ -351,13 +345,13 @@ class Reader:
         """Columns of the turn that brings x and y to two directions at right angles."""
         parts = items(value)
         if parts is None or len(parts) != 2:
-            self.wrong(path, value, "axes")
+            self.wrong(path, value, kinds.TwoAxes)
             return TURNS["z"]
         x, y = (self.axis(f"{path}[{k}]", part)[2] for k, part in enumerate(parts))
         if self.faults.under(path):
             return TURNS["z"]
         if abs(sum(a * b for a, b in zip(x, y, strict=True))) > PERPENDICULAR:
-            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {KINDS['axes']}", "EG-RANGE")
+            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {kinds.TwoAxes.says}", "EG-RANGE")
             return TURNS["z"]
         return axes_columns(x, y)
 
@@ -366,17 +360,63 @@ class Reader:
         if isinstance(value, str):
             if value in TURNS:
                 return TURNS[value]
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}", "EG-TYPE")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
             return TURNS["z"]
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}", "EG-TYPE")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
             return TURNS["z"]
         x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
         if x is None or y is None or z is None:
             return TURNS["z"]
         columns = axis_columns((x, y, z))
         if columns is None:
-            self.faults.add(path, "the axis has no length", f"allowed: {KINDS['axis']}", "EG-RANGE")
+            self.faults.add(path, "the axis has no length", f"allowed: {kinds.Axis.says}", "EG-RANGE")
             return TURNS["z"]
         return columns
+
+    # -- bodies, coordinates and shapes -------------------------------------------------------------------------------
+    def body(self, path: str, value: Any) -> tuple[int, Body] | None:
+        """The index of a body, and its mass."""
+        own = {body.name: k for k, body in enumerate(self.mass_data)}
+        if isinstance(value, str) and value in own:
+            return own[value], self.mass_data[own[value]]
+        if value is not None and not self.faults.under(f"bodies.{value}"):
+            remedy = nearest(shown(value), own, "bodies")
+            self.faults.add(path, f"no body {quoted(value)}", remedy, "EG-NAME-UNKNOWN")
+        return None
+
+    def coordinate(self, path: str, value: Any, measure: str = "") -> Found | None:
+        """The coordinate meant by the name of a joint of one degree, or by its own; of a measure, if one is asked for.
+
+        None, and a fault, if there is none.
+        """
+        faults, given = self.faults, name_of(value)
+        own = next((j for j in self.joints if j.entry.name == given), None)
+        home = next((j for j in self.joints if given in j.coordinates), None)
+        if own is not None and home is not None and own is not home:
+            remedy = "rename one of them"
+            faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
+            return None
+        if own is not None and home is None and len(own.coordinates) != 1:
+            names = ", ".join(own.coordinates) or "none"
+            message = f"joint {quoted(given)} has {len(own.coordinates)} coordinates"
+            faults.add(path, message, f"name one of them: {names}", "EG-REFERENCE")
+            return None
+        joint = home or own
+        if joint is not None:
+            name = str(given) if home is not None else joint.coordinates[0]
+            kind = joint.joint.coordinates[joint.coordinates.index(name)].kind
+            if measure and kind != measure:
+                message = f"the coordinate {name!r} is {_A[kind]}"
+                faults.add(path, message, f"name a coordinate that is {_A[measure]}", "EG-REFERENCE")
+                return None
+            return Found(name, kind, joint.entry.name)
+        if isinstance(given, str) and self.names.kinds.get(given) == "coordinate":
+            return Found(given, "angle", None)
+        if not faults.under(f"joints.{given}"):  # else the joint itself is at fault, which is noted already
+            known = [j.entry.name for j in self.joints]
+            known += [c for c in self.names.of("coordinate") if c not in known]
+            remedy = nearest(shown(given), known, "joints and coordinates")
+            faults.add(path, f"no joint {quoted(given)}", remedy, "EG-NAME-UNKNOWN")
+        return None

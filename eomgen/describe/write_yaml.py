@@ -9,16 +9,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..base.texts import comment_text, yaml_quoted
+from ..elements.kinds import Field, items
 from ..errors import cannot
-from .description import SECTIONS, Description, is_zero, items
+from .description import SECTIONS, Description
 from .dotted_names import undotted
-from .fields import MODEL, SHORT
+from .fields import MODEL, SHORT, fields_of
 from .sympy_face import is_sympy, name_of
 from .write_equations import with_intermediates
 from .write_markers import with_named_markers
 from .yaml_nodes import scalar
 
 Names = frozenset[Any]  # of declared functions
+_UNKNOWN = Field("")  #: a key that is no key of its entry
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.(*+/-][A-Za-z0-9_.()*+/<>= -]*\Z")
 
@@ -53,7 +55,7 @@ def yaml_text(description: Description) -> str:
                 value = with_intermediates(value)
             if key in ("lagrangian", "equations") and value is not None:
                 lines += [f"{key}:", *(f"  {_key(k)}: {_value(v, functions)}" for k, v in value.items())]
-            elif not _is_default(key, value):
+            elif not MODEL[key].is_default(value):
                 lines.append(f"{key}: {_value(value, functions)}")
     return "\n".join(lines) + "\n"
 
@@ -66,19 +68,11 @@ def _section(section: str, description: Description) -> list[str]:
     short = SHORT.get(section)
     lines = [f"{section}:"]
     for entry in entries:
-        values = {key: value for key, value in entry.values.items() if not _is_default(key, value)}
+        fields = fields_of(section, entry.values)
+        values = {key: x for key, x in entry.values.items() if not fields.get(key, _UNKNOWN).is_default(x)}
         only = short is not None and list(values) == [short]
         lines.append(f"  {_key(entry.name)}: {_value(values[short] if only and short else values, functions)}")
     return lines
-
-
-def _is_default(key: str, value: Any) -> bool:
-    """Whether leaving a value out means the same."""
-    if value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0):
-        return True
-    if key in ("com", "inertia", "gravity", "rpy"):
-        return is_zero(value)
-    return key == "axis" and isinstance(value, str) and value == "z"
 
 
 def _value(value: Any, functions: Names) -> str:

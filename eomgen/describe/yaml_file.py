@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ..base.files import as_name, beside, open_plain
+from ..elements import kinds
 from ..errors import ModelError, Problem, UsageError
 from .components import Components
 from .description import SECTIONS, Description, Faults
 from .dotted_names import undotted
-from .fields import KINDS, MODEL, PARTS, SHORT
+from .fields import MODEL, PARTS, SHORT
 from .names import nearest
 from .yaml_nodes import SIZE, Document
 
@@ -93,7 +94,7 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
                 if isinstance(given[key], Mapping):
                     target.values[key] = given[key]
                 elif given[key] is not None:
-                    faults.add(f"{start}{key}", f"is not {KINDS['table']}", "write names as keys", "EG-TYPE")
+                    faults.add(f"{start}{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
 
     def open_file(name: str) -> Description | None:
         return _open_part(name, file, origin, faults)
@@ -105,7 +106,7 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
             key not in SECTIONS
             and key not in PARTS
             and key != "contacts"
-            and (value is not None or MODEL[key].kind != "table")
+            and (value is not None or not isinstance(MODEL[key], kinds.Table))
         ):
             description.values[key] = value
     fill(tree, "", description)
@@ -148,7 +149,7 @@ def _add_contacts(description: Description, faults: Faults, value: Any, origin: 
     if value is None:
         return
     if not isinstance(value, Mapping):
-        faults.add("contacts", f"is not {KINDS['table']}", "write the names of the contacts as keys", "EG-TYPE")
+        faults.add("contacts", f"is not {kinds.Table.says}", "write the names of the contacts as keys", "EG-TYPE")
         return
     for path, place in list(description.lines.items()):
         if path.startswith("contacts."):
@@ -167,7 +168,7 @@ def _spread_law(description: Description, faults: Faults, path: str, values: dic
     if values.get("type") != "contacts" or "law" not in values:
         return values
     if not isinstance(law, Mapping):
-        faults.add(f"{path}.law", f"is not {KINDS['law']}", "give stiffness and what else the law has", "EG-TYPE")
+        faults.add(f"{path}.law", f"is not {kinds.Law.says}", "give stiffness and what else the law has", "EG-TYPE")
         return values
     for key in law:
         if key in values:
@@ -185,7 +186,7 @@ def _add_section(
         return
     if not isinstance(value, Mapping):
         faults.add(
-            f"{start}{section}", f"is not {KINDS['table']}", f"write the names of the {section} as keys", "EG-TYPE"
+            f"{start}{section}", f"is not {kinds.Table.says}", f"write the names of the {section} as keys", "EG-TYPE"
         )
         return
     for name, given in value.items():
@@ -200,7 +201,7 @@ def _add_section(
                 values = {key: given}
             else:
                 faults.add(
-                    f"{start}{place}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}", "EG-TYPE"
+                    f"{start}{place}", f"is not {kinds.Table.says}", "write its keys as {key: value, ...}", "EG-TYPE"
                 )
                 values = {}
         if section == "forces":

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from .entry import Entry
-from .field import Field, Fields
+from .kinds import Choice, Fields
 
 
 class ElementType(NamedTuple):
@@ -47,7 +47,7 @@ class ElementType(NamedTuple):
 
     def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
         """All keys, ``type`` among them."""
-        return {"type": Field("choice", f"type of the {what}", required=True, choices=tuple(types)), **self.keys}
+        return {"type": Choice(f"type of the {what}", required=True, choices=tuple(types)), **self.keys}
 
 
 Types = dict[str, ElementType]

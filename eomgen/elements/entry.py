@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ..base.value_rules import Allowed
-from ..frames import Marker, WrapCylinder
+from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
-from .field import Fields
+from .kinds import Field, Fields
 
 
 class Found(NamedTuple):
@@ -90,60 +90,23 @@ class Entry(Protocol):
         """
 
     # -- values ---------------------------------------------------------------------------------------------------
-    def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:
-        """An expression, or the default of its key.
+    def __getitem__(self, key: str) -> Any:
+        """What a key holds, or its default, read by its kind."""
 
-        ``local`` are names that it alone knows; with ``exclusive`` none of them may be a name of the model too.
-        """
+    def read(self, key: str, kind: type[Field] | None = None) -> Any:
+        """The same, read as if the key was of another kind."""
 
-    def given(self, key: str) -> Expr | None:
-        """An expression, if the key is given."""
-
-    def positive(self, key: str) -> Expr:
-        """An expression that must be greater than 0."""
-
-    def several(self, key: str, count: int) -> tuple[Expr, ...] | None:
-        """So many expressions."""
-
-    def sizes(self, key: str, names: Sequence[str]) -> dict[str, Expr] | None:
-        """Expressions greater than 0 by their names, of which some may be missing."""
-
-    def vector(self, key: str) -> Vec3:
-        """Three expressions."""
-
-    def matrix(self, key: str, size: int) -> tuple[tuple[Expr, ...], ...] | None:
-        """A square matrix, given as such or by its diagonal."""
-
-    def choice(self, key: str) -> str:
-        """One of the words of a key."""
-
-    def flag(self, key: str) -> bool:
-        """True or false."""
-
-    def states(self) -> tuple[Expr, ...]:
-        """The symbols of its own first-order states, in the order in which its type names them."""
-
-    # -- parts of the mechanism -----------------------------------------------------------------------------------
-    def marker(self, key: str) -> Marker | None:
-        """A marker."""
+    def law(self, key: str, local: Mapping[str, Expr], exclusive: bool = True) -> Expr:
+        """An expression with names that it alone knows; with ``exclusive`` none may be a name of the model too."""
 
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
 
-    def axis(self, key: str) -> Vec3:
-        """A direction of length 1."""
+    def positive(self, key: str) -> Expr:
+        """An expression that must be greater than 0."""
 
-    def via(self, key: str = "via") -> Sequence[Marker | WrapCylinder] | None:
-        """What a path runs over, in order; None if anything is wrong with it."""
-
-    def coordinate(self, key: str = "joint", kind: str = "") -> Found | None:
-        """The coordinate that a joint, or its own name, means; of a kind, if one is asked for."""
-
-    def shapes(self, key: str) -> Any:
-        """The shapes of a group (:class:`~eomgen.forces.contact_shapes.ContactShape`); None where there are faults."""
-
-    def body(self, key: str = "body") -> tuple[int, BodyData] | None:
-        """The index of a body, and its mass."""
+    def states(self) -> tuple[Expr, ...]:
+        """The symbols of its own first-order states, in the order in which its type names them."""
 
     # -- coordinates and names ------------------------------------------------------------------------------------
     def symbol(self, found: Found) -> Expr:
@@ -151,12 +114,6 @@ class Entry(Protocol):
 
     def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
         """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
-
-    def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
-        """Two different coordinates, measured from one body."""
-
-    def factors(self, key: str) -> list[tuple[Found, Expr]] | None:
-        """Coordinates and their factors, in one order however they are given."""
 
     def require_one_carrier(self, key: str, a: Found, b: Found) -> None:
         """Note two coordinates that are measured from different bodies."""

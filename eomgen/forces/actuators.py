@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.dimensions import FORCE, PUSH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Choice, MarkerReference, Scalar, Value, Vector
 from ..elements.looks import CYLINDER, ROUND_ARROW, Pull, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -79,27 +79,27 @@ class BodyTorque(Force):
         return [Pull(self.marker, self.value, self.axes == "body", turns=True)]
 
 
-_AXES = Field("choice", "axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
+_AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
 
 
 def _actuator(e: Entry) -> Force | None:
-    path, value = read_joint_or_path(e), e.law("value")
+    path, value = read_joint_or_path(e), e["value"]
     return None if path is None else Actuator(e.name, path, value)
 
 
 def _force(e: Entry) -> Force | None:
-    value, axes = e.vector("value"), e.choice("axes")
-    marker = e.marker("marker") if "marker" in e.values else None
+    value, axes = e.read("value", Vector), e["axes"]
+    marker = e["marker"]
     return None if marker is None else PointForce(e.name, marker, value, axes)
 
 
 def _torque(e: Entry) -> Force | None:
     if "joint" in e.values:
         e.refuse("axes", "a torque on a joint's coordinate has no axes")
-        path, value = read_coordinate(e), e.law("value")
+        path, value = read_coordinate(e), e.read("value", Scalar)
         return None if path is None else Actuator(e.name, path, value)
-    marker = e.marker("body")
-    vector, axes = e.vector("value"), e.choice("axes")
+    marker = e["body"]
+    vector, axes = e.read("value", Vector), e["axes"]
     return None if marker is None else BodyTorque(e.name, marker, vector, axes)
 
 
@@ -108,8 +108,8 @@ TYPES = table(
         "force",
         "a force on a body, at the origin of a marker.",
         {
-            "marker": Field("marker", "marker at whose origin the force acts", required=True),
-            "value": Field("vector", "force (N)", required=True, level=LAW, dimension=FORCE),
+            "marker": MarkerReference("marker at whose origin the force acts", required=True),
+            "value": Vector("force (N)", required=True, level=LAW, dimension=FORCE),
             "axes": _AXES,
         },
         _force,
@@ -122,9 +122,8 @@ TYPES = table(
         "a torque on a joint's coordinate (one value) or on a body (three values).",
         {
             "joint": ON_JOINT,
-            "body": Field("marker", "a body"),
-            "value": Field(
-                "value",
+            "body": MarkerReference("a body"),
+            "value": Value(
                 "torque (N m): one value on a joint (a force in N if its coordinate is a length), three on a body",
                 required=True,
                 level=LAW,
@@ -141,8 +140,7 @@ TYPES = table(
         {
             "joint": ON_JOINT,
             "between": BETWEEN,
-            "value": Field(
-                "expression",
+            "value": Scalar(
                 "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
                 required=True,
                 level=LAW,

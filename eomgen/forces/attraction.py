@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.dimensions import Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import BodyName, Choice, MarkerReference, Scalar
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -76,8 +76,8 @@ class PointGravity(Force):
 
 
 def _point_gravity(e: Entry) -> PointGravity | None:
-    center = e.marker("center") if "center" in e.values else None
-    mu, extent, found = e.positive("mu"), e.choice("extent"), e.body("body")
+    center = e["center"]
+    mu, extent, found = e.positive("mu"), e["extent"], e["body"]
     if found is None:
         return None
     index, body = found
@@ -93,16 +93,14 @@ TYPES = table(
         "point_gravity",
         "the gravity that a point exerts on a body; the reaction acts at the point.",
         {
-            "center": Field("marker", "marker at the attracting point", required=True),
-            "body": Field("body", "the body that is attracted at its centre of mass", required=True),
-            "mu": Field(
-                "expression",
+            "center": MarkerReference("marker at the attracting point", required=True),
+            "body": BodyName("the body that is attracted at its centre of mass", required=True),
+            "mu": Scalar(
                 "gravitational parameter G M of the centre (m^3/s^2)",
                 required=True,
                 dimension=Dimension(3, 0, -2),
             ),
-            "extent": Field(
-                "choice",
+            "extent": Choice(
                 "point takes the body as a point mass; maccullagh adds its inertia to second order: the "
                 "gravity-gradient torque and its force",
                 default="point",

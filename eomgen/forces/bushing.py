@@ -10,7 +10,7 @@ from ..base.value_rules import Allowed
 from ..elements.dimensions import ENERGY, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Matrix6
 from ..elements.looks import RUBBER, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -128,7 +128,7 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
 
 
 def _bushing(e: Entry) -> Bushing | None:
-    pair, stiffness, damping = e.pair(), e.matrix("stiffness", 6), e.matrix("damping", 6)
+    pair, stiffness, damping = e.pair(), e["stiffness"], e["damping"]
     for i, j in combinations(range(6), 2) if stiffness is not None else ():
         difference = cast(Mat6, stiffness)[j][i] - cast(Mat6, stiffness)[i][j]
         if difference.is_zero:
@@ -154,16 +154,14 @@ TYPES = table(
         "bushing",
         "a bushing: force and torque are matrices times the displacement of the second marker in axes of the first.",
         {
-            "between": BETWEEN._replace(required=True),
-            "stiffness": Field(
-                "matrix6",
+            "between": BETWEEN.replace(required=True),
+            "stiffness": Matrix6(
                 "six values for the diagonal, three of forces and three of torques, or a symmetric 6 x 6 matrix "
                 "(N/m, N, N m/rad)",
                 required=True,
                 dimension=ENERGY,
             ),
-            "damping": Field(
-                "matrix6",
+            "damping": Matrix6(
                 "the same form, for the velocity of the displacement (N s/m, N s, N m s/rad)",
                 default=(0,) * 6,
                 level=LAW,

@@ -10,7 +10,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field, Fields
+from ..elements.kinds import Fields, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -219,7 +219,7 @@ def _on_plane(e: Entry) -> SpherePlane | None:
 
 
 def _two_spheres(e: Entry) -> SphereSphere | None:
-    pair, law, friction, radii = e.pair(), read_normal_law(e), _friction(e), e.several("radii", 2)
+    pair, law, friction, radii = e.pair(), read_normal_law(e), _friction(e), e["radii"]
     if pair is None or radii is None:
         return None
     for k, radius in enumerate(radii):
@@ -232,7 +232,7 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
 _ENDS = "the plane (z points out of the solid) and the {0}"
 _CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE, **FRICTION_CHOICE}
 #: Of contacts whose radii are known.
-CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"]._replace(required=False), **ELASTIC}
+CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"].replace(required=False), **ELASTIC}
 
 
 def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
@@ -244,7 +244,7 @@ TYPES = table(
     ElementType(
         "point_plane",
         "contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid).",
-        {"between": Field("pair", _ENDS.format("point"), required=True), **_CONTACT},
+        {"between": Pair(_ENDS.format("point"), required=True), **_CONTACT},
         _on_plane,
         states=_states("xy"),
     ),
@@ -252,8 +252,8 @@ TYPES = table(
         "sphere_plane",
         "contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {
-            "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
-            "radius": Field("expression", "radius of the sphere (m)", required=True, dimension=LENGTH),
+            "between": Pair(_ENDS.format("sphere's centre"), required=True),
+            "radius": Scalar("radius of the sphere (m)", required=True, dimension=LENGTH),
             **CURVED,
         },
         _on_plane,
@@ -263,8 +263,8 @@ TYPES = table(
         "sphere_sphere",
         "contact of two spheres, each centred at a marker.",
         {
-            "between": Field("pair", "the centres", required=True),
-            "radii": Field("radii", "radii of the spheres (m)", required=True, dimension=LENGTH),
+            "between": Pair("the centres", required=True),
+            "radii": Radii("radii of the spheres (m)", required=True, dimension=LENGTH),
             **CURVED,
         },
         _two_spheres,

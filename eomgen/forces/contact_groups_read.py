@@ -9,11 +9,11 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import Law
 from .bristles import UNIT
 from .contact import CURVED
 from .contact_groups import ContactGroups
-from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS
+from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS, ContactShapes
 from .contact_shapes import ContactShape, by_edges
 from .contact_states import BED, MOST_PAIRS, ShapeParts, cells_of, given_groups, pair_states
 from .dry_friction import DryFriction
@@ -24,11 +24,11 @@ from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
 
 
 def _contact_groups(e: Entry) -> ContactGroups | None:
-    first = e.shapes("first")
-    second = e.shapes("second") if "second" in e.values else ()
+    first = e["first"]
+    second = e["second"] if "second" in e.values else ()
     soil = "soil" in e.values
     laws = _laws(e)
-    lateral = e.flag("lateral")
+    lateral = e["lateral"]
     if first is None or second is None or laws is None or e.at_fault():
         return None
     law, friction = laws
@@ -49,7 +49,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    rigidly = e.given("friction") if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
+    rigidly = e["friction"] if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
     axes = 0
     if soil or has_bristles(e.values):
         groups = given_groups(e.values)
@@ -60,7 +60,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
             told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
             e.fault("", told, remedy, "EG-TOO-LARGE")
-    return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
+    return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e["restitution"])
 
 
 def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
@@ -85,7 +85,7 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
         return read_soil(e)
     for key in SOIL:
         e.refuse(key, "belongs to contacts that have soil")
-    if e.choice("normal_law") == RIGID:
+    if e["normal_law"] == RIGID:
         return _rigid_law(e), None
     if not has_bristles(e.values):
         e.refuse("lateral", "belongs to contacts that have soil, or friction_law: lugre")
@@ -98,10 +98,10 @@ def _rigid_law(e: Entry) -> RigidLaw:
         if key not in ("normal_law", "friction", "restitution"):
             e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
     for key in ("friction", "restitution"):
-        value = e.given(key)
+        value = e[key]
         if value is not None:
             e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    restitution = e.given("restitution")
+    restitution = e["restitution"]
     if restitution is not None:
         e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
     return RigidLaw()
@@ -233,11 +233,11 @@ _ALLOWED = (
     "half_space, height_field and each other"
 )
 
-_NORMAL_LAW = CURVED["normal_law"]._replace(
+_NORMAL_LAW = CURVED["normal_law"].replace(
     choices=(*NORMAL_LAWS, RIGID),
     doc=CURVED["normal_law"].doc + f"; {RIGID}, no penetration, for runs by the method moreau only",
 )
-_RESTITUTION = CURVED["restitution"]._replace(
+_RESTITUTION = CURVED["restitution"].replace(
     doc="coefficient of restitution, from which the dissipation is computed; in runs by the method moreau Newton's"
 )
 _SHAPES = "shapes {shape, on, ...} of the "
@@ -249,13 +249,12 @@ TYPES = table(
         f"({', '.join(PLANAR)}; {', '.join(kind for kind in SHAPE_FIELDS if kind not in PLANAR)}), "
         "on (a marker or a list of markers) and sizes.  Shapes of one body do not meet.",
         {
-            "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
-            "second": Field(
-                "shapes",
+            "first": ContactShapes(_SHAPES + "first group", required=True, dimension=LENGTH),
+            "second": ContactShapes(
                 _SHAPES + "second group; without it those of the first meet among themselves",
                 dimension=LENGTH,
             ),
-            "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
+            "law": Law("the keys that follow as a mapping, instead of one by one"),
             **CURVED,
             "normal_law": _NORMAL_LAW,
             "restitution": _RESTITUTION,

@@ -9,7 +9,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Choice, Pair, Scalar
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -107,23 +107,23 @@ class Creep(Force):
 
 
 def _creep(e: Entry) -> Creep | None:
-    pair, law, radius = e.pair(), e.choice("creep_law"), e.law("radius")
+    pair, law, radius = e.pair(), e["creep_law"], e["radius"]
     e.require("radius", radius, POSITIVE, "must be greater than 0")
     for key in ("normal", "friction"):
         if law == "linear":
             e.refuse(key, "the linear law does not saturate")
         elif key not in e.values:
             e.missing(key, f"the law {law} needs the normal force and the coefficient of friction")
-    along, across, turning, spin = (e.law(key) for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
+    along, across, turning, spin = (e[key] for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
     for key, value in (("longitudinal", along), ("lateral", across)):
         e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    friction = e.given("friction")
+    friction = e["friction"]
     if friction is not None:
         e.require("friction", friction, NOT_NEGATIVE, "must be 0 or greater")
     if pair is None or e.at_fault():
         return None
     track, wheel = pair
-    speed, normal = e.given("speed"), e.given("normal")
+    speed, normal = e["speed"], e["normal"]
     return Creep(e.name, track, wheel, radius, speed, along, across, turning, spin, law, normal, friction)
 
 
@@ -132,36 +132,29 @@ TYPES = table(
         "creep",
         "creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach).",
         {
-            "between": Field(
-                "pair",
+            "between": Pair(
                 "the track (x along it, z its normal, to the side of the wheel) and a marker on the wheel's axle",
                 required=True,
             ),
-            "radius": Field(
-                "expression", "rolling radius (m), which may change with the place", required=True, level=LAW,
+            "radius": Scalar("rolling radius (m), which may change with the place", required=True, level=LAW,
                 dimension=LENGTH,
             ),
-            "longitudinal": Field(
-                "expression", "creep coefficient f11 (N)", required=True, level=LAW, dimension=FORCE
+            "longitudinal": Scalar("creep coefficient f11 (N)", required=True, level=LAW, dimension=FORCE
             ),
-            "lateral": Field("expression", "creep coefficient f22 (N)", required=True, level=LAW, dimension=FORCE),
-            "lateral_spin": Field(
-                "expression", "creep coefficient f23 (N m)", default=0, level=LAW, dimension=FORCE.times(LENGTH)
+            "lateral": Scalar("creep coefficient f22 (N)", required=True, level=LAW, dimension=FORCE),
+            "lateral_spin": Scalar("creep coefficient f23 (N m)", default=0, level=LAW, dimension=FORCE.times(LENGTH)
             ),
-            "spin": Field(
-                "expression", "creep coefficient f33 (N m^2)", default=0, level=LAW, dimension=FORCE.times(LENGTH, 2)
+            "spin": Scalar("creep coefficient f33 (N m^2)", default=0, level=LAW, dimension=FORCE.times(LENGTH, 2)
             ),
-            "speed": Field(
-                "expression",
+            "speed": Scalar(
                 "by which velocities are divided (m/s); that of the wheel's marker along the track unless given",
                 level=LAW,
                 dimension=SPEED,
             ),
-            "creep_law": Field("choice", "how the forces saturate", default="linear", choices=LAWS),
-            "normal": Field(
-                "expression", "normal force (N), such as -multiplier(roll.height)", level=LAW, dimension=FORCE
+            "creep_law": Choice("how the forces saturate", default="linear", choices=LAWS),
+            "normal": Scalar("normal force (N), such as -multiplier(roll.height)", level=LAW, dimension=FORCE
             ),
-            "friction": Field("expression", "coefficient of friction", level=LAW, dimension=NONE),
+            "friction": Scalar("coefficient of friction", level=LAW, dimension=NONE),
         },
         _creep,
         ends=("track", "wheel"),

@@ -9,7 +9,7 @@ from ..base.value_rules import NOT_NEGATIVE
 from ..elements.dimensions import DAMPING, PUSH, RATE, STIFFNESS
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Scalar
 from ..graph.core import Expr
 from ..records import dataclass
 from .dry_friction import LineFriction
@@ -51,7 +51,7 @@ class JointFriction(Force):
 
 
 def _joint_friction(e: Entry) -> Force | None:
-    path, viscous = read_coordinate(e), e.given("viscous")
+    path, viscous = read_coordinate(e), e["viscous"]
     if viscous is not None:
         e.require("viscous", viscous, NOT_NEGATIVE, "must be 0 or greater")
     if "coefficient" in e.values:
@@ -82,27 +82,23 @@ TYPES = table(
         "friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), by the reaction that "
         "the joint carries, or several of them.",
         {
-            "joint": ON_JOINT._replace(required=True),
-            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING),
-            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
-            "static": Field(
-                "expression",
+            "joint": ON_JOINT.replace(required=True),
+            "viscous": Scalar("viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING),
+            "coulomb": Scalar("Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
+            "static": Scalar(
                 "static friction, at the onset of sliding (N m or N); give stribeck too",
                 level=LAW,
                 dimension=PUSH,
             ),
             **BY_REACTION,
-            "stribeck": Field(
-                "expression",
+            "stribeck": Scalar(
                 "Stribeck velocity (rad/s or m/s): where static friction has largely dropped to Coulomb friction",
                 dimension=RATE,
             ),
-            "smoothing": Field(
-                "expression", "velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE
-            ),
+            "smoothing": Scalar("velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE),
             **FRICTION_CHOICE,
-            "bristle_stiffness": FRICTION_CHOICE["bristle_stiffness"]._replace(dimension=STIFFNESS),
-            "bristle_damping": FRICTION_CHOICE["bristle_damping"]._replace(dimension=DAMPING),
+            "bristle_stiffness": FRICTION_CHOICE["bristle_stiffness"].replace(dimension=STIFFNESS),
+            "bristle_damping": FRICTION_CHOICE["bristle_damping"].replace(dimension=DAMPING),
         },
         _joint_friction,
         states=_states,

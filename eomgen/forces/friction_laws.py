@@ -10,7 +10,7 @@ from ..base.limits.contacts import AT_REST
 from ..base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import NONE, RATE, REACH
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field, Fields
+from ..elements.kinds import LAW, Choice, Fields, Scalar
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
@@ -123,47 +123,39 @@ def has_bristles(values: Mapping[str, Any]) -> bool:
 
 #: Of contacts, as parts of the normal force.
 FRICTION: Fields = {
-    "friction": Field("expression", "coefficient of sliding friction", level=LAW, dimension=NONE),
-    "static_friction": Field(
-        "expression",
+    "friction": Scalar("coefficient of sliding friction", level=LAW, dimension=NONE),
+    "static_friction": Scalar(
         "coefficient of static friction, at the onset of sliding; give stribeck too",
         level=LAW,
         dimension=NONE,
     ),
-    "stribeck": Field(
-        "expression",
+    "stribeck": Scalar(
         "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
         "sliding friction",
         dimension=RATE,
     ),
-    "viscous_friction": Field(
-        "expression",
+    "viscous_friction": Scalar(
         "viscous friction coefficient per normal force and velocity (s/m)",
         default=0,
         level=LAW,
         dimension=NONE.times(RATE, -1),
     ),
-    "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
+    "smoothing": Scalar("sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
 }
 #: Which law it is, and what only some laws have; of a contact.
 FRICTION_CHOICE: Fields = {
-    "friction_law": Field(
-        "choice",
+    "friction_law": Choice(
         "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; lugre, "
         "bristles that hold a body at rest",
         default=FRICTION_LAWS[0],
         choices=FRICTION_LAWS,
     ),
-    "transition": Field(
-        "expression", "velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE
-    ),
-    "bristle_stiffness": Field(
-        "expression",
+    "transition": Scalar("velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE),
+    "bristle_stiffness": Scalar(
         "friction of friction_law lugre per deflection of the bristles",
         dimension=NONE.times(REACH, -1),
     ),
-    "bristle_damping": Field(
-        "expression",
+    "bristle_damping": Scalar(
         "friction of friction_law lugre per rate of the deflection",
         dimension=NONE.times(RATE, -1),
     ),
@@ -178,13 +170,13 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
             if key in e.values:
                 e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out", "EG-MISSING")
         return None
-    level = e.law(dynamic)
-    kind = e.choice("friction_law")
+    level = e[dynamic]
+    kind = e["friction_law"]
     if kind == BRISTLES:
         e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
     else:
         e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
-    along = e.given(viscous)
+    along = e[viscous]
     if along is not None and not alone:
         e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
     drag = e.graph.zero if along is None else along
@@ -207,7 +199,7 @@ def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None
         missing = "stribeck" if static in e.values else static
         e.missing(missing, f"give {static} and stribeck together, or neither")
         return None
-    onset = e.given(static)
+    onset = e[static]
     if onset is not None:
         _require_greater(e, level, onset, static)
     return onset, e.positive("stribeck") if "stribeck" in e.values else None
@@ -225,7 +217,7 @@ def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcP
     if "transition" not in e.values:
         e.missing("transition", "give the velocity (greater than 0) near which friction is largest")
         return None
-    onset = e.given(static)
+    onset = e[static]
     if onset is None:
         onset = level
     _require_greater(e, level, onset, static)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..elements.dimensions import ENERGY, LENGTH, NONE, PUSH, RATE, SPIN, Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field, Fields
+from ..elements.kinds import LAW, Fields, Scalar
 from ..elements.looks import LAW_BOX, LAW_RING, Seen
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
@@ -70,7 +70,7 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
         where = path(e)
         if "law" not in e.values and "potential" not in e.values:
             e.fault("", "has no force law", "give law, potential or both", "EG-MISSING")
-        on = e.coordinate("joint") if "joint" in e.values and where is not None else None
+        on = e["joint"] if "joint" in e.values and where is not None else None
         word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
         value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
         law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
@@ -83,18 +83,16 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
 def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
     """Keys of a law of ``of``, its dimension and that of ``rate``."""
     local = {"length": LENGTH, "angle": NONE, "rate": rate}
-    names = {name: Field("expression", "", dimension=own) for name, own in local.items()}
+    names = {name: Scalar("", dimension=own) for name, own in local.items()}
     return {
-        "law": Field(
-            "expression",
+        "law": Scalar(
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
             "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
             level=LAW,
             dimension=push,
             local=names,
         ),
-        "potential": Field(
-            "expression",
+        "potential": Scalar(
             f"potential energy (J), an expression of {of} and parameters; the force is minus its derivative",
             dimension=ENERGY,
             local=names,

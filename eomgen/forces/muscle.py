@@ -9,7 +9,7 @@ from ..base.value_rules import Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Scalar
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
@@ -131,16 +131,16 @@ def _muscle(e: Entry) -> Muscle | None:
     path, drive = read_path(e), None
     if "excitation" in e.values:
         activation = e.states()[0]
-        drive = Activation(e.law("excitation"), e.positive("activation_time"), e.positive("deactivation_time"))
+        drive = Activation(e["excitation"], e.positive("activation_time"), e.positive("deactivation_time"))
         e.require("excitation", drive.excitation, Allowed(0.0, 1.0), "an excitation is 0 to 1")
     else:
-        activation = e.law("activation")
+        activation = e["activation"]
         e.require("activation", activation, Allowed(0.0, 1.0), "an activation is 0 to 1")
         for key in ("activation_time", "deactivation_time"):
             e.refuse(key, "has a meaning beside excitation only")
     force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
     velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else SHORTENING * fiber_length
-    pennation, damping = e.law("pennation"), e.law("damping")
+    pennation, damping = e["pennation"], e["damping"]
     e.require("pennation", pennation, Allowed(-1.5707, 1.5707, above=True, below=True), "must be less than pi/2")
     if path is None:
         return None
@@ -157,34 +157,29 @@ TYPES = table(
         "muscle",
         "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
         {
-            "between": BETWEEN._replace(required=True),
-            "activation": Field("expression", "activation of the muscle, 0 to 1", level=LAW, dimension=NONE),
-            "force_max": Field("expression", "largest active force (N)", required=True, dimension=FORCE),
-            "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True, dimension=LENGTH),
-            "slack_length": Field("expression", "length of the tendon (m)", required=True, dimension=LENGTH),
-            "velocity_max": Field(
-                "expression",
+            "between": BETWEEN.replace(required=True),
+            "activation": Scalar("activation of the muscle, 0 to 1", level=LAW, dimension=NONE),
+            "force_max": Scalar("largest active force (N)", required=True, dimension=FORCE),
+            "fiber_length": Scalar("optimal length of the fibres (m)", required=True, dimension=LENGTH),
+            "slack_length": Scalar("length of the tendon (m)", required=True, dimension=LENGTH),
+            "velocity_max": Scalar(
                 "largest shortening velocity of the fibres (m/s); 10 fiber_length per second by default",
                 dimension=SPEED,
             ),
-            "pennation": Field(
-                "expression",
+            "pennation": Scalar(
                 "angle of the fibres to the tendon at their optimal length (rad)",
                 default=0,
                 dimension=NONE,
             ),
-            "damping": Field(
-                "expression", "damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE
-            ),
+            "damping": Scalar("damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE),
             "via": VIA,
-            "excitation": Field(
-                "expression",
+            "excitation": Scalar(
                 "instead of activation: what a state of the muscle, <name>_activation, follows, 0 to 1",
                 level=LAW,
                 dimension=NONE,
             ),
-            "activation_time": Field("expression", "time in which it grows (s)", default=0.015, dimension=TIME),
-            "deactivation_time": Field("expression", "time in which it dies away (s)", default=0.06, dimension=TIME),
+            "activation_time": Scalar("time in which it grows (s)", default=0.015, dimension=TIME),
+            "deactivation_time": Scalar("time in which it dies away (s)", default=0.06, dimension=TIME),
         },
         _muscle,
         one_of=("activation", "excitation"),

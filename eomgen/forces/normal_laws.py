@@ -9,7 +9,7 @@ from typing import ClassVar
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..elements.entry import Entry
-from ..elements.field import EXPONENT, LINEAR, Field, Fields
+from ..elements.kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
 from ..graph.core import Expr, sqrt
 from ..records import dataclass
 from .branches import beyond_zero
@@ -240,23 +240,17 @@ class RigidLaw(NormalLaw):
 
 
 NORMAL: Fields = {
-    "stiffness": Field(
-        "expression",
+    "stiffness": Scalar(
         "stiffness k (N/m**n) in the normal force k d**n max(0, 1 + dissipation d_dot), d the penetration",
         required=True,
         dimension=PUSH,
         exponent="exponent",
     ),
-    "exponent": Field("expression", "exponent n of the penetration", default=EXPONENT, dimension=NONE),
-    "dissipation": Field(
-        "expression", "dissipation (s/m); or give restitution and velocity", dimension=NONE.times(RATE, -1)
-    ),
-    "restitution": Field(
-        "expression", "coefficient of restitution, from which the dissipation is computed", dimension=NONE
-    ),
-    "velocity": Field("expression", "impact velocity (m/s) at which that restitution holds", dimension=RATE),
-    "formula": Field(
-        "choice",
+    "exponent": Scalar("exponent n of the penetration", default=EXPONENT, dimension=NONE),
+    "dissipation": Scalar("dissipation (s/m); or give restitution and velocity", dimension=NONE.times(RATE, -1)),
+    "restitution": Scalar("coefficient of restitution, from which the dissipation is computed", dimension=NONE),
+    "velocity": Scalar("impact velocity (m/s) at which that restitution holds", dimension=RATE),
+    "formula": Choice(
         "formula that gives the dissipation from the restitution",
         default=RESTITUTIONS[0],
         choices=RESTITUTIONS,
@@ -264,27 +258,24 @@ NORMAL: Fields = {
 }
 #: Which law it is, and what only some laws have.
 NORMAL_CHOICE: Fields = {
-    "normal_law": Field(
-        "choice",
+    "normal_law": Choice(
         "law of the normal force: hunt_crossley, the default; hertz, the same with the exponent 3/2; linear, "
         "max(0, k d + damping d_dot)",
         default=NORMAL_LAWS[0],
         choices=NORMAL_LAWS,
     ),
-    "damping": Field("expression", "damping c (N s/m) of normal_law linear", dimension=DAMPING),
+    "damping": Scalar("damping c (N s/m) of normal_law linear", dimension=DAMPING),
 }
 #: Of bodies whose radii are known, instead of the stiffness.
 ELASTIC: Fields = {
-    "moduli": Field(
-        "radii", "Young's moduli of both bodies (Pa), instead of the stiffness, with poisson", dimension=_PRESSURE
-    ),
-    "poisson": Field("radii", "Poisson's ratios of both bodies, beside moduli", dimension=NONE),
+    "moduli": Radii("Young's moduli of both bodies (Pa), instead of the stiffness, with poisson", dimension=_PRESSURE),
+    "poisson": Radii("Poisson's ratios of both bodies, beside moduli", dimension=NONE),
 }
 
 
 def read_normal_law(e: Entry) -> NormalLaw:
     """The law of the keys :data:`NORMAL` and :data:`NORMAL_CHOICE`, and :data:`ELASTIC` where the type has them."""
-    kind = e.choice("normal_law")
+    kind = e["normal_law"]
     if kind == LINEAR:
         return _linear(e)
     e.refuse("damping", f"belongs to normal_law: linear; of {kind} the dissipation is damping / stiffness")
@@ -293,7 +284,7 @@ def read_normal_law(e: Entry) -> NormalLaw:
     if "moduli" in e.values or "poisson" in e.values:
         return _elastic(e, kind)
     _require_stiffness(e)
-    stiffness, exponent = e.positive("stiffness"), e.law("exponent")
+    stiffness, exponent = e.positive("stiffness"), e["exponent"]
     e.require("exponent", exponent, Allowed(1.0), "must be at least 1; above 1 the stiffness begins without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
 
@@ -308,7 +299,7 @@ def _linear(e: Entry) -> DampedLinear:
     _require_stiffness(e)
     for key in ("dissipation", "restitution", "velocity", "formula", "exponent", *ELASTIC):
         e.refuse(key, "has no meaning in normal_law: linear, which has stiffness and damping")
-    damping = e.given("damping")
+    damping = e["damping"]
     if damping is not None:
         e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
     return DampedLinear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
@@ -319,7 +310,7 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
     if kind != "hertz":
         key = "moduli" if "moduli" in e.values else "poisson"
         e.fault(key, f"belongs to normal_law: hertz, and this is {kind}", "give normal_law: hertz, or stiffness")
-    moduli, ratios = e.several("moduli", 2), e.several("poisson", 2)
+    moduli, ratios = e["moduli"], e["poisson"]
     for key in ELASTIC:
         if key not in e.values:
             e.missing(key, "give moduli and poisson together, two numbers each")
@@ -339,13 +330,13 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
 
 def _dissipation(e: Entry) -> Expr:
     """Given as such, or through a coefficient of restitution; none of them means none."""
-    restitution, velocity = e.given("restitution"), e.given("velocity")
-    formula = e.choice("formula")
+    restitution, velocity = e["restitution"], e["velocity"]
+    formula = e["formula"]
     if "dissipation" in e.values:
         for key in ("restitution", "velocity", "formula"):
             if key in e.values:
                 e.fault(key, "dissipation is given too", "give dissipation, or restitution with velocity")
-        value = e.law("dissipation")
+        value: Expr = e["dissipation"]
         e.require("dissipation", value, NOT_NEGATIVE, "must be 0 or greater")
         return value
     if restitution is None and velocity is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import JointReference, Pair
 from ..elements.looks import Drawn, Points
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -15,8 +15,8 @@ from ..records import dataclass
 from .force import CoordinateLoad, Load, MarkerLoad, View
 
 #: Keys that say along what a force acts.
-ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")
-BETWEEN = Field("pair", "two markers")
+ON_JOINT = JointReference("a joint of one degree, or a coordinate")
+BETWEEN = Pair("two markers")
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class JointCoordinate(Path):
 
 def read_coordinate(e: Entry, angle: bool = False) -> JointCoordinate | None:
     """The coordinate meant by ``joint``: of a joint of one degree, or named itself."""
-    found = e.coordinate("joint") if "joint" in e.values else None
+    found = e["joint"]
     if found is None:
         return None
     if found.kind == "parameter":
@@ -137,5 +137,5 @@ def read_angle(e: Entry) -> Path | None:
     """An angle: of a joint, or between two markers."""
     if "joint" in e.values:
         return read_coordinate(e, angle=True)
-    pair = e.pair() if "between" in e.values else None
+    pair = e.pair()
     return None if pair is None else Turn(*pair)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..base.value_rules import NOT_NEGATIVE
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field, Fields
+from ..elements.kinds import LAW, Fields, Scalar
 from ..graph.core import Expr, sqrt
 from ..records import dataclass
 from .branches import beyond_zero
@@ -56,18 +56,14 @@ class ReactionFriction(Force):
 
 #: Keys of friction by the joint's reaction.
 BY_REACTION: Fields = {
-    "coefficient": Field(
-        "expression",
+    "coefficient": Scalar(
         "friction coefficient, times the force across its axis that the joint carries",
         level=LAW,
         dimension=NONE,
     ),
-    "static_coefficient": Field(
-        "expression", "the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
-    ),
-    "radius": Field("expression", "radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
-    "thrust_radius": Field(
-        "expression",
+    "static_coefficient": Scalar("the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE),
+    "radius": Scalar("radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
+    "thrust_radius": Scalar(
         "mean radius of the collar (m) on which the reaction along the axis rubs; none by default",
         dimension=LENGTH,
     ),
@@ -79,7 +75,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if "coulomb" not in e.values and "static" in e.values:
         e.fault("static", "is given without coulomb", "give static_coefficient, or coulomb too", "EG-MISSING")
         return None
-    if (kind := e.choice("friction_law")) != "coulomb":
+    if (kind := e["friction_law"]) != "coulomb":
         e.fault("friction_law", f"{kind} has no coefficient", "leave friction_law out, or give coulomb")
         return None
     for key in ("transition", "bristle_stiffness", "bristle_damping"):
@@ -88,7 +84,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
         e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
     coefficient, onset, preload, breakaway = (
-        e.given(key) for key in ("coefficient", "static_coefficient", "coulomb", "static")
+        e[key] for key in ("coefficient", "static_coefficient", "coulomb", "static")
     )
     given = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
     for key, value in given.items():
@@ -99,7 +95,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
         remedy = "give stribeck together with static_coefficient or static, or none of them"
         e.fault("stribeck", message, remedy, "EG-MISSING")
         return None
-    found = e.coordinate("joint") if path is not None else None
+    found = e["joint"] if path is not None else None
     if found is None or path is None or coefficient is None:
         return None
     if found.joint is None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import Via
 from ..elements.looks import Drawn, Points
 from ..frames import Marker, WrapCylinder
 from ..graph import vectors as vec
@@ -193,8 +193,7 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
     )
 
 
-VIA = Field(
-    "via",
+VIA = Via(
     "points of the path between its ends, in order: markers that it slides through, and cylinders that it wraps "
     "around, {around: marker, radius: r, sense: positive or negative}, about the z axis of a marker; with friction and "
     "smoothing the rope rubs on the cylinder",
@@ -204,8 +203,8 @@ VIA = Field(
 
 def read_path(e: Entry) -> Path | None:
     """The line between two markers, or a path over what ``via`` lists."""
-    pair = e.pair() if "between" in e.values else None
-    via = e.via()
+    pair = e.pair()
+    via = e["via"]
     if pair is None or via is None:
         return None
     return Route(*pair, tuple(via)) if via else Line(*pair)

@@ -15,7 +15,7 @@ from ..base.limits.contacts import CAUGHT_UP
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
 from ..elements.entry import Entry
-from ..elements.field import Field, Fields
+from ..elements.kinds import Choice, Fields, Flag, Radii, Scalar
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
@@ -195,64 +195,51 @@ class SoilShear(DryFriction):
 _PRESSURE = FORCE.times(LENGTH, -2)
 _RISE = FORCE.times(REACH, -1)
 SOIL: Fields = {
-    "soil": Field(
-        "choice",
+    "soil": Choice(
         "soil under plates and wheels, instead of laws of normal force and friction: the name of a published one, or "
         f"{OWN} with all numbers given; numbers that are given replace those of a named soil",
         choices=(OWN, *SOILS),
     ),
-    "cohesive_modulus": Field(
-        "expression", "k_c (N/m^(n+1)) of the pressure (k_c / b + k_phi) z^n", dimension=_RISE,
+    "cohesive_modulus": Scalar("k_c (N/m^(n+1)) of the pressure (k_c / b + k_phi) z^n", dimension=_RISE,
         exponent="sinkage_exponent",
     ),
-    "frictional_modulus": Field(
-        "expression", "k_phi (N/m^(n+2))", dimension=_RISE.times(REACH, -1), exponent="sinkage_exponent"
+    "frictional_modulus": Scalar("k_phi (N/m^(n+2))", dimension=_RISE.times(REACH, -1), exponent="sinkage_exponent"
     ),
-    "sinkage_exponent": Field("expression", "n of the sinkage", dimension=NONE),
-    "cohesion": Field("expression", "cohesion c (Pa)", dimension=_PRESSURE),
-    "friction_angle": Field("expression", "angle of internal shearing resistance phi (rad)", dimension=NONE),
-    "shear_modulus": Field("expression", "K (m): shear displacement in which stress builds up", dimension=LENGTH),
-    "contact_width": Field(
-        "expression", "b (m), the smaller side of the area in contact; the width of the plate unless given",
+    "sinkage_exponent": Scalar("n of the sinkage", dimension=NONE),
+    "cohesion": Scalar("cohesion c (Pa)", dimension=_PRESSURE),
+    "friction_angle": Scalar("angle of internal shearing resistance phi (rad)", dimension=NONE),
+    "shear_modulus": Scalar("K (m): shear displacement in which stress builds up", dimension=LENGTH),
+    "contact_width": Scalar("b (m), the smaller side of the area in contact; the width of the plate unless given",
         dimension=LENGTH,
     ),
-    "rebound": Field(
-        "expression", f"part of the sinkage that unloading gives back; {REBOUND} unless given", dimension=NONE
+    "rebound": Scalar(f"part of the sinkage that unloading gives back; {REBOUND} unless given", dimension=NONE
     ),
-    "unloading_stiffness": Field(
-        "expression", "k_0 (N/m^3) of the slope k_0 + A_u z_m of unloading, instead of rebound",
+    "unloading_stiffness": Scalar("k_0 (N/m^3) of the slope k_0 + A_u z_m of unloading, instead of rebound",
         dimension=_PRESSURE.times(LENGTH, -1),
     ),
-    "unloading_rise": Field("expression", "A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2)),
-    "peak_angle": Field(
-        "radii",
+    "unloading_rise": Scalar("A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2)),
+    "peak_angle": Radii(
         "c1 and c2 of wheels, whose pressure is greatest at (c1 + c2 abs(slip)) times the angle of entry, such as "
         "[0.43, 0.32] of compact, [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
         dimension=NONE,
     ),
-    "reversal": Field(
-        "expression",
-        "velocity (m/s) of wheels over the ground over which front and rear change places",
+    "reversal": Scalar("velocity (m/s) of wheels over the ground over which front and rear change places",
         default=REVERSAL,
         dimension=SPEED,
     ),
-    "settling": Field(
-        "expression",
+    "settling": Scalar(
         "time (s) in which cells of a bed come to hold what is put into them, and in which they follow fast sliding",
         default=SETTLING,
         dimension=TIME,
     ),
-    "recovery": Field(
-        "expression",
-        "time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
+    "recovery": Scalar("time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
         f"{RECOVERY} unless given",
         dimension=TIME,
     ),
 }  # fmt: skip
 #: Of contacts with friction that has states.
 LATERAL: Fields = {
-    "lateral": Field(
-        "flag",
+    "lateral": Flag(
         "whether sliding across the plane of planar shapes has states too; mechanisms of the plane need none (false)",
         default=True,
     ),
@@ -262,7 +249,7 @@ _OF_OTHERS = (*NORMAL, *NORMAL_CHOICE, *ELASTIC, *FRICTION, *FRICTION_CHOICE)
 
 def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     """The two laws of the keys :data:`SOIL`; None where there are faults, which are noted."""
-    name = e.choice("soil")
+    name = e["soil"]
     for key in _OF_OTHERS:
         if key != "dissipation":
             e.refuse(key, "is of another law than soil")
@@ -272,7 +259,8 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
 
     def number(key: str, published: float | None) -> Expr:
         if key in e.values:
-            return e.law(key)
+            value: Expr = e[key]
+            return value
         if published is None:
             why = f"is missing of soil: {name}"
             where_from = "K is 0.01 m in firm sand, 0.025 m in loose sand, 0.006 m in firm clay (Wong, 2008)"
@@ -301,7 +289,7 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     rolls = any(shape.kind == WHEEL for group in groups for shape in group) and not cells_of(groups)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
     e.require("recovery", recovery, POSITIVE, "must be greater than 0")
-    dissipation = e.given("dissipation")
+    dissipation = e["dissipation"]
     if dissipation is not None:
         e.require("dissipation", dissipation, NOT_NEGATIVE, "must be 0 or greater")
     unloading, peak = _unloading(e), _peak(e)
@@ -319,11 +307,11 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     """The part of the sinkage that is given back, or two numbers of the slope."""
     keys = ("unloading_stiffness", "unloading_rise")
     if not any(key in e.values for key in keys):
-        part = e.law("rebound") if "rebound" in e.values else e.graph.constant(REBOUND)
+        part = e["rebound"] if "rebound" in e.values else e.graph.constant(REBOUND)
         e.require("rebound", part, Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
         return part, None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
-    found = [e.law(key) if key in e.values else e.graph.zero for key in keys]
+    found = [e[key] if key in e.values else e.graph.zero for key in keys]
     for key, value in zip(keys, found, strict=True):
         e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     return None, (found[0], found[1])
@@ -331,7 +319,7 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
 
 def _peak(e: Entry) -> tuple[Expr, Expr] | None:
     """The two numbers of the angle of greatest pressure."""
-    pair = e.several("peak_angle", 2) if "peak_angle" in e.values else None
+    pair = e["peak_angle"]
     if pair is None:
         return None
     e.require("peak_angle[0]", pair[0], Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..elements.dimensions import DAMPING, ENERGY, LENGTH, NONE, REACH, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Scalar
 from ..elements.looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -82,18 +82,18 @@ class Damper(Force):
         return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
 
 
-_STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS)
-_TURNING_STIFFNESS = _STIFFNESS._replace(dimension=ENERGY)
-_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING)
-_TURNING_DAMPING = _DAMPING._replace(dimension=ENERGY.times(TIME))
-_MARKERS = BETWEEN._replace(required=True)
-_COORDINATE = ON_JOINT._replace(required=True)
+_STIFFNESS = Scalar("stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS)
+_TURNING_STIFFNESS = _STIFFNESS.replace(dimension=ENERGY)
+_DAMPING = Scalar("damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING)
+_TURNING_DAMPING = _DAMPING.replace(dimension=ENERGY.times(TIME))
+_MARKERS = BETWEEN.replace(required=True)
+_COORDINATE = ON_JOINT.replace(required=True)
 _ANGLE = {"joint": ON_JOINT, "between": BETWEEN}
 
 
 def _spring(path: Callable[[Entry], Path | None], rest: str) -> Callable[[Entry], Spring | None]:
     def read(e: Entry) -> Spring | None:
-        where, stiffness, length = path(e), e.law("stiffness"), e.law(rest)
+        where, stiffness, length = path(e), e["stiffness"], e[rest]
         return None if where is None else Spring(e.name, where, stiffness, length)
 
     return read
@@ -101,7 +101,7 @@ def _spring(path: Callable[[Entry], Path | None], rest: str) -> Callable[[Entry]
 
 def _damper(path: Callable[[Entry], Path | None]) -> Callable[[Entry], Damper | None]:
     def read(e: Entry) -> Damper | None:
-        where, damping = path(e), e.law("damping")
+        where, damping = path(e), e["damping"]
         return None if where is None else Damper(e.name, where, damping)
 
     return read
@@ -114,7 +114,7 @@ TYPES = table(
         {
             "between": _MARKERS,
             "stiffness": _STIFFNESS,
-            "length": Field("expression", "free length (m), at which the force is 0", default=0, dimension=LENGTH),
+            "length": Scalar("free length (m), at which the force is 0", default=0, dimension=LENGTH),
             "via": VIA,
         },
         _spring(read_path, "length"),
@@ -131,7 +131,7 @@ TYPES = table(
         {
             **_ANGLE,
             "stiffness": _TURNING_STIFFNESS,
-            "angle": Field("expression", "angle (rad) at which the torque is 0", default=0, dimension=NONE),
+            "angle": Scalar("angle (rad) at which the torque is 0", default=0, dimension=NONE),
         },
         _spring(read_angle, "angle"),
         one_of=("joint", "between"),
@@ -149,9 +149,7 @@ TYPES = table(
         {
             "joint": _COORDINATE,
             "stiffness": _STIFFNESS,
-            "rest": Field(
-                "expression", "value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH
-            ),
+            "rest": Scalar("value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH),
         },
         _spring(read_coordinate, "rest"),
     ),

@@ -8,7 +8,7 @@ from ..base.value_rules import POSITIVE
 from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import Field
+from ..elements.kinds import Scalar
 from ..elements.looks import STOP, Seen
 from ..graph.core import Expr
 from ..records import dataclass
@@ -74,7 +74,7 @@ class JointStop(Force):
 
 def _stop(e: Entry) -> JointStop | None:
     path, law = read_coordinate(e), read_normal_law(e)
-    lower, upper = e.given("lower"), e.given("upper")
+    lower, upper = e["lower"], e["upper"]
     if lower is None and upper is None:
         e.fault("", "has no limit", "give lower, upper or both", "EG-MISSING")
     if lower is not None and upper is not None:
@@ -87,10 +87,10 @@ TYPES = table(
         "stop",
         "elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
         {
-            "joint": ON_JOINT._replace(required=True),
+            "joint": ON_JOINT.replace(required=True),
             "stiffness": NORMAL["stiffness"],
-            "lower": Field("expression", "lower limit (rad or m)", dimension=REACH),
-            "upper": Field("expression", "upper limit (rad or m)", dimension=REACH),
+            "lower": Scalar("lower limit (rad or m)", dimension=REACH),
+            "upper": Scalar("upper limit (rad or m)", dimension=REACH),
             **{key: field for key, field in (NORMAL | NORMAL_CHOICE).items() if key != "stiffness"},
         },
         _stop,

@@ -9,7 +9,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import LAW, Field
+from ..elements.kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -222,9 +222,9 @@ class Tyre(Force):
 
 # -- reading ----------------------------------------------------------------------------------------------------------
 def _tyre(e: Entry) -> Tyre | None:
-    pair, axis, radius = e.pair(), e.axis("axis"), e.positive("radius")
+    pair, axis, radius = e.pair(), e["axis"], e.positive("radius")
     rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
-    damping, settling, relaxation = e.law("damping"), e.law("settling"), e.several("relaxation", 2)
+    damping, settling, relaxation = e["damping"], e["settling"], e["relaxation"]
     reversal = e.positive("reversal")
     e.require("settling", settling, NOT_NEGATIVE, "must be 0 or greater")
     e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
@@ -239,7 +239,7 @@ def _tyre(e: Entry) -> Tyre | None:
 
 
 def _law(e: Entry) -> TyreLaw | None:
-    kind = e.choice("law")
+    kind = e["law"]
     if kind == "brush":
         e.refuse("shifts", "belongs to law: magic_formula")
         for key in ("slip_stiffness", "friction"):
@@ -252,7 +252,7 @@ def _law(e: Entry) -> TyreLaw | None:
     for key in ("slip_stiffness", "half_length"):
         e.refuse(key, "belongs to law: brush")
     friction = e.positive("friction") if "friction" in e.values else e.graph.one
-    return MagicFormula(e.flag("shifts"), friction)
+    return MagicFormula(e["shifts"], friction)
 
 
 TYPES = table(
@@ -260,44 +260,34 @@ TYPES = table(
         "tyre",
         "a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the wheel.",
         {
-            "between": Field("pair", "the road and the wheel's centre", required=True),
-            "radius": Field("expression", "radius without load (m)", required=True, dimension=LENGTH),
-            "stiffness": Field("expression", "radial stiffness (N/m)", required=True, dimension=STIFFNESS),
-            "relaxation": Field(
-                "radii", "relaxation lengths along and across the wheel (m)", required=True, dimension=LENGTH
+            "between": Pair("the road and the wheel's centre", required=True),
+            "radius": Scalar("radius without load (m)", required=True, dimension=LENGTH),
+            "stiffness": Scalar("radial stiffness (N/m)", required=True, dimension=STIFFNESS),
+            "relaxation": Radii("relaxation lengths along and across the wheel (m)", required=True, dimension=LENGTH
             ),
-            "damping": Field("expression", "radial damping (N s/m)", default=0, dimension=DAMPING),
-            "settling": Field(
-                "expression", "time (s) that damps the deflections at rest; steady slips do not depend on it",
+            "damping": Scalar("radial damping (N s/m)", default=0, dimension=DAMPING),
+            "settling": Scalar("time (s) that damps the deflections at rest; steady slips do not depend on it",
                 default=0, dimension=TIME,
             ),
-            "reversal": Field(
-                "expression", "velocity (m/s) around 0 over which rolling forwards becomes rolling backwards",
+            "reversal": Scalar("velocity (m/s) around 0 over which rolling forwards becomes rolling backwards",
                 default=0.1, dimension=SPEED,
             ),
-            "axis": Field("axis", "axis of the wheel to its left, in its marker", default="y"),
-            "rolling_radius": Field(
-                "expression", "effective rolling radius (m), the radius unless given", dimension=LENGTH
+            "axis": Axis("axis of the wheel to its left, in its marker", default="y"),
+            "rolling_radius": Scalar("effective rolling radius (m), the radius unless given", dimension=LENGTH
             ),
-            "law": Field(
-                "choice",
-                "law of the forces: brush; magic_formula, of the car tyre 205/60R15 91V of Pacejka (2006)",
+            "law": Choice("law of the forces: brush; magic_formula, of the car tyre 205/60R15 91V of Pacejka (2006)",
                 default=LAWS[0],
                 choices=LAWS,
             ),
-            "slip_stiffness": Field(
-                "expression", "force of the brush per slip (N), along and across", level=LAW, dimension=FORCE
+            "slip_stiffness": Scalar("force of the brush per slip (N), along and across", level=LAW, dimension=FORCE
             ),
-            "friction": Field(
-                "expression", "friction coefficient of the brush, or factor of the peaks of the Magic Formula",
+            "friction": Scalar("friction coefficient of the brush, or factor of the peaks of the Magic Formula",
                 level=LAW, dimension=NONE,
             ),
-            "half_length": Field(
-                "expression", "half of the length of contact (m) of the brush, for its aligning moment",
+            "half_length": Scalar("half of the length of contact (m) of the brush, for its aligning moment",
                 dimension=LENGTH,
             ),
-            "shifts": Field(
-                "flag", "whether the Magic Formula has its forces at no slip (conicity, ply steer)", default=True
+            "shifts": Flag("whether the Magic Formula has its forces at no slip (conicity, ply steer)", default=True
             ),
         },
         _tyre,

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
-from ..elements.field import MOTION, Field, Fields
+from ..elements.kinds import MOTION, Fields, Vector, ref
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.substitute import substitute
+from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .joint import SEQUENCE, Closure, Coordinate, Joint, Shape
@@ -21,16 +21,38 @@ from .rotation_coordinates import euler, euler_rates
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)
 ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
-CURVE = Field(
-    "shape",
+
+
+class GuidePoint(Vector):
+    """Three expressions [x, y, z] of the joint's own first coordinates and of parameters."""
+
+    schema = ref("vector")
+
+    def read(self, reader: Any, path: str, value: Any, *own: Any) -> Shape:
+        """A point as expressions of parameters of the model and of coordinates of the joint, ``own``."""
+        (names,), point = own, reader.vector(path, value, self.level)
+        shown = " and ".join(names)
+        for name in sorted(symbols_of(point) - {*reader.names.of("parameter"), *names}):
+            if name in reader.names.kinds:
+                message = f"the {reader.names.kinds[name]} {name!r} cannot be used here"
+                reader.faults.add(path, message, f"allowed are parameters and {shown}", "EG-REFERENCE")
+        if not symbols_of(point) & {*names} and not reader.faults.under(path):
+            remedy = f"use the joint's own {shown} in the expressions"
+            reader.faults.add(path, f"does not depend on {shown}", remedy, "EG-EXPRESSION")
+        return Shape(point, tuple(reader.graph.symbol(name) for name in names))
+
+    def absent(self, reader: Any) -> Shape:
+        return Shape((reader.stand_in,) * 3, ())
+
+
+CURVE = GuidePoint(
     "point of the curve in the predecessor's axes (m), as expressions of the joint's coordinate s",
     required=True,
     level=MOTION,
     own=1,
     dimension=LENGTH,
 )
-SURFACE = Field(
-    "shape",
+SURFACE = GuidePoint(
     "point of the surface in the predecessor's axes (m), as expressions of the joint's coordinates u and v",
     required=True,
     level=MOTION,

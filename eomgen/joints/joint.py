@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from itertools import product
 from typing import ClassVar, NamedTuple
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..elements import dimensions
-from ..elements.field import Field, Fields
+from ..elements.kinds import Choice, Fields, Scalar
 from ..elements.looks import JointLook
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -65,12 +66,13 @@ class Shape(NamedTuple):
 
 #: Sequences of axes of Euler angles: no axis follows itself.
 SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
-SEQUENCE = Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES)
-LENGTH = Field(
-    "expression",
+SEQUENCE = Choice("axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES)
+LENGTH = Scalar(
     "length of the rod (m)",
     required=True,
     not_zero="give a length other than 0; a rod without length is a spherical joint",
+    allowed=NOT_NEGATIVE,
+    remedy="give a length greater than 0",
     dimension=dimensions.LENGTH,
 )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.dimensions import LENGTH
-from ..elements.field import Field, Fields
+from ..elements.kinds import Fields, Scalar
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
@@ -91,8 +91,7 @@ class Screw(Joint):
         (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True
     )
     options: ClassVar[Fields] = {
-        "pitch": Field(
-            "expression",
+        "pitch": Scalar(
             "advance of S per turn (m), negative for a left-handed thread",
             required=True,
             not_zero="give a pitch other than 0; a screw without advance is a revolute joint",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.field import Fields
+from ..elements.kinds import Fields
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.field import Field, Fields
+from ..elements.kinds import Choice, Fields
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -17,8 +17,7 @@ from .rotation_coordinates import euler, euler_angles, euler_rates, parameter_ro
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
-ROTATION = Field(
-    "choice",
+ROTATION = Choice(
     "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
     default="euler_angles",
     choices=("euler_angles", "euler_parameters"),

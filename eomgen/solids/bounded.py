@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH
+from ..elements.kinds import Fields, Scalar, Vector
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .solid import Solid, SolidSize
+from .solid import Solid
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,7 @@ class Box(Solid):
     """A rectangular block; edges along its axes."""
 
     type_name: ClassVar[str] = "box"
-    dimensions: ClassVar[dict[str, SolidSize]] = {"size": SolidSize("vector", "edges along x, y, z (m)")}
+    dimensions: ClassVar[Fields] = {"size": Vector("edges along x, y, z (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
         a, b, c = self.lengths["size"]
@@ -32,7 +34,7 @@ class Ellipsoid(Solid):
     """An ellipsoid; half axes along its axes."""
 
     type_name: ClassVar[str] = "ellipsoid"
-    dimensions: ClassVar[dict[str, SolidSize]] = {"semi_axes": SolidSize("vector", "half axes along x, y, z (m)")}
+    dimensions: ClassVar[Fields] = {"semi_axes": Vector("half axes along x, y, z (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
         a, b, c = self.lengths["semi_axes"]
@@ -48,7 +50,7 @@ class Sphere(Solid):
     """A ball."""
 
     type_name: ClassVar[str] = "sphere"
-    dimensions: ClassVar[dict[str, SolidSize]] = {"radius": SolidSize("expression", "radius (m)")}
+    dimensions: ClassVar[Fields] = {"radius": Scalar("radius (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
         r = self.length("radius")

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH
+from ..elements.kinds import Fields, Scalar
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .solid import Solid, SolidSize
+from .solid import Solid
 
-_LENGTH = SolidSize("expression", "length along the axis (m)")
-_RADIUS = SolidSize("expression", "radius (m)")
+_LENGTH = Scalar("length along the axis (m)", required=True, dimension=LENGTH)
+_RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,7 @@ class Cylinder(Solid):
     """A full circular cylinder, placed by its centre; of length 0 a disc (which needs a mass)."""
 
     type_name: ClassVar[str] = "cylinder"
-    dimensions: ClassVar[dict[str, SolidSize]] = {"radius": _RADIUS, "length": _LENGTH}
+    dimensions: ClassVar[Fields] = {"radius": _RADIUS, "length": _LENGTH}
     has_axis: ClassVar[bool] = True
 
     def content(self) -> Expr:
@@ -37,9 +39,9 @@ class Tube(Solid):
     """A hollow circular cylinder, placed by its centre."""
 
     type_name: ClassVar[str] = "tube"
-    dimensions: ClassVar[dict[str, SolidSize]] = {
-        "outer_radius": SolidSize("expression", "outer radius (m)"),
-        "inner_radius": SolidSize("expression", "inner radius (m)"),
+    dimensions: ClassVar[Fields] = {
+        "outer_radius": Scalar("outer radius (m)", required=True, dimension=LENGTH),
+        "inner_radius": Scalar("inner radius (m)", required=True, dimension=LENGTH),
         "length": _LENGTH,
     }
     has_axis: ClassVar[bool] = True
@@ -60,7 +62,7 @@ class Rod(Solid):
     """A thin straight rod, placed by its middle; ``line_density`` is its mass for each metre."""
 
     type_name: ClassVar[str] = "rod"
-    dimensions: ClassVar[dict[str, SolidSize]] = {"length": _LENGTH}
+    dimensions: ClassVar[Fields] = {"length": _LENGTH}
     has_axis: ClassVar[bool] = True
     content_key: ClassVar[str] = "line_density"
 
@@ -78,9 +80,9 @@ class Cone(Solid):
     """A full circular cone, placed by the centre of its base, its apex along the axis."""
 
     type_name: ClassVar[str] = "cone"
-    dimensions: ClassVar[dict[str, SolidSize]] = {
-        "radius": SolidSize("expression", "radius of the base (m)"),
-        "length": SolidSize("expression", "height along the axis (m)"),
+    dimensions: ClassVar[Fields] = {
+        "radius": Scalar("radius of the base (m)", required=True, dimension=LENGTH),
+        "length": Scalar("height along the axis (m)", required=True, dimension=LENGTH),
     }
     has_axis: ClassVar[bool] = True
 

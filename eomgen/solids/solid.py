@@ -8,19 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
+from ..elements.kinds import Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Vec3
 from ..records import dataclass
-
-
-class SolidSize(NamedTuple):
-    """A key of a solid: ``kind`` is ``expression`` (a length) or ``vector`` (three of them)."""
-
-    kind: str
-    doc: str
 
 
 @dataclass(frozen=True)
@@ -36,7 +30,7 @@ class Solid(ABC):
     lengths: Mapping[str, Vec3]
 
     type_name: ClassVar[str]
-    dimensions: ClassVar[dict[str, SolidSize]]
+    dimensions: ClassVar[Fields]  #: its keys
     has_axis: ClassVar[bool] = False  #: whether z of its own axes can be laid along an ``axis``
     content_key: ClassVar[str] = "density"  #: the key that gives the mass through :meth:`content`
 

@@ -68,8 +68,8 @@ FAULTS = (
     ),
     Fault(
         "gear-internal", "_gear",
-        '-ratio if e.flag("internal") else ratio',
-        'ratio if e.flag("internal") else -ratio',
+        '-ratio if e["internal"] else ratio',
+        'ratio if e["internal"] else -ratio',
         "outside and inside gears are exchanged",
         "tests/mechanics/test_gears.py::test_pairs_turn_in_the_ratio_of_their_radii[keys0--0.4]",
     ),

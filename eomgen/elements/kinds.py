@@ -1,0 +1,1010 @@
+"""Elements, kinds of keys: one class a kind, and a key of an entry is an object of its kind.
+
+From a kind follow all uses of a key: how YAML and Python give it (:meth:`Field.read`, :meth:`Field.reference`), its
+JSON Schema, the documentation and annotation of an argument, where a dimension is looked up (:meth:`Field.part`), how
+the value in an instance of a component is made of that in the component (:meth:`Field.map`), and what a model file
+leaves out (:meth:`Field.is_default`).  A new kind is one class.  ``reader`` is the
+:class:`~eomgen.describe.values.Reader` of a model, ``visitor`` a :class:`~eomgen.describe.visit.Visitor`, ``refer`` the
+:class:`~eomgen.describe.handles.References` of a model in Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from typing import Any, ClassVar
+
+from ..base.names import LONGEST
+from ..base.value_rules import CHECKS, NOT_NEGATIVE, POSITIVE, Allowed
+from ..frames import Marker, WrapCylinder
+from .dimensions import LENGTH, NONE, TIME, Dimension
+
+# What the expressions of a key may depend on; each level includes those before it.
+NUMBER = -1  #: numbers, pi
+CONSTANT = 0  #: parameters
+MOTION = 1  #: t, inputs, coordinates and their velocities
+LAW = 2  #: positions and velocities of markers, and outputs that need no accelerations
+OUTPUT = 3  #: accelerations and energies
+
+EXPONENT = 1.5  #: of the penetration in the law of a contact (Hertz), unless given
+LINEAR = "linear"  #: the choice of normal_law whose exponent is 1
+
+Schema = dict[str, Any]
+_RULES = {POSITIVE: "must be greater than 0", NOT_NEGATIVE: "must be 0 or greater"}
+
+
+# -- JSON Schema ------------------------------------------------------------------------------------------------------
+def ref(name: str) -> Schema:
+    """A reference to a definition."""
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def array(items: Schema, least: int | None = None, most: int | None = None) -> Schema:
+    """A list of items, so many at least and at most."""
+    limits = {"minItems": least, "maxItems": most}
+    return {"type": "array", "items": items, **{key: x for key, x in limits.items() if x is not None}}
+
+
+def table_schema(fields: Fields) -> Schema:
+    """An object with the keys of a table."""
+    return object_schema({k: f.json() for k, f in fields.items()}, [k for k, f in fields.items() if f.required])
+
+
+def object_schema(properties: Schema, required: Sequence[str] = ()) -> Schema:
+    """An object of these keys and no others."""
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {**schema, "required": [*required]} if required else schema
+
+
+def typed_schema(fields: Fields, type_name: str, key: str = "type") -> Schema:
+    """An object with the keys of a table, for one type."""
+    schema = table_schema(fields)
+    schema["properties"][key] = {"const": type_name}
+    return schema
+
+
+def _mapping(values: Schema, **rest: Any) -> Schema:
+    return {"type": "object", **rest, "additionalProperties": values}
+
+
+def any_of(*schemas: Schema) -> Schema:
+    """What one of several schemas describes."""
+    return {"anyOf": [*schemas]}
+
+
+def enum(*words: Any) -> Schema:
+    """One of these."""
+    return {"enum": [*words]}
+
+
+def define(name: str, schema: Schema | Callable[[], Schema]) -> tuple[Schema, dict[str, Any]]:
+    """A reference to a definition, and the definition."""
+    return ref(name), {name: schema}
+
+
+_TEXT: Schema = {"type": "string"}
+_FLAG: Schema = {"type": "boolean"}
+_WHOLE: Schema = {"type": "integer", "minimum": 1}
+_OBJECT: Schema = {"type": "object"}
+_NUMBER: Schema = {"type": ["number", "string"]}
+
+
+# -- keys -------------------------------------------------------------------------------------------------------------
+class Field:
+    """A key of an entry; the class is the kind of what it holds.
+
+    ``level`` says what its expressions may depend on; ``choices`` lists the words of a choice; ``own`` is how many of
+    the first coordinates of its own joint an expression depends on; ``not_zero`` says what to take instead where 0 has
+    no meaning; ``allowed`` is a range of its numbers, and ``remedy`` says so.  ``measure`` is 'angle' or 'length' where
+    a coordinate must be one.
+
+    ``dimension`` is that of its expressions, None where it depends on what the user means; of a matrix of six rows it
+    is that of the entries for two angles.  ``along`` is the key of the coordinate that ``reach`` in it means.
+    ``exponent`` is a key: the dimension is divided by reach to the power of its number.  ``local`` are names that only
+    its expressions know, and what they are.
+    """
+
+    says: ClassVar[str] = ""  #: how a message describes what it holds: the first line of the class's documentation
+    argument: ClassVar[str] = "scalar"  #: what the argument of a method is called in its documentation
+    annotation: ClassVar[str] = "Value"
+    schema: ClassVar[Schema] = {}
+    defines: ClassVar[Mapping[str, Schema | Callable[[], Schema]]] = {}  #: what the schema refers to
+    names_of: ClassVar[str] = ""  #: 'coordinate' or 'body', where it holds names of these
+    joins: ClassVar[bool] = False  #: whether the method has an argument for each of its two ends
+    parts: ClassVar[Fields] = {}  #: keys within it
+
+    def __init__(
+        self,
+        doc: str,
+        required: bool = False,
+        default: Any = None,
+        level: int = CONSTANT,
+        choices: tuple[str, ...] = (),
+        own: int = 0,
+        not_zero: str = "",
+        dimension: Dimension | None = None,
+        along: str = "joint",
+        exponent: str = "",
+        local: Mapping[str, Field] | None = None,
+        allowed: Allowed | None = None,
+        remedy: str = "",
+        measure: str = "",
+    ) -> None:
+        self.doc, self.required, self.default, self.level, self.choices = doc, required, default, level, choices
+        self.own, self.not_zero, self.dimension, self.along, self.exponent = own, not_zero, dimension, along, exponent
+        self.local, self.allowed, self.remedy, self.measure = local or {}, allowed, remedy, measure
+
+    def __init_subclass__(cls) -> None:
+        first, _, rest = (cls.__doc__ or "").partition("\n")[0].removesuffix(".").partition(" ")
+        cls.says = vars(cls).get("says") or f"{first.lower()} {rest}"
+
+    def replace(self, **changed: Any) -> Field:
+        """The same key but for what is given."""
+        made = copy(self)
+        vars(made).update(changed)
+        return made
+
+    # -- the schema and the documentation -------------------------------------------------------------------------
+    def json(self) -> Schema:
+        """The schema of the key."""
+        schema = dict(self.schema)
+        if self.default not in (None, ()):
+            schema["default"] = list(self.default) if isinstance(self.default, tuple) else self.default
+        return {**schema, "description": self.doc}
+
+    @property
+    def described(self) -> str:
+        """What its argument is called in documentation."""
+        return self.argument
+
+    # -- values ---------------------------------------------------------------------------------------------------
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        """What a value means; a fault is noted at ``path``, and None or a stand-in returned, where it means nothing."""
+        raise NotImplementedError(f"{type(self).__name__} is read with the rest of its entry")
+
+    def absent(self, reader: Any) -> Any:
+        """What stands for a value that is not given."""
+        return None
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        """A value of a call in Python as a model file would write it: names of markers and joints for handles."""
+        return value
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        """A value as a visitor changes what it holds; what has not the form of the kind stays as it is."""
+        return _named(value, getattr(visitor, self.names_of)) if self.names_of else value
+
+    def is_default(self, value: Any) -> bool:
+        """Whether leaving a value out means the same."""
+        return value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
+
+    def part(self, words: Sequence[str]) -> Field | None:
+        """The key of a scalar within it, behind these words; itself where it has no parts."""
+        if not self.parts:
+            return self
+        return next((self.parts[word] for word in reversed(words) if word in self.parts), None)
+
+    def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
+        """The dimension of a scalar in an entry, None if it is not known.
+
+        Parameters
+        ----------
+        values : mapping
+            The entry.
+        place : tuple
+            Indices of the scalar in the field.
+        length : bool
+            Whether the coordinate that the entry acts on is a length.
+        """
+        found = None if self.dimension is None else self.dimension.along(length)
+        if found is not None and self.exponent and length:
+            power = 1.0 if values.get("normal_law") == LINEAR else values.get(self.exponent, EXPONENT)
+            return None if isinstance(power, str) or not hasattr(power, "__float__") else found.times(LENGTH, -power)
+        return found
+
+
+Fields = dict[str, Field]
+
+
+def definitions(kind: type[Field] = Field) -> dict[str, Schema]:
+    """What the schemas of all kinds refer to, by name."""
+    found = {name: schema() if callable(schema) else schema for name, schema in kind.defines.items()}
+    for inner in kind.__subclasses__():
+        found |= definitions(inner)
+    return found
+
+
+def by(method: str) -> Any:
+    """Reading by a method of the reader."""
+    return lambda self, reader, path, value: getattr(reader, method)(path, value)
+
+
+def _each(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A list whose items are changed; anything else as it is."""
+    return [change(part) for part in value] if isinstance(value, list | tuple) else value
+
+
+def _named(value: Any, change: Callable[[str], str]) -> Any:
+    """A name, or a list of names, changed; anything else as it is."""
+    return change(value) if isinstance(value, str) else _each(value, lambda name: _named(name, change))
+
+
+# -- words, names and plain numbers -----------------------------------------------------------------------------------
+class Text(Field):
+    """A text."""
+
+    schema = _TEXT
+    read = by("text")
+
+
+class Unit(Text):
+    """A unit, such as mm or N*m/rad."""
+
+
+class Latex(Text):
+    """The LaTeX of a symbol, such as \\theta_1."""
+
+    argument, annotation = "str", "str"
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {_named(name, visitor.coordinate): visitor.latex(part) for name, part in value.items()}
+        return _each(value, visitor.latex) if isinstance(value, list | tuple) else visitor.latex(value)
+
+
+class Latexes(Latex):
+    """The LaTeX of a symbol, a list of them, or a mapping of coordinates to them."""
+
+    argument, annotation = "str, sequence or mapping of str", "str | Sequence[str] | Mapping[str, str]"
+    schema = any_of(_TEXT, array({"type": ["string", "null"]}), _mapping(_TEXT, propertyNames=ref("name")))
+
+
+class Name(Field):
+    """A name."""
+
+    argument, annotation = "str or symbol", "Any"
+    schema, defines = define("name", {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST})
+
+
+class CoordinateName(Name):
+    """The name that an entry gives to a coordinate."""
+
+    says, names_of = Name.says, "coordinate"
+
+
+class Names(Field):
+    """A list of names."""
+
+    argument, annotation = "sequence of str", "Sequence[Any]"
+    schema = array(ref("name"))
+
+
+class CoordinateNames(Names):
+    """The names that an entry gives to coordinates or velocities."""
+
+    says, names_of = Names.says, "coordinate"
+
+
+class SomeNames(Field):
+    """A list of names, or one name."""
+
+    argument, annotation = "str or sequence of str", "Any"
+    schema = any_of(ref("name"), array(ref("name")))
+    ending = ""  #: what the names have behind them where they stand in expressions
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return _named(value, lambda name: visitor.coordinate(name + self.ending).removesuffix(self.ending))
+
+
+class ConstraintNames(SomeNames):
+    """Constraints that close and open, which go by the names of their states."""
+
+    says, ending = SomeNames.says, "_closed"
+
+
+class Reference(Field):
+    """A name, with those of instances and of bodies before it: ``leg1.foot.tip``."""
+
+    schema, defines = define(
+        "reference", {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
+    )
+
+
+class Choice(Field):
+    """One of the listed words."""
+
+    annotation = "str"
+
+    @property
+    def described(self) -> str:
+        return "{" + ", ".join(f'"{word}"' for word in self.choices) + "}"
+
+    def json(self) -> Schema:
+        return {"enum": list(self.choices), **super().json()}
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        return reader.choice(path, value, self)
+
+
+class Flag(Field):
+    """True or false."""
+
+    argument, annotation = "bool", "bool"
+    schema = _FLAG
+    read = by("flag")
+
+
+class Check(Field):
+    """True or false, error, note or off."""
+
+    schema = enum(True, False, *CHECKS)
+    read = by("check_word")
+
+
+class Times(Field):
+    """True, false or a whole number greater than 0."""
+
+    schema = any_of({"type": "boolean"}, {"type": "integer", "minimum": 1})
+
+
+class Sign(Field):
+    """1, -1 or 0."""
+
+    schema = enum(1, -1, 0)
+
+
+class Number(Field):
+    """A number."""
+
+    argument, annotation = "float", "float"
+    schema = _NUMBER
+    read = by("number")
+
+
+class PositiveNumber(Number):
+    """A number greater than 0."""
+
+    schema = any_of({"type": "number", "exclusiveMinimum": 0}, _TEXT)
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        return reader.number(path, value, positive=True)
+
+
+class Count(Field):
+    """A whole number greater than 0."""
+
+    schema = _WHOLE
+
+
+class Numbers(Field):
+    """A list of numbers."""
+
+    schema = array(_NUMBER, 2)
+
+
+class Grid(Field):
+    """A list of lists of numbers, a row for each x."""
+
+    schema = array(array(_NUMBER), 2)
+
+
+class File(Field):
+    """The path of a file."""
+
+    schema = _TEXT
+    read = by("file")
+
+
+class Table(Field):
+    """A mapping."""
+
+
+class Functions(Field):
+    """A list of names of C functions, null for one that is not there."""
+
+    schema = array({"anyOf": [ref("name"), {"type": "null"}]})
+
+
+# -- expressions ------------------------------------------------------------------------------------------------------
+class Scalar(Field):
+    """A number or an expression."""
+
+    schema, defines = define("expression", _NUMBER)
+
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
+        found = reader.expression(path, value, self.level)
+        if self.allowed is not None:
+            reader.requirements.inside(path, found, self.allowed, self.remedy or _RULES[self.allowed])
+        if self.not_zero:
+            reader.requirements.not_zero(path, found, f"{self.doc}; {self.not_zero}")
+        return found
+
+    def absent(self, reader: Any) -> Any:
+        return reader.stand_in if self.required else None
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return visitor.vector(value, slot)
+
+
+class Vector(Scalar):
+    """Three numbers or expressions [x, y, z]."""
+
+    argument, annotation = "sequence of three", "Sequence[Value]"
+    schema, defines = define("vector", array(ref("expression"), 3, 3))
+
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
+        return reader.vector(path, value, self.level)
+
+    def absent(self, reader: Any) -> Any:
+        return (reader.stand_in,) * 3
+
+    def is_default(self, value: Any) -> bool:
+        return super().is_default(value) or (self.default == (0, 0, 0) and is_zero(value))
+
+
+class Value(Scalar):
+    """A number or an expression for a joint, three of them [x, y, z] for a body."""
+
+    argument, annotation = "scalar or sequence of three", "Value | Sequence[Value]"
+    schema = any_of(ref("expression"), ref("vector"))
+
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
+        """Three for a body, or one."""
+        raise NotImplementedError
+
+
+class Scalars(Field):
+    """A list of expressions."""
+
+    schema = array(ref("expression"))
+    count = 0  #: how many, where that is fixed
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        parts = items(value)
+        if parts is None or len(parts) != self.count:
+            reader.wrong(path, value, self)
+            return None
+        found = []
+        for k, part in enumerate(parts):
+            found.append(reader.expression(f"{path}[{k}]", part, self.level))
+            if self.allowed is not None:
+                reader.requirements.inside(f"{path}[{k}]", found[-1], self.allowed, self.remedy or _RULES[self.allowed])
+        return tuple(found)
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return visitor.vector(value, slot)
+
+
+class Two(Scalars):
+    """A list of two numbers or expressions."""
+
+    argument, annotation = "sequence of two", "Sequence[Value]"
+    schema = array(ref("expression"), 2, 2)
+    count = 2
+
+
+class Radii(Two):
+    """Two numbers or expressions."""
+
+
+class Places(Scalars):
+    """A list of points [x, y]."""
+
+    schema = array(array(ref("expression"), 2, 2), 2)
+
+
+class Matrix(Scalars):
+    """A list of rows, each a list of numbers or expressions."""
+
+    schema = array(array(ref("expression")))
+
+
+class Rotation(Matrix):
+    """The axes of a frame as columns."""
+
+    says = Matrix.says
+    read = by("turn_of_matrix")
+
+
+class Matrix6(Scalars):
+    """Six numbers or expressions for the diagonal, or 6 x 6 of them."""
+
+    argument, annotation = "sequence", "Sequence[Any]"
+    schema = any_of(array(ref("expression"), 6, 6), array(array(ref("expression"), 6, 6), 6, 6))
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        listed, zero = items(value) or (), reader.graph.zero
+        rows = [items(part) for part in listed] if len(listed) == 6 else []
+        if rows and all(row is None for row in rows):
+            diagonal = [reader.expression(f"{path}[{k}]", x, self.level) for k, x in enumerate(listed)]
+            return tuple(tuple(x if i == j else zero for j in range(6)) for i, x in enumerate(diagonal))
+        if rows and all(row is not None and len(row) == 6 for row in rows):
+            return tuple(
+                tuple(reader.expression(f"{path}[{i}][{j}]", x, self.level) for j, x in enumerate(row or ()))
+                for i, row in enumerate(rows)
+            )
+        reader.wrong(path, value, self)
+        return None
+
+    def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
+        """Three forces, then three torques; three lengths, then three angles."""
+        found = super().measured_in(values, place, length)
+        return None if found is None else found.times(LENGTH, -sum(index < 3 for index in (place[0], place[-1])))
+
+
+class Rates(Field):
+    """A mapping of names to expressions."""
+
+    schema = _mapping(ref("expression"))
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        return {_named(name, visitor.coordinate): visitor.scalar(x, slot.at(name)) for name, x in value.items()}
+
+
+class CoordinateForces(Rates):
+    """A mapping of coordinates to expressions, or a list of one expression for each coordinate."""
+
+    schema = any_of(array(ref("expression")), _mapping(ref("expression")))
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return super().map(value, slot, visitor) if isinstance(value, Mapping) else visitor.vector(value, slot)
+
+
+class Factors(Rates):
+    """A mapping of coordinates to numbers or expressions."""
+
+    argument, annotation = "mapping", "Mapping[Any, Value]"
+    schema = _mapping(ref("expression"), minProperties=1)
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        """Coordinates and their factors, in one order however they are given."""
+        if not isinstance(value, Mapping) or not value:
+            reader.wrong(path, value, self)
+            return None
+        terms: list[Any] = []
+        for name, factor in sorted(value.items(), key=lambda pair: str(pair[0])):
+            found = reader.coordinate(f"{path}.{name}", name)
+            own = reader.expression(f"{path}.{name}", factor)
+            if found is not None:
+                if any(found.name == other.name for other, _ in terms):
+                    remedy = "name it once, with the sum of its factors"
+                    reader.faults.add(f"{path}.{name}", f"{found.name!r} is named twice", remedy, "EG-CONFLICT")
+                terms.append((found, own))
+        return terms
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return {refer.joint(name): x for name, x in value.items()} if isinstance(value, Mapping) else value
+
+
+class Wheels(Field):
+    """A mapping of sun, planet, ring to numbers or expressions."""
+
+    argument, annotation = "mapping", "Mapping[str, Value]"
+    names: tuple[str, ...] = ("sun", "planet", "ring")
+    schema = object_schema(dict.fromkeys(names, ref("expression")))
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        """Those that are given, by their names."""
+        if not isinstance(value, Mapping):
+            reader.wrong(path, value, self)
+            return None
+        reader.check_names(path, value, self.names)
+        found = {name: reader.expression(f"{path}.{name}", value[name]) for name in self.names if name in value}
+        for name, size in found.items():
+            reader.requirements.inside(f"{path}.{name}", size, POSITIVE, "give a size greater than 0")
+        return found
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        return {name: visitor.scalar(part, slot.at(name)) for name, part in value.items()}
+
+
+class Inertia(Wheels):
+    """[xx, yy, zz], a 3 x 3 tensor, or a mapping of xx yy zz xy xz yz."""
+
+    argument, annotation = "scalar", "Value"
+    names = ("xx", "yy", "zz", "xy", "xz", "yz")
+    schema, defines = define(
+        "inertia",
+        any_of(ref("vector"), array(ref("vector"), 3, 3), object_schema(dict.fromkeys(names, ref("expression")))),
+    )
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        zero = reader.graph.zero
+        if isinstance(value, Mapping):
+            reader.check_names(path, value, self.names)
+            given = {key: reader.expression(f"{path}.{key}", value[key]) for key in self.names if key in value}
+            xx, yy, zz, xy, xz, yz = (given.get(key, zero) for key in self.names)
+            return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        parts = items(value)
+        if parts is not None and len(parts) == 3:
+            rows = [items(part) for part in parts]
+            if all(row is not None and len(row) == 3 for row in rows):
+                return tuple(reader.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
+            if all(row is None for row in rows):
+                a, b, c = reader.vector(path, parts)
+                return ((a, zero, zero), (zero, b, zero), (zero, zero, c))
+        reader.wrong(path, value, self)
+        return ((reader.stand_in,) * 3,) * 3
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return super().map(value, slot, visitor) if isinstance(value, Mapping) else visitor.vector(value, slot)
+
+    def is_default(self, value: Any) -> bool:
+        return super().is_default(value) or is_zero(value)
+
+
+class Law(Field):
+    """A mapping of keys of the law to numbers or expressions."""
+
+    argument, annotation = "mapping", "Mapping[str, Any]"
+    schema = _OBJECT
+
+
+# -- axes, frames and markers -----------------------------------------------------------------------------------------
+class Axis(Field):
+    """X, y, z, -x, -y, -z or three numbers."""
+
+    argument, annotation = "str or three floats", "str | Sequence[float]"
+    schema, defines = define("axis", any_of(enum("x", "y", "z", "-x", "-y", "-z"), array(ref("expression"), 3, 3)))
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        """A vector of length 1."""
+        return tuple(reader.graph.constant(x) for x in reader.axis(path, value)[2])
+
+    def is_default(self, value: Any) -> bool:
+        return super().is_default(value) or (isinstance(value, str) and value == self.default)
+
+
+class TwoAxes(Field):
+    """Two directions at right angles, each x, y, z, -x, -y, -z or three numbers."""
+
+    argument, annotation = "two of str or three floats", "Sequence[Any]"
+    schema = array(ref("axis"), 2, 2)
+
+
+class FrameAxes(Field):
+    """A mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers."""
+
+    schema = object_schema(dict.fromkeys("xyz", ref("axis"))) | {"minProperties": 2, "maxProperties": 2}
+    read = by("turn_of_axes")
+
+
+MARKER: Fields = {
+    "at": Vector("position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
+    "rpy": Vector("fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
+    "axes": FrameAxes("two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy", dimension=NONE),
+    "matrix": Rotation("3 x 3, its axes as columns in body axes, instead of rpy", dimension=NONE),
+}
+PLACED: Fields = {"body": Name("a body or ground", required=True), **MARKER}
+
+
+class Markers(Field):
+    """A mapping of marker names to [x, y, z] or {at, rpy}."""
+
+    schema, _own = define("markers", _mapping(ref("placement"), propertyNames=ref("name")))
+    defines = _own | define("placement", lambda: any_of(ref("vector"), table_schema(MARKER)))[1]
+    parts = MARKER
+
+    def part(self, words: Sequence[str]) -> Field | None:
+        """A marker may be written as its position alone."""
+        return super().part(words) or MARKER["at"]
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+        try:
+            return {name: self._placed(placed, slot, visitor) for name, placed in pairs}
+        except (TypeError, ValueError):  # no pairs, or names that are no names
+            return value
+
+    @staticmethod
+    def _placed(placed: Any, slot: Any, visitor: Any) -> Any:
+        return visitor.placement(slot.entry.name, placed if isinstance(placed, Mapping) else {"at": placed}, slot)
+
+
+class MarkerReference(Field):
+    """A body, body.marker, ground or {body, at, rpy}."""
+
+    argument, annotation = "handle or str", "Any"
+    schema, defines = define("marker", lambda: any_of(ref("reference"), table_schema(PLACED)))
+    parts = MARKER
+
+    read = by("marker")
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return refer.marker(value)
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return visitor.marker(value, slot)
+
+
+class Pair(Field):
+    """A list of two markers, each a body, body.marker, ground or {body, at, rpy}."""
+
+    argument, annotation = "handles or str", "Sequence[Any]"
+    schema, defines = define("pair", array(ref("marker"), 2, 2))
+    parts, joins = MARKER, True
+
+    read = by("pair")
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return [refer.marker(part) for part in items(value) or [value]]
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return _each(value, lambda part: visitor.marker(part, slot))
+
+
+CYLINDER: Fields = {
+    "around": MarkerReference("marker whose z axis is the axis of the cylinder", required=True),
+    "radius": Scalar("radius (m)", required=True, dimension=LENGTH, allowed=POSITIVE),
+    "sense": Choice("sense of the path about the axis", default="positive", choices=("positive", "negative")),
+    "friction": Scalar(
+        "coefficient of friction of a rope or belt on it; give smoothing too", dimension=NONE, allowed=NOT_NEGATIVE
+    ),
+    "smoothing": Scalar(
+        "slip velocity (m/s) below which this friction is smoothed",
+        dimension=LENGTH.times(TIME, -1),
+        allowed=POSITIVE,
+    ),
+}
+
+
+class Via(Field):
+    """A list of markers and cylinders {around, radius, sense, friction, smoothing}."""
+
+    argument, annotation = "sequence", "Sequence[Any]"
+    schema = array(ref("stop"))
+    defines = define("stop", lambda: any_of(ref("marker"), table_schema(CYLINDER)))[1]
+    parts = CYLINDER | MARKER
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        """Markers and cylinders; None if anything is wrong with them."""
+        listed, found = items(value), list[Marker | WrapCylinder]()
+        if listed is None:
+            reader.wrong(path, value, self)
+            return None
+        for k, item in enumerate(listed):
+            stop = self._stop(reader, f"{path}[{k}]", item)
+            if isinstance(stop, WrapCylinder) and found and isinstance(found[-1], WrapCylinder):
+                remedy = "put a marker between the two cylinders"
+                reader.faults.add(f"{path}[{k}]", "follows another cylinder directly", remedy, "EG-CONFLICT")
+            if stop is not None:
+                found.append(stop)
+        return None if reader.faults.under(path) else found
+
+    def _stop(self, reader: Any, path: str, value: Any) -> Marker | WrapCylinder | None:
+        if not (isinstance(value, Mapping) and "body" not in value):
+            return reader.marker(path, value)  # type: ignore[no-any-return]
+        reader.check_keys(path, value, CYLINDER)
+        if "around" not in value or "radius" not in value:
+            return None
+        keys = ("around", "radius", "sense", *self._rubbing(reader, path, value))
+        made = [CYLINDER[key].read(reader, f"{path}.{key}", value.get(key, CYLINDER[key].default)) for key in keys]
+        marker, radius, sense, *rubbing = made
+        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rubbing)
+
+    @staticmethod
+    def _rubbing(reader: Any, path: str, value: Mapping[str, Any]) -> tuple[str, ...]:
+        """Friction of a rope on a cylinder, and the velocity below which it is smoothed; neither where it is smooth."""
+        keys = ("friction", "smoothing")
+        missing = [key for key in keys if key not in value]
+        if len(missing) == 1:
+            reader.faults.missing(f"{path}.{missing[0]}", "give friction and smoothing together, or neither")
+        return () if missing else keys
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return [self._refer(stop, refer) for stop in value] or None
+
+    @staticmethod
+    def _refer(stop: Any, refer: Any) -> Any:
+        if not (isinstance(stop, Mapping) and "around" in stop):
+            return refer.marker(stop)
+        return {key: refer.marker(x) if key == "around" else x for key, x in stop.items()}
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return _each(value, lambda stop: self._mapped(stop, slot, visitor))
+
+    @staticmethod
+    def _mapped(stop: Any, slot: Any, visitor: Any) -> Any:
+        if not (isinstance(stop, Mapping) and "around" in stop):
+            return visitor.marker(stop, slot)
+        inside = {key: CYLINDER[key].map(x, slot.named(key), visitor) for key, x in stop.items() if key in CYLINDER}
+        return {**stop, **inside}
+
+
+# -- joints, coordinates and bodies -----------------------------------------------------------------------------------
+class BodyName(Reference):
+    """The name of a body."""
+
+    argument, annotation = "handle or str", "Any"
+    names_of = "body"
+    schema = ref("reference")
+    read = by("body")
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return refer.marker(value)
+
+
+class JointReference(Reference):
+    """The name of a joint, or of one coordinate of a joint."""
+
+    argument, annotation = "handle or str", "Any"
+    names_of = "coordinate"
+    schema = ref("reference")
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        return reader.coordinate(path, value, self.measure)
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return refer.joint(value)
+
+
+class JointPair(Field):
+    """A list of two joints, or coordinates of joints."""
+
+    argument, annotation = "handles or str", "Sequence[Any]"
+    names_of = "coordinate"
+    schema = array(ref("reference"), 2, 2)
+    joins = True
+
+    def read(self, reader: Any, path: str, value: Any) -> Any:
+        parts = items(value)
+        if parts is None or len(parts) != 2:
+            reader.wrong(path, value, self)
+            return None
+        a, b = (reader.coordinate(f"{path}[{k}]", part, self.measure) for k, part in enumerate(parts))
+        if a is not None and b is not None and a.name == b.name:
+            reader.faults.add(path, f"{a.name!r} is named twice", "name two different coordinates", "EG-CONFLICT")
+            return None
+        return None if a is None or b is None else (a, b)
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return [refer.joint(part) for part in items(value) or [value]]
+
+
+LIMITS: Fields = {
+    "lower": Number("least value (rad or m)"),
+    "upper": Number("greatest value (rad or m)"),
+    "velocity": Number("greatest speed (rad/s or m/s)"),
+    "effort": Number("greatest torque or force of the drive (N m or N)"),
+}
+
+
+class Limits(Field):
+    """A mapping of lower, upper, velocity and effort to numbers."""
+
+    argument, annotation = "mapping", "Mapping[str, float]"
+    schema, defines = define("limits", lambda: object_schema({key: _each_limit(x.doc) for key, x in LIMITS.items()}))
+
+
+def _each_limit(doc: str) -> Schema:
+    """A number for the coordinate, or a list of one for each of several coordinates."""
+    number = {"type": ["number", "string", "null"]}
+    return {**any_of(number, array(number)), "description": doc}
+
+
+# -- parts of bodies --------------------------------------------------------------------------------------------------
+class About(Field):
+    """Com, origin, a marker of the body or [x, y, z]."""
+
+    schema = any_of(ref("reference"), ref("vector"))
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return value if isinstance(value, str) else visitor.vector(value, slot)
+
+
+class BodyParts(Field):
+    """A list of mappings with places in the body."""
+
+    words = ("type", "axis", "subtract", "file", "shape")  #: keys that are words, not scalars
+
+    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+        return _each(value, lambda part: self._mapped(part, slot, visitor))
+
+    def _mapped(self, part: Any, slot: Any, visitor: Any) -> Any:
+        if not isinstance(part, Mapping):
+            return part
+        placed = {key: x for key, x in part.items() if key in MARKER}
+        words = {key: x for key, x in part.items() if key in self.words}
+        own = {k: visitor.vector(x, slot.named(k)) for k, x in part.items() if k not in words and k not in placed}
+        return {**words, **own, **visitor.placement(slot.entry.name, placed, slot)}
+
+
+POINT: Fields = {
+    "mass": Scalar("mass (kg)", required=True, dimension=Dimension(0, 1)),
+    "at": Vector("position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
+}
+
+
+class Points(BodyParts):
+    """A list of points {mass, at}."""
+
+    schema, defines = define("points", lambda: array(table_schema(POINT)))
+    parts = POINT
+
+
+DISPLAY: Fields = {
+    "shape": Choice("kind of shape", required=True, choices=("mesh", "box", "cylinder", "sphere", "capsule")),
+    "file": Text("file of a mesh (STL, OBJ or DAE), read when the model is drawn"),
+    "scale": Vector("scale of a mesh"),
+    "size": Vector("edges of a box (m)", dimension=LENGTH),
+    "radius": Scalar("radius (m)", dimension=LENGTH),
+    "length": Scalar("length along z (m)", dimension=LENGTH),
+    "color": Text('color "#rrggbb" in pictures; that of the body unless given'),
+    **MARKER,
+}
+
+
+class Display(BodyParts):
+    """A list of shapes {shape, ...}."""
+
+    schema, defines = define("display", lambda: array(table_schema(DISPLAY)))
+    parts = DISPLAY
+
+
+# -- instances of components ------------------------------------------------------------------------------------------
+ROUNDS = 1000  #: most instances that one entry makes
+
+
+class Prefix(Field):
+    """The beginning of names."""
+
+    schema: ClassVar[Schema] = {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"}
+
+
+class Loops(Field):
+    """A mapping of variables to lists, counts or {from, to, step}."""
+
+    schema = _mapping(
+        {
+            "anyOf": [
+                array(_NUMBER, 1, ROUNDS),
+                {"type": "integer", "minimum": 1, "maximum": ROUNDS},
+                object_schema({key: {"type": "number"} for key in ("from", "to", "step")}, ["to"]),
+            ]
+        },
+        propertyNames=ref("name"),
+        minProperties=1,
+    )
+
+
+class AttachedTo(Field):
+    """A marker, or a mapping of attachments to markers."""
+
+    schema = any_of(ref("marker"), _mapping(ref("marker"), propertyNames=ref("name")))
+
+
+class Values(Field):
+    """A mapping of names to numbers or expressions."""
+
+    schema = _mapping(ref("expression"))
+
+
+class Measured(Field):
+    """A mapping of names to numbers, expressions or {value, unit}."""
+
+    schema = _mapping(any_of(ref("expression"), object_schema({"value": ref("expression"), "unit": _TEXT}, ["value"])))
+
+
+# -- lists in any form ------------------------------------------------------------------------------------------------
+def items(value: Any) -> list[Any] | None:
+    """The items of a list, tuple, array or SymPy matrix (a column counts as a plain list); None for anything else."""
+    if isinstance(value, list | tuple):
+        return list(value)
+    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "tolist"):
+        return None
+    listed = value.tolist()
+    if not isinstance(listed, list):
+        return None
+    if listed and all(isinstance(x, list) and len(x) == 1 for x in listed):
+        return [x[0] for x in listed]
+    return listed
+
+
+def is_zero(value: Any) -> bool:
+    """Whether a value is three plain zeros."""
+    listed = items(value)
+    return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
