@@ -35,7 +35,8 @@ def beside_closed_form(repeats: int) -> tuple[float, float, float]:
         ours, theirs = folder / "slider_crank.c", Path(__file__).with_suffix("").parent / "slider_crank.c"
         flags = compile_flags(Options(), compiler, ours.stat().st_size)
         program = folder / "timing"
-        files = [str(theirs), str(ours), "-I", name, "-lm", "-o", str(program)]
+        files = [str(theirs), *(str(folder / file) for file in sources if file.endswith(".c") and "_lanes" not in file)]
+        files += ["-DEOMGEN_LANES=0", "-I", name, "-lm", "-o", str(program)]
         subprocess.run([*compiler.command, *flags, *files], check=True)
         found = [subprocess.run([program], check=True, capture_output=True, text=True) for _ in range(repeats)]
     rows = [tuple(map(float, run.stdout.split())) for run in found]

@@ -18,8 +18,8 @@ from eomgen import pipeline
 from eomgen.base.kernel_table import KERNELS
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.c_pairs import pair_files
-from eomgen.codegen.files import read_template
 from eomgen.compilation.compiler import Options, compile_flags, find_compiler
+from eomgen.layer import read_header
 
 from .report import Limit, Report, Table
 from .tracks import track
@@ -46,7 +46,7 @@ def seconds_to_compile(sources: dict[str, str]) -> float:
     compiler = find_compiler(None)
     flags = compile_flags(Options(), compiler, 0)
     with tempfile.TemporaryDirectory() as folder:
-        headers = {f"{name}": read_template(f"c/{name}") for name in ("eomgen.h", "eomgen_real.h", "eomgen_sincos.h")}
+        headers = {name: read_header(name) for name in ("eomgen.h", "eomgen_real.h")}
         for name, text in {**headers, **sources}.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         found = []

@@ -12,7 +12,7 @@ from .base.operations import tape_rows
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
     *("control", "signals", "tape"),
-    *("plain", "rk4_step", "rk4"),
+    *("plain", "rk4"),
     *("dense_begin", "products", "lu", "lu_large", "lu_complex", "lu_large_complex"),
     *("newton_parts", "newton_sparse", "newton", "radau", "radau_step", "dense_end"),
     *("taylor_terms", "taylor"),
@@ -25,7 +25,7 @@ CYTHON = (
 )
 
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
-SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_coordinates.h", "eomgen_straight.h")
+SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_straight.h")
 SOLVER = "eomgen_solvers.c"
 #: Parts of that source, in order.
 SOLVERS = ("linear_algebra", "projection", "embedding", "systems", "singular", "trees", "jacobian")
@@ -55,7 +55,7 @@ LAYER = {
 }
 
 #: Headers that models and the layer share.
-HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h", *SOLVER_HEADERS)
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h", "eomgen_processor.h", *SOLVER_HEADERS)
 
 
 @cache
@@ -80,8 +80,6 @@ def read_native() -> dict[str, str]:
 
 def read_header(name: str) -> str:
     """The text of a header that models and the layer share, as it comes with eomgen."""
-    if name not in SOLVER_HEADERS:
-        return (shipped("templates") / "c" / name).read_text(encoding="utf-8")
     text = _read(name)
     return definitions(text) + text
 

@@ -81,7 +81,8 @@ def limits() -> Iterator[str]:
         ("eomgen/native/ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
         ("eomgen/native/steppers", r"\d(?:\.\d+)?e-\d+"),
     ):
-        for file in sorted((ROOT / folder).glob("*.[ch]")):
+        polynomials = {ROOT / "eomgen/native/eomgen_real.h"}
+        for file in sorted({*(ROOT / folder).glob("*.[ch]")} - polynomials):
             text = re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
             yield from (f"{file.name}: a limit without a name: {found}" for found in re.findall(pattern, text))
             try:

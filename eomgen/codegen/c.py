@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,10 +17,10 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels
 from .c_layout import describe_equations, is_straight, work_areas
 from .c_pairs import pair_declarations, pair_files
-from .c_parts import distribute, part_names
+from .c_parts import distribute
 from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
-from .c_text import Printed, print_block, print_precompute, used_helpers
+from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .held_states import held_tables
 from .loops.loop_blocks import LARGE
@@ -29,15 +29,15 @@ from .series import NoSeriesError
 from .single_precision import in_single_precision, refuse_double
 
 #: Headers of the numbers that functions compute with, and those that lanes need besides.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
-PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
-#: Characters of a C literal, which compilers need not take longer than 4095, and of one of its lines, which become four
-#: times as long at most.  gcc reads the metadata of 1,600 bodies as literals in 0.06 s, as numbers in 1.0 s.
-LITERAL, LINE = 4000, 28
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h")
+PROCESSOR = "eomgen_processor.h"
+#: Characters of a C literal, which compilers need not take longer than 4095, and of one of its lines.  gcc reads the
+#: metadata of 1,600 bodies as literals in 0.06 s, as numbers in 1.0 s.
+LITERAL, LINE = 4000, 112
 #: A block of more inputs has no comment with their names.
 NAMED = 100
 #: All that could end a literal, begin an escape, a trigraph or a comment, be read as code, or is no plain character.
-UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:-]")
+UNSAFE = re.compile(r"[^]A-Za-z0-9 _.,:[-]")
 
 
 def emit_c(program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True) -> SourceSet:
@@ -51,16 +51,17 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     lanes : bool, optional
         Whether there are functions for several states at a time, and Taylor series.
     separate : bool, optional
-        Whether the pieces of a large model go into files of their own.
+        Whether functions that analyses alone need, and the pieces of a large model, go into files of their own.
 
     Returns
     -------
     SourceSet
         ``<name>.c``, ``<name>.h``, ``eomgen.h`` and other headers that are the same for all models, ``model.json``;
         C99, no dependency but libm; ``eomgen_solvers.c``, which is the same for all models, unless all functions are
-        straight-line code; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has
-        further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
-        ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
+        straight-line code; ``<name>_analyses.c`` with what runs do without; ``<name>_metadata.c`` with the table of
+        functions; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has further files
+        ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in ``<name>_tables.c``, native
+        functions in ``<name>_native_<first of them>.c``.
     """
     single = precision == "float"
     if single:
@@ -78,56 +79,107 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     if precision:
         about["precision"] = precision
     program = replace(program, metadata={**program.metadata, **about})
-    printed = _print(program, lanes and precision is None)
-    parts = distribute(program, printed) if separate else []
+    apart = _of_analyses(program) if separate else frozenset()
+    printed = _print(program, apart, lanes and precision is None)
+    parts = distribute(program, list(printed.values())) if separate else []
     calls = used_calls(program)
     for_lanes = _printed_for_lanes(program, printed) if in_lanes else {}
-    work = max((p.work for p in (*printed[1:], *for_lanes.values())), default=0)
-    context = _context(program, printed, work) | {"parts": parts, "part_names": part_names(printed) if parts else []}
-    context |= {
-        "printed": for_lanes,
-        "library": precision is not None,
-        "costs": {},
-        "most_states": states_beside_change_points(),
-    }
-    further = {
-        f"{program.name}_part{k}.c": render(
-            "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
-            {**context, "part_names": [name for name, _ in part], "functions": [text for _, text in part]},
-        )
-        for k, part in enumerate(parts, 1)
-    }
+    work = max((p.work for name, p in (*printed.items(), *for_lanes.items()) if name != "precompute"), default=0)
+    context = _context(program, printed, work, apart) | {"library": precision is not None, "costs": {}}
+    name = program.name
     sources = {
-        f"{program.name}.c": render("c/model.c.j2", context),
-        **further,
-        **(lane_files(program, context) if lanes else {}),
+        f"{name}.c": _model_file(program, context, printed, bool(parts), apart),
+        **({f"{name}_analyses.c": _model_file(program, context, printed, bool(parts), apart, True)} if apart else {}),
+        f"{name}_metadata.c": render("c/metadata.c.j2", context),
+        **{f"{name}_part{k}.c": _part_file(context, k, part) for k, part in enumerate(parts, 1)},
+        **(lane_files(program, context, for_lanes) if lanes else {}),
         **series,
         **function_files(program, calls),
         **pair_files(program),
     }
     if program.drivers:
         sources |= {name: read_header(name) for name in SOLVER_HEADERS} | {SOLVER: read_layer()[SOLVER]}
+    sources |= {name: read_header(name) for name in (*HEADERS, *([PROCESSOR] if lanes else []))}
     if precision:
-        context["costs"] = _costs(program, sources)
-    sources |= {
-        f"{program.name}.h": render("c/model.h.j2", context),
-        **{name: read_header(name) for name in ("eomgen.h", *NUMBERS, *(PROCESSORS if lanes else ()))},
-        "model.json": metadata_json(program),
-    }
+        context |= {"costs": _costs(program, sources), "most_states": states_beside_change_points()}
+    sources |= {f"{name}.h": render("c/model.h.j2", context), "model.json": metadata_json(program)}
     return SourceSet(in_single_precision(sources) if single else sources)
+
+
+def _of_analyses(program: Program) -> frozenset[str]:
+    """Names of the blocks that only kernels need which runs do without: those that a session leaves for later."""
+    late = {k.name for k in KERNELS if k.late}
+    first = [k.name for k in program.kernels if k.name not in late]
+    if "rhs" not in first:  # a module for analyses
+        return frozenset()
+    drivers = {k.name: k.blocks for k in program.drivers}
+    needed = {block for name in first for block in drivers.get(name, (program.twins.get(name, name),))}
+    return frozenset(b.name for b in program.blocks if b.name not in needed and b.name not in program.twins)
+
+
+def _model_file(
+    program: Program,
+    context: dict[str, Any],
+    printed: Mapping[str, Printed],
+    parts: bool,
+    apart: Collection[str],
+    analyses: bool = False,
+) -> str:
+    """The main file of a model, or that of what analyses alone need; ``parts``: pieces lie in files of their own."""
+    here = [name for name in printed if (name in apart) == analyses]
+    roots = [y for b in program.blocks if b.name in here for y in b.roots]
+    roots += [] if analyses else program.hoisted
+    pieces = [piece for name in here for piece, _ in printed[name].pieces]
+    linked = [f"{program.name}_{name}_block" for name in _linked(program, apart)]
+    return render(
+        "c/model.c.j2",
+        {
+            **context,
+            "part": ", functions that analyses alone need" if analyses else "",
+            "helpers": [*used_helpers(program, roots), *context["declarations"]],
+            "declared": [*(pieces if parts else []), *linked],
+            "functions": [printed[name].text for name in here]
+            if parts
+            else with_pieces(printed[name] for name in here),
+            "equations": None if analyses else context["equations"],
+            "kernels": [k for k in context["kernels"] if (k["block"] in apart) == analyses],
+        },
+    )
+
+
+def _part_file(context: dict[str, Any], number: int, part: list[tuple[str, str]]) -> str:
+    """A file of pieces; it declares its own alone, so that the text grows as the pieces do."""
+    names, functions = [name for name, _ in part], [text for _, text in part]
+    helpers = [*context["helpers"], *context["declarations"]]
+    more = {"part": f", part {number}", "helpers": helpers, "declared": names, "functions": functions}
+    return render("c/model.c.j2", {**context, **more, "equations": None, "kernels": []})
+
+
+def _linked(program: Program, apart: Collection[str]) -> list[str]:
+    """Names of the blocks in the file for analyses that the table of the solvers names."""
+    return [name for name in dict.fromkeys(b for d in program.drivers for b in d.blocks) if name in apart]
 
 
 def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str, int]]:
     """Operations and bytes of stack of every public function, by name."""
-    stacks = stack_of(text for name, text in sources.items() if name.endswith(".c"))
+    metadata = f"{program.name}_metadata.c"
+    texts = [text for name, text in sources.items() if name.endswith((".c", ".h")) and name != metadata]
+    stacks = stack_of(texts, program.name, {"N": str(program.sizes.n_v)})
     names = [k.name for k in program.kernels]
     return {name: (operations_of(program, name), stacks[f"{program.name}_{name}"]) for name in names}
 
 
-def _print(program: Program, branches: bool = False) -> list[Printed]:
-    """Every straight-line function, the precompute first; ``branches``: statements of alike branches as vectors."""
-    blocks = [_print_function(program, b, branches) for b in program.blocks if b.name not in program.twins]
-    return [_print_precompute(program) if program.hoisted else Printed("", (), 0), *blocks]
+def _print(program: Program, apart: Collection[str], branches: bool = False) -> dict[str, Printed]:
+    """Every straight-line function by name, the precompute first; what another file calls bears the model's name.
+
+    ``branches``: statements of alike branches as vectors.
+    """
+    printed = {"precompute": _print_precompute(program)} if program.hoisted else {}
+    printed |= {b.name: _print_function(program, b, branches) for b in program.blocks if b.name not in program.twins}
+    for name in _linked(program, apart):
+        text = printed[name].text.replace(f"static flag {name}_block(", f"flag {program.name}_{name}_block(")
+        printed[name] = printed[name]._replace(text=text)
+    return printed
 
 
 def _print_precompute(program: Program) -> Printed:
@@ -145,19 +197,18 @@ def _print_function(program: Program, block: Block, branches: bool) -> Printed:
     return printed._replace(text=f"/* {names} */\n{printed.text.lstrip()}")
 
 
-def _printed_for_lanes(program: Program, printed: list[Printed]) -> dict[str, Printed]:
+def _printed_for_lanes(program: Program, printed: Mapping[str, Printed]) -> dict[str, Printed]:
     """The straight-line functions that have lanes, by name, without vectors of their own."""
-    found = dict(zip((b.name for b in program.blocks if b.name not in program.twins), printed[1:], strict=True))
     return {
-        name: print_block(program, block) if found[name].in_pairs else found[name]
+        name: print_block(program, block) if printed[name].in_pairs else printed[name]
         for name, block in lane_blocks(program).items()
     }
 
 
-def _context(program: Program, printed: list[Printed], work: int) -> dict[str, Any]:
+def _context(program: Program, printed: Mapping[str, Printed], work: int, apart: Collection[str]) -> dict[str, Any]:
     twins, in_lanes = program.twins, program.metadata["lanes"]
     areas, n_work = work_areas(program, work)
-    n_const = count_constants(program, printed[0])
+    n_const = count_constants(program, printed.get("precompute"))
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
     numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
@@ -176,13 +227,10 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
         "hoisted": len(program.hoisted),
         "closed_at": numbers["closed_at"],
         "work_at": len(program.parameters) + len(program.hoisted),
-        "helpers": [
-            *used_helpers(program, roots),
-            *declarations(program, used_calls(program)),
-            *pair_declarations(program),
-        ],
-        "blocks": printed if program.hoisted else printed[1:],
-        "equations": describe_equations(program, areas) if program.drivers else None,
+        "helpers": used_helpers(program, roots),
+        "declarations": [*declarations(program, used_calls(program)), *pair_declarations(program)],
+        "arguments": _describe_arguments(program),
+        "equations": describe_equations(program, areas, _linked(program, apart)) if program.drivers else None,
         "straight": straight,
         "starts": {name: start for name, start, _ in areas},
         "n_states": program.n_states,
@@ -194,10 +242,14 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
         "kernels": [
             {
                 "name": k.name,
+                "block": twins.get(k.name, k.name) if isinstance(k, Block) else "",
                 "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
-                "straight": straight and k.name == "rhs",
+                "solver": ""
+                if isinstance(k, Block)
+                else "rhs_or_solved"
+                if straight and k.name == "rhs"
+                else f"eom_{k.name}",
                 "lanes": k.name in in_lanes,
-                "driver": not isinstance(k, Block),
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],
@@ -212,9 +264,18 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
     }
 
 
-def count_constants(program: Program, precompute: Printed) -> int:
+def _describe_arguments(program: Program) -> list[str]:
+    """What stands in c and u, where names are few."""
+    made = ", then what precompute makes of them" if program.hoisted else ""
+    texts = [f"c = {', '.join(program.parameters)}{made}" if program.parameters else ""]
+    texts += [f"u = {', '.join(program.inputs)}" if program.inputs else ""]
+    few = len(program.parameters) + len(program.inputs) <= NAMED
+    return [comment_lines(text, "      ") for text in texts if text and few]
+
+
+def count_constants(program: Program, precompute: Printed | None) -> int:
     """Length of c: parameters, what is computed from them once, and the work of that."""
-    return len(program.parameters) + len(program.hoisted) + precompute.work
+    return len(program.parameters) + len(program.hoisted) + (precompute.work if precompute else 0)
 
 
 def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
@@ -233,7 +294,15 @@ def _literals(text: str) -> list[list[str]]:
     Octal escapes have three digits, so that none of them takes a digit of the text.
     """
     pieces = (text[k : k + LITERAL] for k in range(0, len(text), LITERAL))
-    return [
-        [UNSAFE.sub(lambda found: f"\\{ord(found[0]):03o}", piece[k : k + LINE]) for k in range(0, len(piece), LINE)]
-        for piece in pieces
-    ]
+    return [list(_lines(UNSAFE.sub(lambda found: f"\\{ord(found[0]):03o}", piece))) for piece in pieces]
+
+
+def _lines(escaped: str) -> Iterator[str]:
+    """The text in lines that cut no escape."""
+    start = 0
+    while start < len(escaped):
+        end = start + LINE
+        inside = escaped.rfind("\\", end - 3, end)
+        end = inside if inside > 0 else end
+        yield escaped[start:end]
+        start = end

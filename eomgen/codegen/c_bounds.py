@@ -21,6 +21,12 @@ _STRUCT = re.compile(r"typedef struct \{\n(.*?)\} (\w+);", re.DOTALL)
 _FUNCTION = re.compile(r"^[a-zA-Z][\w *]*?\b(\w+)\(([^;{}]*?)\)\s*\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
 _ARRAY = re.compile(r"\w+((?:\[[^\]]+\])+)")
 _CALL = re.compile(r"\b(\w+)\(")
+_KERNEL = re.compile(r"^EOMGEN_(?:FUNCTION|SOLVED)\((\w+), (\w+), \d+\)$", re.MULTILINE)
+_CALLED = (
+    r"int \1(EOMGEN_ARGUMENTS)\n{\n    eom_at at;\n    int status = \2(at), checked = check_rows() + check_finite();\n}"
+)
+_EXPRESSION = re.compile(r"^ *(?:const real \w+|out\[.*\]) = (.*);$", re.MULTILINE)
+_OPERATOR = re.compile(r"[*/]| [+-] |(?<!\w)-(?=[\w(])")
 _EVALUATION = re.compile(r"\bEVALUATE\((\w+)")  #: of a straight-line function of the model, by the solvers
 
 
@@ -60,19 +66,23 @@ def _factoring(parent: Sequence[int]) -> int:
     return sum(n + n * (n + 1) for n in above) + sum(4 * n + 1 for n in above)
 
 
-def stack_of(sources: Iterable[str]) -> dict[str, int]:
+def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dict[str, int]:
     """Bytes on the stack that each function of C sources needs at most, with all that it calls of them.
 
-    Every variable is counted with a place of its own, which compilers need not give it, and every function with a frame
-    of its own, also where it becomes a part of its caller.
+    Every variable and every operation is counted with a place of its own, which compilers need not give it, and every
+    function with a frame of its own, also where it becomes a part of its caller.
 
     Parameters
     ----------
     sources : iterable of str
         Texts of the files.
+    name : str
+        Of the model, which stands before names of functions that another file calls.
+    sizes : mapping of str to str
+        Further numbers that lengths of arrays are made of.
     """
-    texts = list(sources)
-    numbers = {name: value for text in texts for name, value in _NUMBER.findall(text)}
+    texts = [_KERNEL.sub(_CALLED, text) for text in sources]
+    numbers = {word: value for text in texts for word, value in _NUMBER.findall(text)} | dict(sizes)
     structs = {name: body for text in texts for body, name in _STRUCT.findall(text)}
     types = "|".join(("real", "double", "float", "int", "flag", "bits", "short", *structs))
     declaration = re.compile(rf"^\s*(?:for \()?(?:const )?({types})\b([^;]*);", re.MULTILINE)
@@ -83,22 +93,23 @@ def stack_of(sources: Iterable[str]) -> dict[str, int]:
             each = places(structs[kind]) if kind in structs and not names.lstrip().startswith("*") else 1
             arrays = _ARRAY.findall(re.sub(r"=\s*\{[^{}]*\}|=[^,]*", "", names))
             found += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
-        return found
+        return found + sum(len(_OPERATOR.findall(expression)) for expression in _EXPRESSION.findall(text))
 
     own: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
     for text in texts:
-        for name, parameters, body in _FUNCTION.findall(text):
-            needed = _FRAME + _PLACE * (places(body) + parameters.count(",") + 1)
-            own[name] = max(own.get(name, 0), needed)
-            called = (*_CALL.findall(body), *(f"{function}_block" for function in _EVALUATION.findall(body)))
-            calls.setdefault(name, set()).update(called)
+        for function, parameters, body in _FUNCTION.findall(text):
+            count = parameters.count(",") + (6 if "EOMGEN_ARGUMENTS" in parameters else 1)
+            function = function.removeprefix(f"{name}_") if function.endswith("_block") else function
+            own[function] = max(own.get(function, 0), _FRAME + _PLACE * (places(body) + count))
+            called = (*_CALL.findall(body), *(f"{block}_block" for block in _EVALUATION.findall(body)))
+            calls.setdefault(function, set()).update(called)
 
     @cache
-    def total(name: str) -> int:
-        return own[name] + max((total(callee) for callee in calls[name] & own.keys() - {name}), default=0)
+    def total(function: str) -> int:
+        return own[function] + max((total(callee) for callee in calls[function] & own.keys() - {function}), default=0)
 
-    return {name: total(name) for name in own}
+    return {function: total(function) for function in own}
 
 
 def _length(lengths: str, numbers: Mapping[str, str]) -> int:

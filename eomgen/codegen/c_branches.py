@@ -47,7 +47,6 @@ class BranchPrinter(BlockPrinter):
         if x in self._second:
             own = self._own(x)
             if own not in self._both:
-                self.used.add("w")
                 self._new(own, f"both_at(w + {piece.loads[x]})", result)
             return self._both[own] if own == operand else self._new(operand, f"both_turned({self._both[own]})", result)
         for k in (x, y):
@@ -61,11 +60,11 @@ class BranchPrinter(BlockPrinter):
             super()._read(i, piece, loaded, result)
         elif i not in self._alone:
             self._alone.add(i)
+            self._name_waiting(result)
             minus = "-" if i != a and self._sign[a] < 0 else ""
             if self._own(a) in self._both:
                 text = f"{'first' if i == a else 'second'}_of({self._both[self._own(a)]})"
             else:
-                self.used.add("w")
                 text = f"w[{piece.loads[i]}]"
             result.append(f"const real {self._name(i)} = {minus}{text};")
 
@@ -75,6 +74,7 @@ class BranchPrinter(BlockPrinter):
         if i not in self._second:
             super()._statement(i, piece, loaded, result)
             return
+        self._name_waiting(result)
         kind = self._nodes[i][0]
         b = self._second[i]
         if kind in CIRCULAR:
@@ -88,10 +88,8 @@ class BranchPrinter(BlockPrinter):
                 self._read(k, piece, loaded, result)
                 result.append(f"EOMGEN_REJECT({self.failed(k, piece)})")
             if k in piece.results:
-                self.used.add("out")
                 result += [f"out[{at}] = {text};" for at in piece.results[k]]
         if i in piece.stores:
-            self.used.add("w")
             result.append(f"both_put(w + {piece.stores[i]}, {name});")
 
     def _circular(self, kind: str, x: int, y: int) -> str:

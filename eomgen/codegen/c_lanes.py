@@ -1,7 +1,7 @@
 """the straight-line functions of a model once more, for several states side by side (lanes).
 
 The right-hand side of closed loops has lanes where it is made of straight-line blocks: lanes that need more, such as
-pivoting, are left to the function of one state (templates/c/closed_lanes.c.j2).
+pivoting, are left to the function of one state (eomgen_straight.h).
 """
 
 from __future__ import annotations
@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..base.limits.in_c import definitions
-from .c_functions import declarations, used_calls
-from .c_pairs import pair_declarations
-from .c_text import used_helpers
-from .files import read_template, render
+from .c_text import Printed, used_helpers, with_pieces
+from .files import render
 from .loops.block_groups import REGULAR, USUAL
 from .program import Block, Program
 
@@ -70,7 +67,7 @@ def lane_kernels(program: Program) -> list[str]:
     return [k.name for k in program.kernels if twins.get(k.name, k.name) in blocks or (closed and k.name == "rhs")]
 
 
-def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
+def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[str, Printed]) -> dict[str, str]:
     """The header with the text of the functions, and a file for each width; none without such functions."""
     blocks, first = lane_blocks(program), rhs_blocks(program)
     if not blocks:
@@ -79,16 +76,11 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     roots = [y for b in blocks.values() for y in b.roots]
     inside = {
         **context,
-        "helpers": [
-            *used_helpers(program, roots),
-            *declarations(program, used_calls(program)),
-            *pair_declarations(program),
-        ],
-        "blocks": [context["printed"][b] for b in blocks],
-        "first": len(first),
+        "helpers": [*used_helpers(program, roots), *context["declarations"]],
+        "first": with_pieces(printed[b] for b in first),
+        "others": with_pieces(printed[b] for b in blocks if b not in first),
         "closed": loops_in_lanes(program),
         "regular": REGULAR[0] in program.block_names,
-        "limits": definitions(read_template("c/closed_lanes.c.j2")),
     }
     call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from itertools import accumulate
 from typing import Any
 
@@ -24,8 +25,13 @@ def crosses_singular(program: Program) -> bool:
     return program.has_loops and program.projects and not program.given_rates
 
 
-def describe_equations(program: Program, areas: list[tuple[str, int, int]]) -> dict[str, Any]:
-    """The entries of ``eom_model`` in its order: numbers, tables, starts of areas, functions; each with a comment."""
+def describe_equations(
+    program: Program, areas: list[tuple[str, int, int]], linked: Collection[str] = ()
+) -> dict[str, Any]:
+    """The entries of ``eom_model`` in its order: numbers, tables, starts of areas, functions; each with a comment.
+
+    ``linked`` are the functions that lie in another file.
+    """
     header = read_header(SOLVER_HEADERS[0])
     starts = {name: start for name, start, _ in areas}
     used = {name for driver in program.drivers for name in driver.blocks}
@@ -62,7 +68,11 @@ def describe_equations(program: Program, areas: list[tuple[str, int, int]]) -> d
         "tables": tables,
         "areas": [starts.get(name, 0) for name in re.findall(r"^    AREA_(\w+),", header, re.MULTILINE)],
         "functions": [
-            f"{name}_block" if name in used and name in program.block_names else "NULL"
+            f"{program.name}_{name}_block"
+            if name in linked
+            else f"{name}_block"
+            if name in used and name in program.block_names
+            else "NULL"
             for name in re.findall(r"eomgen_function (\w+);", header)
         ],
     }

@@ -11,11 +11,6 @@ from .program import Program
 LENGTH = 150_000
 
 
-def part_names(printed: Sequence[Printed]) -> list[str]:
-    """Names of all pieces, to declare them."""
-    return [name for p in printed for name, _ in p.pieces]
-
-
 def distribute(program: Program, printed: Sequence[Printed]) -> list[list[tuple[str, str]]]:
     """The pieces, name and text, by file; none if the model is small enough for one file."""
     pieces = [piece for p in printed for piece in p.pieces]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..graph.core import Expr
 from .c_layout import places_again
-from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
+from .c_text import BlockPrinter, Printed, direct_results, function_text
 from .program import Block, Program
 from .segments import FEW, Place, SegmentKind, Segments, find_segments
 from .statements import Pieces, PrintedFunction, conditions, references
@@ -64,7 +64,7 @@ def _print(
     main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
     angles, first = _print_angles(found, name)
     runs, calls = _print_runs(found.runs, name, len(found.kinds))
-    text = function_text(f"static flag {name}", set(ARGUMENTS), [*main, *first, *calls])
+    text = function_text(f"static flag {name}", [*main, *first, *calls])
     return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
 
 
@@ -121,9 +121,8 @@ def _print_list(found: Segments, i: int, name: str) -> str:
             )
             value = form.format(f"{source}[i]")
         filled.append(f"for (int i = 0; i < {len(pairs)}; i++) {{ w[{to}[i]] = {value}; }}")
-    unused = " ".join(f"(void){a};" for a in ("out", *({"t", "x", "u", "c"} - set(by_array)), "first", "last"))
-    lines = "\n".join(f"    {line}" for line in (unused, *found.lists.lines(i, filled)))
-    head = f"static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)"
+    lines = "\n".join(f"    {line}" for line in ("(void)first; (void)last;", *found.lists.lines(i, filled)))
+    head = f"static EOMGEN_APART flag {name}(EOMGEN_ARGUMENTS, int first, int last)"
     return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
 
 
@@ -170,7 +169,6 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     table = PlaceTable("i", n)
     numbers: dict[tuple[float, ...], int] = {}
     fixed, loads = {}, {}
-    used: set[str] = set()
     for column in zip(*kind.reads, strict=True):
         i = column[0]
         where = [found.places[j] for j in column]
@@ -184,7 +182,6 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
         elif array == "w":
             loads[i] = table.text([at for _, at in where])
         else:
-            used.add(array)
             fixed[i] = "t" if array == "t" else f"{array}[{table.text([at for _, at in where])}]"
     statements = kind.members[0]
     stride = len(kind.exports)
@@ -203,13 +200,12 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     inlined = conditions(program.graph, statements, kept, checks)
     printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
     printer.lists = found.lists
+    printer.named = frozenset(statements[kind.exports[e]] for e in carried.first)
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
     lines += [f"r{e} = {printer.real(statements[kind.exports[e]])};" for e in carried.first]
     before, after = _print_carried(kind, carried)
-    used.update("w" for _ in before)
     head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
     head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []
-    before += [f"(void){a};" for a in ARGUMENTS if a not in {*printer.used, *used}]
     body = "\n".join(f"        {line}" for line in head + lines)
     tables = ""
     if table.rows:
@@ -218,12 +214,11 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     if numbers:
         every = list(zip(*numbers, strict=True))
         tables += f"EOMGEN_SHARED const double {name}_numbers[{n}][{len(numbers)}] = {{\n{_rows(every)}\n}};\n"
-    loop = "for (int m = first; m < last; m++)"
     opening, closing = ("".join(f"    {line}\n" for line in part) for part in (before, after))
-    return (
-        f"{tables}static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)\n{{\n    EOMGEN_BEGIN\n{opening}"
-        f"    {loop} {{\n{body}\n    }}\n{closing}    EOMGEN_RETURN\n}}\n"
-    )
+    signature = f"static EOMGEN_APART flag {name}(EOMGEN_ARGUMENTS, int first, int last)"
+    loop = f"    for (int m = first; m < last; m++) {{\n{body}\n    }}\n"
+    inside = f"    EOMGEN_BEGIN\n{opening}{loop}{closing}    EOMGEN_RETURN"
+    return f"{tables}{signature}\n{{\n{inside}\n}}\n"
 
 
 def _print_carried(kind: SegmentKind, carried: FromBefore) -> tuple[list[str], list[str]]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ..base.operations import CONDITION, OPERATIONS
 from .c_lanes import WIDTHS
 from .c_text import helper, literal
-from .files import read_template, render
+from .files import render
 from .program import Program
 from .series import MOST_ORDER, Series, Term, behind, make_series
 from .statements import print_angles, references
@@ -51,8 +51,7 @@ def series_files(program: Program) -> dict[str, str]:
         "widths": [(width, tests) for width, (tests, _) in sorted(WIDTHS.items(), reverse=True) if tests],
         "helpers": [text for k in sorted(used) if (text := helper(OPERATIONS[k]))],
     }
-    files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
-    return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
+    return {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
 
 
 def _signed(parts: list[tuple[int, str]]) -> str:

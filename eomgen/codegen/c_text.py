@@ -1,12 +1,14 @@
 """a straight-line block -> C99 functions in static single assignment.
 
 Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.  The text is written over the type
-``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).
+``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).  A value that is used
+once stands in the expression that uses it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -20,11 +22,11 @@ from .pair_sums import CopiedRun, PairLists, copied_runs
 from .program import Block, Program
 from .statements import CIRCULAR, FindPairs, Pieces, PrintedFunction, cut, gather_angles, print_angles, references
 
-SIGNATURE = (
-    "real t, const real *restrict x, const real *restrict u,\n"
-    "    const real *restrict c, real *restrict out, real *restrict w"
-)
-ARGUMENTS = ("t", "x", "u", "c", "out", "w")
+#: Characters of an expression at most.
+LONGEST = 88
+#: How tightly an operation binds its operands in C; all others are calls.
+BINDING = {"add": 1, "sub": 1, "mul": 2, "div": 2, "neg": 3}
+CALL = 4
 #: A row of at least so many zero results is filled by a loop.
 FILLED = 12
 NOWHERE: Mapping[str, str] = MappingProxyType({})  #: where no sum over pairs keeps anything
@@ -49,7 +51,9 @@ class BlockPrinter:
         self._fixed = references
         self._beside_numbers = operations_with(lambda row: row.takes_numbers)
         self._variables: dict[int, str] = {}
-        self.used: set[str] = set()  #: arguments read or written since last emptied
+        self._uses: Counter[int] = Counter()  #: by statements of this piece; two by one that takes names alone
+        self._waiting: dict[int, tuple[str, int]] = {}  #: expressions without a name, in order, and how they bind
+        self.named: frozenset[int] = frozenset()  #: statements that have a name in any case
 
     def _name(self, i: int) -> str:
         if i not in self._variables:
@@ -59,7 +63,6 @@ class BlockPrinter:
     def operand(self, i: int) -> str:
         fixed = self._fixed.get(i)
         if fixed is not None:
-            self.used.add(fixed[0])
             return fixed
         node = self._nodes[i]
         return literal(node[1]) if node[0] == "const" else self._name(i)
@@ -92,7 +95,6 @@ class BlockPrinter:
         node = self._nodes[i]
         kind = node[0]
         if self.lists.call(i) is not None:
-            self.used.add("w")
             return f"w[{self.lists.place(i)}]"
         if kind in self._calls:
             function, orders = self._calls[kind]
@@ -110,37 +112,79 @@ class BlockPrinter:
         loaded: set[int] = set()
         angles = gather_angles(self._graph, piece, self.pairs)
         self._angles = {}
+        self._uses = self._count_uses(piece)
         first = frozenset(angles.first)
         for i in angles.first:
             self._statement(i, piece, loaded, result)
         if angles.arguments:
             for i in angles.arguments:
                 self._read(i, piece, loaded, result)
+            self._name_waiting(result)
             result += print_angles([self.real(i) for i in angles.arguments])
             self._angles = {i: k for k, i in enumerate(angles.arguments)}
         for i in piece.statements:
             if i not in first:
                 self._statement(i, piece, loaded, result)
+        self._name_waiting(result)
         return result
 
+    def _count_uses(self, piece: PrintedFunction) -> Counter[int]:
+        """How often statements use each value; one that is used as a name counts twice."""
+        paired = () if self.pairs is None else (*self.pairs.second, *self.pairs.second.values())
+        by_name, uses = {*piece.inlined, *paired}, Counter[int]()
+        for i in piece.statements:
+            nests = self._nodes[i][0] in BINDING and i not in by_name
+            uses.update(k for k in self._nodes[i][1:] for _ in range(1 if nests else 2))
+        uses.update(k for i in (*piece.results, *piece.stores, *piece.checks, *paired, *self.named) for k in (i, i))
+        return uses
+
+    def _nested(self, i: int) -> str:
+        """The expression of an operation around those that wait for it; empty where none does, or it is too long."""
+        kind, *operands = self._nodes[i]
+        if kind not in BINDING or self._waiting.keys().isdisjoint(operands):
+            return ""
+        texts = []
+        for place, k in enumerate(operands):
+            text, binding = self._waiting.get(k) or (self.operand(k), CALL)
+            least = CALL if kind == "neg" or (place and binding == BINDING["neg"]) else BINDING[kind] + place
+            texts.append(text if binding >= least else f"({text})")
+        text = OPERATIONS[kind].c.format(*texts)
+        if len(text) > LONGEST:
+            return ""
+        for k in operands:
+            self._waiting.pop(k, None)
+        return text
+
+    def _name_waiting(self, result: list[str], operands: Sequence[int] | None = None) -> None:
+        """Give expressions that wait a name: all, or those among the operands of a statement."""
+        for i in list(self._waiting) if operands is None else [k for k in operands if k in self._waiting]:
+            result.append(f"const real {self._name(i)} = {self._waiting.pop(i)[0]};")
+
     def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
+        self._load(i, piece, loaded, result)
         if self.lists.is_list(i):
-            self._load(i, piece, loaded, result)
-            self.used |= {"x", "w"} if self.lists.again else {"w"}
+            self._name_waiting(result)
             result += self.lists.lines(i, [f"w[{place}] = {self.real(x)};" for place, x in self.lists.fills(i)])
             return
         if i not in piece.inlined:
-            self._load(i, piece, loaded, result)
-            result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
+            text = self._nested(i)
+            if not text:
+                self._name_waiting(result, self._nodes[i][1:])
+                text = self._value(i, piece)
+            if self._uses[i] == 1 and self.lists.call(i) is None:
+                self._waiting[i] = (text, BINDING.get(self._nodes[i][0], CALL))
+                return
+            places = "".join(f"out[{k}] = " for k in piece.results.get(i, ()))
+            if places and self._uses[i] == 2:  # by the result alone
+                result.append(f"{places}{text};")
+                return
+            result.append(f"const real {self._name(i)} = {text};")
+            if places:
+                result.append(f"{places}{self._name(i)};")
         if i in piece.checks:
-            if i in piece.inlined:
-                self._load(i, piece, loaded, result)
+            self._name_waiting(result)
             result.append(f"EOMGEN_REJECT({self.failed(i, piece)})")
-        if i in piece.results:
-            self.used.add("out")
-            result += [f"out[{k}] = {self._name(i)};" for k in piece.results[i]]
         if i in piece.stores:
-            self.used.add("w")
             result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
 
     def _load(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
@@ -153,17 +197,20 @@ class BlockPrinter:
 
     def _read(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read a value of an earlier piece, if it is one."""
-        if i in piece.loads and i not in loaded and not self.lists.is_list(i):
-            loaded.add(i)
-            self.used.add("w")
+        if i not in piece.loads or i in loaded or self.lists.is_list(i):
+            return
+        loaded.add(i)
+        if self._uses[i] == 1:
+            self._waiting[i] = (f"w[{piece.loads[i]}]", CALL)
+        else:
+            self._name_waiting(result)
             result.append(f"const real {self._name(i)} = w[{piece.loads[i]}];")
 
 
-def function_text(head: str, used: set[str], lines: Sequence[str]) -> str:
+def function_text(head: str, lines: Sequence[str]) -> str:
     """A C function of the arguments of all blocks."""
-    unused = [f"(void){a};" for a in ARGUMENTS if a not in used]
-    text = "\n".join(f"    {line}" for line in ([" ".join(unused)] if unused else []) + list(lines))
-    return f"{head}({SIGNATURE})\n{{\n    EOMGEN_BEGIN\n{text}\n    EOMGEN_RETURN\n}}\n"
+    text = "".join(f"    {line}\n" for line in lines)
+    return f"{head}(EOMGEN_ARGUMENTS)\n{{\n    EOMGEN_BEGIN\n{text}    EOMGEN_RETURN\n}}\n"
 
 
 class Printed(NamedTuple):
@@ -173,6 +220,11 @@ class Printed(NamedTuple):
     pieces: tuple[tuple[str, str], ...]  #: name and text of each
     work: int  #: doubles of work needed
     in_pairs: bool = False  #: whether statements of alike branches are vectors, so that the text has no lanes
+
+
+def with_pieces(printed: Iterable[Printed]) -> list[str]:
+    """The functions of one file, each behind its pieces."""
+    return [text for p in printed for text in (*(f"static EOMGEN_APART {piece}" for _, piece in p.pieces), p.text)]
 
 
 def print_block(
@@ -207,24 +259,17 @@ def print_pieces(
     printer = printing(program, texts, pieces)
     printer.lists.again = again
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
-    used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
     if len(pieces.pieces) == 1:
         main += printer.lines(pieces.pieces[0])
-        used |= printer.used
-    elif pieces.pieces:
-        used = set(ARGUMENTS)
+    else:
         for k, piece in enumerate(pieces.pieces):
-            printer.used.clear()
-            lines = printer.lines(piece)
             part = f"{program.name}_{name}_{k}"
-            functions.append((part, function_text(f"flag {part}", printer.used, lines)))
+            functions.append((part, function_text(f"flag {part}", printer.lines(piece))))
             main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
     main += printer.lists.copies(runs)
-    used |= {"out", "w"} if runs else set()
-    return Printed(
-        function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end, pieces.pairs is not None
-    )
+    text = function_text(f"static flag {name}", main)
+    return Printed(text, tuple(functions), printer.lists.end, pieces.pairs is not None)
 
 
 def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:

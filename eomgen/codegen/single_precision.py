@@ -15,7 +15,6 @@ from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..base.operations import FUNCTION, OPERATIONS
 from ..errors import cannot
 from .c_functions import used_calls
-from .files import read_template
 from .pair_sums import refuse_sums
 from .program import Program
 
@@ -38,8 +37,6 @@ _TOKEN = re.compile(
     rf"|(?P<number>{_NUMBER})",
     re.MULTILINE,
 )
-#: Headers that have a text of their own in single precision.
-_OWN = {"eomgen_real.h": "c/eomgen_real_single.h", "eomgen_sincos.h": "c/eomgen_sincos_single.h"}
 
 
 def single_limit(value: float) -> float:
@@ -77,13 +74,11 @@ def refuse_double(program: Program) -> None:
 
 def in_single_precision(sources: Mapping[str, str]) -> dict[str, str]:
     """All C sources and headers in single precision, other files as they are."""
-    return {
-        name: read_template(_OWN[name]) if name in _OWN else _converted(text) if name.endswith((".c", ".h")) else text
-        for name, text in sources.items()
-    }
+    return {name: _converted(name, text) if name.endswith((".c", ".h")) else text for name, text in sources.items()}
 
 
-def _converted(text: str) -> str:
+def _converted(name: str, text: str) -> str:
+    text = f"#define EOMGEN_SINGLE\n{text}" if name == "eomgen_real.h" else text
     limits = _LIMIT.sub(lambda match: f"{match[1]} {single_limit(float(match[2]))!r}", text)
     return _TOKEN.sub(_exchanged, limits)
 

@@ -556,6 +556,7 @@ def print_angles(operands: Sequence[str]) -> list[str]:
             group = ", ".join(operands[start : start + size])
             lines.append(f"{sign} sincos_{name}({group}, sines + {start}, cosines + {start});")
             start, sign = start + size, "far |="
-    lines.append("if (any_far(far)) {")
-    lines += [f"    sincos_far({a}, sines + {k}, cosines + {k});" for k, a in enumerate(operands)]
-    return [*lines, "}"]
+    far = [f"sincos_far({a}, sines + {k}, cosines + {k});" for k, a in enumerate(operands)]
+    if n <= 2:
+        return [*lines, f"if (any_far(far)) {{ {' '.join(far)} }}"]
+    return [*lines, "if (any_far(far)) {", *(f"    {line}" for line in far), "}"]

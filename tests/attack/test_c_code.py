@@ -106,13 +106,13 @@ def test_what_is_wrong_is_seen(tmp_path: Path) -> None:
     """A result that depends on what was in the work array, and an access beyond it."""
     files = exported("pendulum", "recursive", tmp_path)
     text = (tmp_path / "pendulum.c").read_text()
-    before, after = text.split("int pendulum_energy(double t,")
-    body, rest = after.split("return status", 1)
+    before, after = text.split("static flag energy_block(")
+    body, rest = after.split("EOMGEN_RETURN", 1)
     for line, said in (
         ("out[0] += w[0] != w[0];", "energy: depends on alignment"),
         ("w[-1] = 1.0;", "heap-buffer-overflow"),
     ):
-        changed = f"{before}int pendulum_energy(double t,{body}{line}\n    return status{rest}"
+        changed = f"{before}static flag energy_block({body}{line}\n    EOMGEN_RETURN{rest}"
         (tmp_path / "pendulum.c").write_text(changed)
         done = driven(tmp_path, files)
         assert done.returncode != 0

@@ -306,7 +306,7 @@ def test_two_versions_on_one_cache(target: str, tmp_path: Path) -> None:
         shutil.copytree(source, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "built"))
     for file, old, new in (
         ("eomgen/__init__.py", '__version__ = "', '__version__ = "9.'),
-        ("eomgen/templates/c/eomgen_sincos.h", "*sine = (pack)(", "*sine = -(pack)("),
+        ("eomgen/native/eomgen_real.h", "*sine = (pack)(", "*sine = -(pack)("),
         ("eomgen/base/operations.py", 'c="sine_of({})"', 'c="sine_of({})", numpy="(-np.sin({}))"'),
     ):
         text = (tmp_path / file).read_text(encoding="utf-8")

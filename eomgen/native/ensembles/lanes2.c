@@ -6,7 +6,8 @@
 #include "eomgen_ensembles.h"
 
 #if EOMGEN_LANES & 2
-#include "eomgen_contraction.h"
+#define EOMGEN_CONTRACT
+#include "eomgen_processor.h"
 #define EOMGEN_WIDTH 2
 #include "eomgen_lane_runs.h"
 

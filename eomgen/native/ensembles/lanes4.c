@@ -6,7 +6,8 @@
 #include "eomgen_ensembles.h"
 
 #if EOMGEN_LANES & 4
-#include "eomgen_contraction.h"
+#define EOMGEN_CONTRACT
+#include "eomgen_processor.h"
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
 #else

@@ -1,5 +1,6 @@
 /* RK4 with steps of one size: W. Kutta, Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen, 1901;
    between the steps the cubic through both ends. Its error is not watched: max_step is the step. */
+#include "eomgen_calls.h"
 #include "eomgen_steppers.h"
 
 static void rk4_attempt(eomgen_run *run, double h)
