@@ -92,7 +92,7 @@ class Builder(ElementMethods):
     ) -> Self:
         """Make a model from a Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
-        from .sympy_names import SympyNames
+        from .sympy_text import SympyNames
 
         coordinates = one_or_several(coordinates)
         given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
@@ -105,7 +105,7 @@ class Builder(ElementMethods):
     ) -> Self:
         """Make a model from equations M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
         from .given_equations import describe_equations
-        from .sympy_names import SympyNames
+        from .sympy_text import SympyNames
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
         coordinates = one_or_several(coordinates)

@@ -63,6 +63,7 @@ _REASONS = {
     "user": (HARMLESS, "sizes of memory, data of users"),
 }
 _DRIVES = "general motor position velocity intvelocity orientation pid damper cylinder muscle adhesion dcmotor plugin"
+_TIES = "equality/connect, equality/weld, equality/joint, equality/tendon"
 
 #: Element of a default -> what it is a default of.
 _DEFAULTS = {
@@ -90,10 +91,8 @@ def _path_of(parent: str, tag: str) -> str:
 MJCF = Constructs(
     f"""
     mujoco, mujocoinclude: taken model
-    mujoco/compiler: taken alignfree angle assetdir autolimits balanceinertia boundinertia boundmass conflict
-    mujoco/compiler: taken coordinate discardvisual eulerseq exactmeshinertia fitaabb fusestatic inertiafromgeom
-    mujoco/compiler: taken inertiagrouprange meshdir passthrough savecanonical savecompiled saveinertial settotalmass
-    mujoco/compiler: taken strippath texturedir usethread convexhull
+    mujoco/compiler, asset/mesh, asset/model, body/frame, body/replicate, body/attach, body/inertial: taken *
+    mujoco/include, body/freejoint, body/site: taken *
     compiler/lengthrange: solver **
     mujoco/option: taken gravity actuatorgroupdisable
     mujoco/option: medium density viscosity wind
@@ -112,11 +111,7 @@ MJCF = Constructs(
     mujoco/statistic, mujoco/visual: looks **
     mujoco/default, default/default, mujoco/worldbody, mujoco/asset, mujoco/tendon, mujoco/equality: taken
     mujoco/actuator, mujoco/contact: taken
-    mujoco/include: taken file
     mujoco/extension, body/plugin, geom/plugin, mesh/plugin, flexcomp/plugin: plugin **
-    asset/mesh: taken builtin content_type face file inertia material maxhullvert normal params refpos refquat scale
-    asset/mesh: taken smoothnormal texcoord vertex
-    asset/model: taken content_type file
     asset/hfield: contact **
     asset/skin, asset/texture, asset/material, body/camera, body/light: looks **
     body/body: taken axisangle euler fuse pos quat xyaxes zaxis
@@ -124,25 +119,18 @@ MJCF = Constructs(
     body/body: mocap mocap
     body/body: solver simple
     body/body: asleep sleep
-    body/frame: taken axisangle euler pos quat xyaxes zaxis
-    body/replicate: taken count euler offset sep
-    body/attach: taken body frame model prefix
     body/composite: taken **
-    body/inertial: taken axisangle diaginertia euler fullinertia mass pos quat xyaxes zaxis
-    body/joint: taken type pos axis ref springref stiffness damping armature springdamper
-    body/joint: taken actuatorfrclimited actuatorfrcrange
+    body/joint: taken actuatorfrclimited actuatorfrcrange armature axis damping pos ref springdamper springref stiffness
+    body/joint: taken type
     body/joint: limits range limited
     body/joint: friction frictionloss
     body/joint: parts springyield actuatorgravcomp
     body/joint: solver margin solimpfriction solimplimit solreffriction solreflimit solreflimit
-    body/freejoint: taken align
     body/geom: taken axisangle density euler fitscale fromto hfield mass mesh pos quat shellinertia size type
     body/geom: taken xyaxes zaxis
     body/geom: contact adhesion conaffinity condim contype friction gap margin priority solimp solmix solref surfacevel
     body/geom: medium fluidcoef fluidshape
     body/geom: looks castshadow material rgba
-    body/site: taken axisangle euler fromto mesh pos quat size type xyaxes zaxis
-    body/site: looks material rgba
     body/flexcomp, mujoco/deformable: soft **
     contact/pair, contact/exclude: contact **
     tendon/spatial, tendon/fixed: taken stiffness damping armature springlength actuatorfrclimited actuatorfrcrange
@@ -151,14 +139,9 @@ MJCF = Constructs(
     tendon/spatial, tendon/fixed: looks material rgba width
     spatial/site, spatial/geom, spatial/pulley: parts **
     fixed/joint: taken coef joint
-    equality/connect: taken active anchor body1 body2 site1 site2
-    equality/weld: taken active anchor body1 body2 relpose site1 site2 torquescale
-    equality/joint: taken active joint1 joint2 polycoef
-    equality/tendon: taken active tendon1 tendon2 polycoef
-    equality/flex, equality/flexstrain: soft active flex cell
-    equality/connect, equality/joint, equality/tendon, equality/flex: solver torquescale
-    equality/connect, equality/weld, equality/joint, equality/tendon, equality/flex, equality/flexstrain: yield solref
-    equality/connect, equality/weld, equality/joint, equality/tendon, equality/flex, equality/flexstrain: yield solimp
+    {_TIES}: taken active anchor body1 body2 joint1 joint2 polycoef relpose site1 site2 tendon1 tendon2 torquescale
+    equality/flex, equality/flexstrain: soft active cell flex torquescale
+    {_TIES}, equality/flex, equality/flexstrain: yield solimp solref
     {", ".join(f"actuator/{tag}" for tag in _DRIVES.split())}: drive *
     plugin/config: plugin **
     mujoco/sensor: measure **
@@ -183,38 +166,13 @@ NOTED = {
     "actuator_dampingpoly": ("DAMPER", "the parts of dampers of actuators that are not linear"),
     "actuator_delay": ("ACTUATION", "the delays of actuators"),
 }
-#: Field that is read -> what it holds, which must be no larger than LARGEST; ranges may be infinite.
-FINITE = {
-    "opt_gravity": "the components of gravity",
-    "body_mass": "masses",
-    "body_inertia": "moments of inertia",
-    "body_ipos": "centres of mass",
-    "body_iquat": "axes of inertias",
-    "body_pos": "places of bodies",
-    "body_quat": "rotations of bodies",
-    "jnt_pos": "places of joints",
-    "jnt_axis": "axes of joints",
-    "jnt_stiffness": "stiffnesses of joints",
-    "qpos0": "initial positions",
-    "qpos_spring": "rest positions of springs",
-    "dof_armature": "armatures of joints",
-    "dof_damping": "dampings of joints",
-    "dof_frictionloss": "dry frictions of joints",
-    "site_pos": "places of sites",
-    "site_quat": "rotations of sites",
-    "eq_data": "data of equalities",
-    "wrap_prm": "coefficients of tendons",
-    "tendon_stiffness": "stiffnesses of tendons",
-    "tendon_damping": "dampings of tendons",
-    "tendon_armature": "armatures of tendons",
-    "tendon_lengthspring": "rest lengths of tendons",
-    "tendon_length0": "lengths of tendons",
-    "actuator_gear": "gears of actuators",
-    "actuator_gainprm": "gains of actuators",
-    "actuator_biasprm": "biases of actuators",
-    "actuator_damping": "dampings of actuators",
-    "actuator_armature": "armatures of actuators",
-}
+#: Fields that are read, whose numbers must be no larger than LARGEST; ranges may be infinite.
+FINITE = (
+    "opt_gravity body_mass body_inertia body_ipos body_iquat body_pos body_quat jnt_pos jnt_axis jnt_stiffness qpos0 "
+    "qpos_spring dof_armature dof_damping dof_frictionloss site_pos site_quat eq_data wrap_prm tendon_stiffness "
+    "tendon_damping tendon_armature tendon_lengthspring tendon_length0 actuator_gear actuator_gainprm actuator_biasprm "
+    "actuator_damping actuator_armature"
+)
 SLOWEST = 1.0  #: rad/s: an equality that comes back to its place more slowly hardly holds in MuJoCo
 _MISSING = "MJCF files need mujoco: pip install 'eomgen[robots]'"
 _SLEEP = 1 << 4  # mjtEnableBit
@@ -344,9 +302,9 @@ class _MjcfReader:
 
     def read(self) -> Robot:
         m, robot = self.m, self.robot
-        for key, what in FINITE.items():
+        for key in FINITE.split():
             if not (np.abs(getattr(m, key, 0.0)) <= LARGEST).all():
-                message = f"{what} ({key.removeprefix('opt_')}) come out too large or not finite"
+                message = f"numbers of {key} come out too large or not finite"
                 remedy = f"at most {LARGEST:g}, so that products stay finite"
                 robot.problems.append(self.root.problem("mujoco", message, remedy, "EG-RANGE"))
         if robot.problems:

@@ -255,15 +255,6 @@ def sum_inertias(parts: Sequence[Inertia]) -> Inertia:
 
 # -- links, joints, loops and drives -----------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Mimic:
-    """q = factor q(joint) + offset."""
-
-    joint: str
-    factor: float
-    offset: float
-
-
-@dataclass(frozen=True)
 class RobotLink:
     """A link: its inertia in its own frame, and shapes to draw as (placement, data)."""
 
@@ -295,7 +286,6 @@ class RobotJoint:
     armature: float = 0.0
     stiffness: float = 0.0
     rest: float = 0.0
-    mimic: Mimic | None = None
     initial: float = 0.0
     start: Placement | None = None  #: of a free joint
     clamp: Range | None = None  #: range of what all drives together do along it
@@ -311,13 +301,14 @@ class Sum:
 
 @dataclass(frozen=True)
 class Tie:
-    """``left`` = a0 + a1 ``right`` + a2 ``right``^2 + ..., the a_k in ``law``."""
+    """``left`` = a0 + a1 ``right`` + a2 ``right``^2 + ..., the a_k in ``law``; ``path`` is its place in the file."""
 
     name: str
     left: Sum
     right: Sum
     law: tuple[float, ...]
     place: Place
+    path: str = ""
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ class _Writer:
         for body, joint in moving:
             self._joint(body, joint)
         self._loops()
-        self._mimics()
+        self._ties()
         self._drives()
         self._note_data()
         self.out.note_renamed(self.names.renamed)
@@ -325,22 +325,8 @@ class _Writer:
             axis = {"axis": _axis(loop.axis)} if JOINTS[loop.type].has_axis else {}
             self._add("joints", name, {"type": loop.type, "between": pair, **axis}, loop.place)
 
-    def _mimics(self) -> None:
-        ties = list(self.robot.ties)
-        loose = []
-        for joint in self.robot.joints.values():
-            law = joint.mimic
-            if law is None:
-                continue
-            if self.options.mimic == "coupling":
-                own, other = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
-                ties.append(Tie(f"{joint.name}_mimic", own, other, (law.offset, law.factor), joint.place))
-            elif joint.type != "weld":
-                loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
-        if loose:
-            note = f"joints that mimic others keep coordinates of their own ({', '.join(loose)})"
-            self.out.notes.append(f"{note}; mimic='coupling' ties them")
-        for tie in ties:
+    def _ties(self) -> None:
+        for tie in self.robot.ties:
             values = _describe_tie(tie, self.joints, self.options.lock)
             if values is None:
                 self.out.notes.append(f"left out: the coupling {tie.name}, all of whose joints are locked")
@@ -382,18 +368,16 @@ class _Writer:
 
     def _law(self, k: int, drive: Drive) -> tuple[str, str]:
         """Name of a drive and its force, empty if there is none."""
-        parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
-        fixed = sum(c * self.options.lock.get(joint, 0.0) for joint, c in drive.parts)
+        length, fixed = _collect(Sum(drive.parts), self.joints, self.options.lock)
         b0, b1, b2 = drive.bias
-        terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
-        name = f"tendon_{k}"
+        name, terms = f"tendon_{k}", [(b1 * c, q) for q, c in length.items()]
+        terms += [(b2 * c, f"{q}_dot") for q, c in length.items()]
         if drive.name:
             name = self.names.symbol(drive.name)
             self._add("inputs", name, {"value": 0.0}, drive.place)
             terms.insert(0, (drive.gain, _cut(name, drive.control) if drive.control else name))
-        return name, " + ".join(
-            [f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x]
-        )
+        constant = b0 + b1 * fixed
+        return name, " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(constant)] * bool(constant))
 
     def _note_data(self) -> None:
         """Say of which joints limits and dry friction are data that do not act."""
@@ -452,8 +436,8 @@ def _turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:
         ]
     r0, r1, r2, r3 = (float(x) for x in euler_parameters_from_matrix(rest))
     # the conjugate of the rest times e
-    p = [_sum((r0, r1, r2, r3), e)]
-    p += [_sum(row, e) for row in ((-r1, r0, r3, -r2), (-r2, -r3, r0, r1), (-r3, r2, -r1, r0))]
+    rows = ((r0, r1, r2, r3), (-r1, r0, r3, -r2), (-r2, -r3, r0, r1), (-r3, r2, -r1, r0))
+    p = [_text(dict(zip(e, row, strict=True))) for row in rows]
     square = f"(1 - ({p[0]})**2)"  # sin(phi/2)^2; near 0 the series of phi / sin(phi/2)
     series = f"2 + {square}/3 + 3*{square}**2/20 + 5*{square}**3/56"
     exact = f"2*atan2(sqrt({square}), abs({p[0]}))/sqrt({square})"
@@ -461,13 +445,6 @@ def _turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:
     return [f"({x})*{factor}" for x in p[1:]]
 
 
-def _sum(factors: Sequence[float], terms: Sequence[str]) -> str:
-    """The sum of the terms whose factors are not zero."""
-    kept = [(f, x) for f, x in zip(factors, terms, strict=True) if f]
-    return " + ".join(x if f == 1.0 else f"({f!r})*{x}" for f, x in kept) or "0"
-
-
-# -- couplings and laws as texts ---------------------------------------------------------------------------------------
 def _describe_tie(tie: Tie, coordinates: Mapping[str, str], locked: Mapping[str, float]) -> dict[str, Any] | None:
     """The keys of a coupling, a linear one by its factors; None where no joint is left to tie.
 
@@ -512,6 +489,7 @@ def _collect(side: Sum, coordinates: Mapping[str, str], locked: Mapping[str, flo
     return factors, constant
 
 
-def _text(factors: Mapping[str, float], constant: float) -> str:
-    terms = [q if c == 1.0 else f"({c!r})*{q}" for q, c in factors.items()]
+def _text(factors: Mapping[str, float], constant: float = 0.0) -> str:
+    """The sum of factors times terms, those of factor 0 left out, and a constant."""
+    terms = [x if f == 1.0 else f"({f!r})*{x}" for x, f in factors.items() if f]
     return " + ".join(terms + [f"({constant!r})"] * bool(constant or not terms))

@@ -108,8 +108,7 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
     _lock(robot, options)
     _check_ends(robot)
     root = _root(robot)
-    if options.mimic != "independent":
-        _check_mimics(robot)
+    _check_ties(robot)
     if robot.problems:
         if options.check == "error":
             _check_inertias(robot, options.check_inertia is None)
@@ -225,14 +224,14 @@ def _root(robot: Robot) -> str:
     return roots[0].name if roots else ""
 
 
-def _check_mimics(robot: Robot) -> None:
-    for joint in robot.joints.values():
-        path, other = f"joint.{joint.name}.mimic", joint.mimic.joint if joint.mimic else joint.name
-        if other not in robot.joints:
-            remedy = nearest(other, robot.joints, "joints")
-            robot.problem(path, f"no joint {other!r}", remedy, joint.place, "EG-NAME-UNKNOWN")
-        elif joint.mimic and other == joint.name:
-            robot.problem(path, "the joint mimics itself", "name another joint", joint.place, "EG-CIRCLE")
+def _check_ties(robot: Robot) -> None:
+    for tie in robot.ties:
+        for other, _ in tie.right.parts if tie.path else ():
+            if other not in robot.joints:
+                remedy = nearest(other, robot.joints, "joints")
+                robot.problem(tie.path, f"no joint {other!r}", remedy, tie.place, "EG-NAME-UNKNOWN")
+            elif (other, 1.0) in tie.left.parts:
+                robot.problem(tie.path, "the joint mimics itself", "name another joint", tie.place, "EG-CIRCLE")
 
 
 def _check_inertias(robot: Robot, lenient: bool) -> None:
@@ -277,7 +276,7 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
     """
     heavy: set[str] = set()
     idle: list[RobotJoint] = []
-    tied = found.tied(robot) | {name for j in robot.joints.values() if j.mimic for name in (j.name, j.mimic.joint)}
+    tied = found.tied(robot)
     carrying = {found.parent(joint) for _, joint in found.moving if joint.parent}
     for body, joint in reversed(found.moving):  # children come after their parents
         inertia = body.inertia()

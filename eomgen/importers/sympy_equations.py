@@ -16,7 +16,7 @@ from ..describe.names import nearest
 from ..describe.printed_names import give_latex
 from ..describe.scope import RATES
 from ..describe.sympy_face import function_name, is_sympy, lower_sympy, name_of, named, names_of, one_or_several
-from ..describe.sympy_names import SympyNames
+from ..describe.sympy_text import SympyNames
 from ..errors import ExpressionError, ModelError, Problem, ill_typed
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp

@@ -22,12 +22,13 @@ from .robot import (
     NOTHING,
     Inertia,
     Loop,
-    Mimic,
     Placement,
     Robot,
     RobotJoint,
     RobotLink,
     RobotOptions,
+    Sum,
+    Tie,
     placed,
 )
 from .xml_file import DATA, HARMLESS, LEFT, TAKEN, Constructs, XmlElement
@@ -143,6 +144,7 @@ class _UrdfReader:
     def __init__(self, root: XmlElement, options: RobotOptions) -> None:
         self.root, self.options = root, options
         self.robot = Robot(root.attributes.get("name") or "robot", root.file)
+        self.loose: list[str] = []  # joints that mimic others and are not tied to them
         materials = [element for element in root.walk() if element.tag == "material"]  # a name counts everywhere
         self.colors = {m.attributes.get("name", ""): c for m in reversed(materials) if (c := _color(m))}
 
@@ -191,6 +193,9 @@ class _UrdfReader:
                 if count > 1 and row is not None and row.fate in (TAKEN, DATA):
                     name = child.attributes.get("name", "")
                     notes.append(f"{child.tag}.{name}: {count} <{tag}>; only the first is used")
+        if self.loose:
+            note = f"joints that mimic others keep coordinates of their own ({', '.join(self.loose)})"
+            notes.append(f"{note}; mimic='coupling' ties them")
 
     # -- values ---------------------------------------------------------------------------------------------------
     def fault(self, element: XmlElement, path: str, message: str, remedy: str, code: str) -> None:
@@ -358,8 +363,9 @@ class _UrdfReader:
             limits=self._limits(element, path, given) if one_degree else {},
             damping=0.0 if dynamics is None else self.number(dynamics, "damping", f"{path}.dynamics", 0.0),
             dry_friction=0.0 if dynamics is None else self.number(dynamics, "friction", f"{path}.dynamics", 0.0),
-            mimic=self._mimic(element, path) if one_degree else None,
         )
+        if one_degree:
+            self._mimic(element, name)
 
     def _axis(self, element: XmlElement, path: str, kind: str | None) -> tuple[float, float, float]:
         axis, default = element.find("axis"), (1.0, 0.0, 0.0)
@@ -414,13 +420,19 @@ class _UrdfReader:
             result = {key: value for key, value in result.items() if key not in sides}
         return {key: value for key, value in result.items() if not limits_nothing(key, value)}
 
-    def _mimic(self, element: XmlElement, path: str) -> Mimic | None:
-        mimic = element.find("mimic")
+    def _mimic(self, element: XmlElement, name: str) -> None:
+        """Tie a joint to another, q = factor q_other + offset, or note that it is not."""
+        mimic, path = element.find("mimic"), f"joint.{name}.mimic"
         if mimic is None:
-            return None
-        joint = mimic.attributes.get("joint")
-        if not joint:
-            self.fault(mimic, f"{path}.mimic", "names no joint", 'give <mimic joint="..."/>', "EG-MISSING")
-            return None
-        factor = self.number(mimic, "multiplier", f"{path}.mimic", 1.0)
-        return Mimic(joint, factor, self.number(mimic, "offset", f"{path}.mimic", 0.0))
+            return
+        other = mimic.attributes.get("joint")
+        if not other:
+            self.fault(mimic, path, "names no joint", 'give <mimic joint="..."/>', "EG-MISSING")
+            return
+        factor, offset = self.number(mimic, "multiplier", path, 1.0), self.number(mimic, "offset", path, 0.0)
+        own, followed = Sum(((name, 1.0),)), Sum(((other, 1.0),))
+        if self.options.mimic == "coupling":
+            place = element.file, element.line
+            self.robot.ties.append(Tie(f"{name}_mimic", own, followed, (offset, factor), place, path))
+        elif name not in self.options.lock:
+            self.loose.append(f"{name} = {factor:g} {other} + {offset:g}")
