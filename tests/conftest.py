@@ -16,6 +16,8 @@ from outside_programs import PROGRAMS, missing
 from eomgen.compilation.native import find_native
 
 CACHE = pytest.StashKey[str]()
+#: Most builds in C in the shared cache by ``make test``, beside the 20 of tests that have caches of their own.
+BUILDS = 130
 QUICK = pytest.StashKey[set[str]]()
 #: What ``--quick`` runs a folder of tests for: the packages of eomgen that it guards.
 ROOMS = {
@@ -63,6 +65,11 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     if not is_worker(config):
         shutil.rmtree(config.stash[CACHE], ignore_errors=True)
+
+
+def count_builds(config: pytest.Config) -> int:
+    """Models, lanes, libraries and objects in C in the cache of this run; entries of target numpy have no object."""
+    return sum(any(entry.glob("*.*o")) for entry in Path(config.stash[CACHE], "entries").glob("*"))
 
 
 def is_worker(config: pytest.Config) -> bool:
@@ -135,6 +142,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    terminalreporter.write_line(f"builds in C: {count_builds(terminalreporter.config)}")
     if terminalreporter.config.getoption("--quick"):
         chosen = [room for room in ROOMS if room in terminalreporter.config.stash.get(QUICK, ROOMS)]
         terminalreporter.write_line(f"for what differs from the last commit: quick tests of {', '.join(chosen)}")
@@ -155,6 +163,9 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         return
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     left_out = [r for kind in ("skipped", "xfailed") for r in reporter.stats.get(kind, [])]
-    if left_out and exitstatus == pytest.ExitCode.OK:
+    wrong = [f"{len(left_out)} skipped or expected to fail, and --no-skips was given"] if left_out else []
+    if not session.config.getoption("--thorough") and (builds := count_builds(session.config)) > BUILDS:
+        wrong.append(f"{builds} builds in C, of at most {BUILDS}")
+    if wrong and exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        reporter.write_line(f"{len(left_out)} skipped or expected to fail, and --no-skips was given", red=True)
+        reporter.write_line("; ".join(wrong), red=True)

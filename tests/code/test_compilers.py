@@ -12,6 +12,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from command import run
 from refusals import refused, refuses
 
 
@@ -108,7 +109,7 @@ def test_a_compiler_may_have_a_relative_name_and_a_blank_one_is_none(
     monkeypatch.setenv("CC", f"./{name}")
     assert write_unit(tmp_path).is_file()
     monkeypatch.setenv("CC", " ")
-    assert write_unit(tmp_path).is_file()
+    assert run("doctor").code == 0
 
 
 def test_no_compiler(tmp_path: Path) -> None:

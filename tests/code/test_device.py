@@ -45,8 +45,7 @@ def foreign(model: Any, x: np.ndarray) -> Any:
 
 def pair(name: str, device: Any, target: str = "numpy") -> tuple[Any, Any]:
     equations = models.build(name).derive()
-    options = {"optimize": 0} if target == "cython" else {}
-    return equations.to_cuda(device), equations.compile(target=target, **options)
+    return equations.to_cuda(device), equations.compile(target=target, **(models.IN_C if target == "cython" else {}))
 
 
 def starts(module: Any, count: int = 4) -> np.ndarray:

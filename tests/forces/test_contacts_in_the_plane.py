@@ -46,8 +46,7 @@ START = {"j0_y": 0.0995, "j1_x": 0.15, "j1_y": 0.12, "j2_x": 0.26, "j2_y": 0.22,
 
 
 def test_as_the_same_pairs_one_by_one() -> None:
-    kernels = ("rhs", "jacobian", "parameter_jacobian", "bias", "energy")
-    bulk, single = heap(True).compile(optimize=0, kernels=kernels), heap(False).compile(target="numpy")
+    bulk, single = (heap(together).compile(target="numpy") for together in (True, False))
     x = bulk.x0(**START)
     assert np.count_nonzero(bulk.rhs(0.0, x)[9:]) == 9  # all touch
     for call in ("rhs", "jacobian", "parameter_jacobian", "bias"):

@@ -53,7 +53,7 @@ SINK = 2.0 * G / 1e6
 @cache
 def compiled(law: str) -> eg.Module:
     """A block under each law."""
-    return block({"coulomb": COULOMB, "brown_mcphee": BROWN, "lugre": BRISTLES}[law]).compile(optimize=0)
+    return block({"coulomb": COULOMB, "brown_mcphee": BROWN, "lugre": BRISTLES}[law]).compile(target="numpy")
 
 
 @pytest.mark.parametrize("bulk", [False, True])
@@ -324,7 +324,7 @@ def test_a_bounce_takes_friction_times_the_impulse_of_the_normal_force(ground: s
     law = {**PLAIN, "stiffness": 1e6, "exponent": 1.5, "bristle_stiffness": 1e5, "bristle_damping": 300.0}
     circle = {"shape": "circle", "on": body, "radius": 0.05}
     m.contacts("touch", circle, {**GROUNDS[ground], "on": m.ground}, {**law, "lateral": False})
-    mod = m.compile(optimize=0)
+    mod = m.compile(target="numpy")
     start = {"y": 0.051, "x_dot": 1.5, "y_dot": -0.3}
     traj = mod.simulate(0.06, initial=start, method="Radau", rtol=1e-8, atol=1e-11)
 

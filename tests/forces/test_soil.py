@@ -95,7 +95,7 @@ def test_sinkage_of_tracks_in_a_published_example(width: float, length: float, s
 
 def test_pressed_unloaded_and_reloaded() -> None:
     """A load that rises and falls twice: the force follows the closed form of the greatest sinkage so far."""
-    mod = plate({"soil": "clayey_soil_38", "lateral": False}).compile(optimize=0)
+    mod = plate({"soil": "clayey_soil_38", "lateral": False}).compile(target="numpy")
     load = "-500*t - (1500 + 600*t)*(1 - cos(2*pi*t))"
     times = np.linspace(0, 2, 401)
     traj = mod.simulate((0, 2), initial={"y": 1e-4}, inputs={"N": load}, t_eval=times, rtol=1e-9, atol=1e-11)

@@ -240,7 +240,7 @@ START = {"theta": 1.0, "theta_dot": -5.0}
 
 
 @cache
-def two_rows(coupled: bool, target: str = "cython") -> Any:
+def two_rows(coupled: bool, target: str = "numpy") -> Any:
     m = eg.Model(f"two_rows_{'coupled' if coupled else 'hinged'}", gravity=(0, -9.81, 0))
     m.parameter("off", 1e-3)
     a, b, c, d, e = (m.body(name, mass=1, com=(0.5, 0, 0), inertia={"zz": 1 / 12}) for name in "abcde")

@@ -7,6 +7,7 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
+import analysed
 import models
 import numpy as np
 import pytest
@@ -19,8 +20,6 @@ from sympy.physics.biomechanics import (
     FiberForceLengthPassiveDeGroote2016,
     FiberForceVelocityDeGroote2016,
 )
-
-import eomgen as eg
 
 
 @cache
@@ -168,7 +167,7 @@ def test_an_engine_runs_as_its_one_angle_does(name: str) -> None:
 
 # -- A walker and a wheelset -------------------------------------------------------------------------------------------
 def test_a_wheel_without_a_rim_walks_at_the_published_speed() -> None:
-    mod = eg.load(models.EXAMPLES / "rimless_wheel.yaml").compile(optimize=0)
+    mod = analysed.compiled("rimless_wheel", "cython")
     p = dict(zip(mod.p_names, mod.p, strict=True))
     run = mod.simulate(25.0)
     times = np.sort(np.concatenate([run.t_events[f"step{k}_closes"] for k in range(6)]))
@@ -197,7 +196,7 @@ def critical(p: dict[str, float]) -> float:
 
 
 def test_a_wheelset_hunts_above_its_critical_speed() -> None:
-    mod = eg.load(models.EXAMPLES / "wheelset.yaml").compile(optimize=0)
+    mod = analysed.compiled("wheelset", "cython")
     p = dict(zip(mod.p_names, mod.p, strict=True))
     limit = critical(p)
 

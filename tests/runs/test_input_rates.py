@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 from models import IN_C
 from refusals import refused, refuses
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -57,7 +58,7 @@ def winch(request: Any) -> Any:
     return build("winch", request.param)
 
 
-@pytest.fixture(params=["cython", "numpy"])
+@pytest.fixture(params=TARGETS)
 def ring(request: Any) -> Any:
     return build("ring", request.param)
 
