@@ -160,7 +160,7 @@ def test_thrust_of_a_track_against_slip() -> None:
 
 def test_shear_turns_back_within_its_strength() -> None:
     """Stress falls and rises the other way with the same modulus, and never exceeds c + p tan phi."""
-    mod = plate({**EXAMPLE, "lateral": False}).compile(optimize=0)
+    mod = plate({**EXAMPLE, "lateral": False}).compile(target="numpy")
     names = list(mod.x_names)
     z, K = 0.1, 0.05
 
@@ -179,7 +179,7 @@ def test_shear_turns_back_within_its_strength() -> None:
 
 def test_exact_derivatives() -> None:
     """Of a plate of which one point loads and the other unloads, and of wheels that roll and stand."""
-    mod = plate({"soil": "dry_sand", "dissipation": 0.5, "lateral": False}).compile(optimize=0)
+    mod = plate({"soil": "dry_sand", "dissipation": 0.5, "lateral": False}).compile(target="numpy")
     x = mod.x0(y=-0.06, x_dot=0.3, y_dot=-0.1)
     x[4:] = [0.004, 0.02, -0.003, 0.08]
     cases = [(mod, x, 1e-7)]
