@@ -1,4 +1,4 @@
-"""Stage cli: command line -> exit code; one file per verb, loaded when it is called."""
+"""Stage cli: command line -> exit code; a file of verbs is loaded when one of them is called."""
 
 from __future__ import annotations
 

@@ -14,10 +14,9 @@ import click
 from ..base.names import hint
 from ..base.texts import visible
 from ..errors import UsageError
-from .failures import USAGE, to_dict
-from .screen import print_json
+from .output import USAGE, print_json, to_dict
 
-#: verb -> what it does; the file of the same name in this folder holds the command of the same name.
+#: verb -> what it does.
 VERBS = {
     "run": "Derive, compile and simulate a model.",
     "ensemble": "Run a model many times with different values.",
@@ -41,6 +40,17 @@ VERBS = {
     "doctor": "Check that this installation can derive, compile and simulate.",
     "cache": "List, prune or clear the compiled modules.",
 }
+#: File of this folder -> its verbs, commands of the same name.
+FILES = {
+    "runs": ("run", "view", "kinematics"),
+    "ensembles": ("ensemble",),
+    "models": ("check", "derive", "explain", "generate", "convert"),
+    "analyses": (
+        *("linearize", "modes", "equilibrium", "sensitivity", "consistent"),
+        *("reactions", "inverse", "impact", "verify"),
+    ),
+    "installation": ("examples", "doctor", "cache"),
+}
 
 
 class Verbs(click.Group):
@@ -52,7 +62,8 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        command: click.Command = getattr(import_module(f".verb_{cmd_name}", __package__), cmd_name)
+        home = next(file for file, verbs in FILES.items() if cmd_name in verbs)
+        command: click.Command = getattr(import_module(f".{home}", __package__), cmd_name)
         return command
 
     def resolve_command(

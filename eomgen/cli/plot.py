@@ -13,7 +13,7 @@ import numpy as np
 from ..base.files import save_figure
 from ..base.notation import Notation
 from ..errors import MissingDependencyError, bad_file, incomplete
-from .shared_options import split_names
+from .options import split_names
 
 if TYPE_CHECKING:
     from ..describe.mechanism import Mechanism

@@ -255,8 +255,8 @@ FAULTS = (
     ),
     Fault(
         "inverse-start", "inverse",
-        "work.initial or None",
-        "None",
+        "module.x0(work.initial, t=t)",
+        "module.x0(None, t=t)",
         "the command inverse ignores --set of coordinates",
         "tests/shown/test_command_results.py::test_inverse_begins_at_the_state_requested",
     ),

@@ -1,4 +1,4 @@
-"""Stage cli, ensemble: model file and cases -> many runs, their last states or statistics."""
+"""Verb ensemble: model file and cases -> many runs, their last states or statistics."""
 
 from __future__ import annotations
 
@@ -15,11 +15,8 @@ from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, ill_ty
 from ..runtime.near_names import require
 from ..runtime.room import require_room
 from ..runtime.storage import split_head, write_netcdf
-from .analysis import Prepared, analysis_options
-from .number_option import Number, NumberRange
-from .screen import finite, print_heading, print_json, print_table, say, stage
-from .sections import verb_command
-from .shared_options import parse_number, require_folder
+from .options import Number, Prepared, analysis_verb, end_option, file_option, parse_number, require_folder
+from .output import finite, print_heading, print_json, print_table, say, stage
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -29,8 +26,7 @@ SHOWN = 10  #: failures listed
 MOST_WORKERS = 4096  #: processes of a local cluster
 
 
-@verb_command()
-@analysis_options
+@analysis_verb
 @click.option(
     "--cases",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
@@ -45,7 +41,7 @@ MOST_WORKERS = 4096  #: processes of a local cluster
 )
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs for --vary.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random numbers.")
-@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@end_option
 @click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M evenly spaced times.")
 @click.option("--statistics", is_flag=True, help="Keep only mean, standard deviation, least and greatest values.")
 @click.option("--solver", metavar="NAME", help="Integrator; by default that of the file.")
@@ -63,7 +59,7 @@ MOST_WORKERS = 4096  #: processes of a local cluster
     help="Keep finished runs in DIR, and continue from there.",
 )
 @click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw column NAME to the picture FILE.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz, .csv or .nc.")
+@file_option("--out", "Write results to FILE.npz, .csv or .nc.")
 def ensemble(
     work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
     seed: int, end: float | None,
@@ -94,7 +90,7 @@ def ensemble(
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
         raise incomplete("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
-    sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial), "parameters": {}, "inputs": {}}
+    sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial or {}), "parameters": {}, "inputs": {}}
     for name, column in values.items():
         kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
         sorted_values[kind][name] = column

