@@ -53,7 +53,7 @@ def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
     """A joint from its raw keys, whose faults are told elsewhere."""
     kind = JOINTS[type_name]
     given = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
-    return kind(**{key: None for key, field in kind.options.items() if field.required} | given)
+    return kind(**{key: field.default for key, field in kind.options.items()} | given)
 
 
 def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[Declared]:
@@ -172,9 +172,10 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
     for option in kind.options:
         if isinstance(fields[option], Scalar):  # its names are not all known yet
             options[option] = fields[option].absent(reader)
-        elif option in entry.values:
-            options[option] = fields[option].read(reader, f"{entry.path}.{option}", entry.values[option])
-    if options.get("rotation") == "euler_parameters" and "sequence" in options:
+        else:
+            value = entry.values.get(option, fields[option].default)
+            options[option] = fields[option].read(reader, f"{entry.path}.{option}", value)
+    if options.get("rotation") == "euler_parameters" and "sequence" in entry.values:
         remedy = "leave out sequence, or choose rotation: euler_angles"
         reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
     return kind(**options)

@@ -1,4 +1,4 @@
-# Written by python -m eomgen.describe.stubs from the tables of types.
+# Written by python tools/stubs.py from the tables of types.
 
 from collections.abc import Mapping, Sequence
 from typing import Any

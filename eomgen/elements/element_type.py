@@ -1,7 +1,8 @@
 """Elements, one type: its word in model files, its keys, and the function that makes an element of an entry.
 
 The tables of types (:data:`~eomgen.forces.FORCES` ...) drive the check of model files, their JSON Schema, the methods
-of Model and their documentation, so that a new type is one row, in the file of its class.
+of Model and their documentation, so that a new type is one row, in the file of its class.  The keys of most are fields
+of their class, which :func:`key` marks.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from .entry import Entry
-from .kinds import Choice, Fields
+from .kinds import Choice, Field, Fields
 
 
 class ElementType(NamedTuple):
@@ -56,3 +57,52 @@ Types = dict[str, ElementType]
 def table(*types: ElementType) -> Types:
     """Types by their names."""
     return {one.name: one for one in types}
+
+
+class Where(NamedTuple):
+    """What an element acts on: keys before and behind those of its law, and how they are read together."""
+
+    keys: Fields
+    read: Callable[[Entry], Any]  #: None where anything is at fault
+    behind: Mapping[str, Field] = {}
+    one_of: tuple[str, ...] = ()
+
+
+def key(field: Field) -> Any:
+    """A field of an element's class that is a key of its entries."""
+    return field
+
+
+def keys_of(element: type) -> Fields:
+    """The keys that are fields of a class, those of its bases first."""
+    fields = [(name, x) for base in reversed(element.__mro__) for name, x in vars(base).items()]
+    return {name: x for name, x in fields if isinstance(x, Field)}
+
+
+def element(
+    kind: type, name: str, doc: str, where: Where | None = None, keys: Fields | None = None, **more: Any
+) -> ElementType:
+    """The type of elements whose fields are read from their keys one by one, in this order.
+
+    Parameters
+    ----------
+    kind : type
+        The class: name, what it acts on (with ``where``), its keys.
+    name, doc : str
+        As of :class:`ElementType`.
+    where : Where, optional
+    keys : Fields, optional
+        Other keys for the same fields, in their order.
+    **more
+        What else an ElementType has.
+    """
+    own = keys_of(kind) if keys is None else keys
+
+    def read(e: Entry) -> Any:
+        values = [*([] if where is None else [where.read(e)]), *(e[one] for one in own)]
+        needed = [True] * (where is not None) + [x.required or x.default is not None for x in own.values()]
+        missing = any(value is None and need for value, need in zip(values, needed, strict=True))
+        return None if missing else kind(e.name, *values)
+
+    more = {"read": read, **({} if where is None else {"one_of": where.one_of}), **more}
+    return ElementType(name, doc, own if where is None else {**where.keys, **own, **where.behind}, **more)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..elements.dimensions import FORCE, PUSH
-from ..elements.element_type import ElementType, table
+from ..elements.element_type import ElementType, element, key, table
 from ..elements.entry import Entry
 from ..elements.kinds import LAW, Choice, MarkerReference, Scalar, Value, Vector
 from ..elements.looks import CYLINDER, ROUND_ARROW, Pull, Seen
@@ -15,21 +15,24 @@ from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, View
-from .paths import BETWEEN, ON_JOINT, Path, read_coordinate
-from .routes import VIA, read_joint_or_path
+from .paths import ON_JOINT, PathForce, read_coordinate
+from .routes import ANYWHERE
 
 
 @dataclass(frozen=True)
-class Actuator(Force):
+class Actuator(PathForce):
     """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
 
     sentence: ClassVar[str] = "A given force or torque $F$ (`value`) along its path of length or angle $s$."
     formula: ClassVar[str] = r"\delta W = F \delta s"
-    path: Path
-    value: Expr
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.value)
+    value: Expr = key(
+        Scalar(
+            "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
+            required=True,
+            level=LAW,
+            dimension=PUSH,
+        )
+    )
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self.value
@@ -43,15 +46,18 @@ def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
     return vec.times(view.rotation(marker), value) if axes == "body" else value
 
 
+_AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
+
+
 @dataclass(frozen=True)
 class PointForce(Force):
     """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
 
     sentence: ClassVar[str] = r"A given force $\mathbf{F}$ at the origin of a marker."
     formula: ClassVar[str] = r"\delta W = \mathbf{F}^T \delta \mathbf{r}"
-    marker: Marker
-    value: Vec3
-    axes: str = "ground"
+    marker: Marker = key(MarkerReference("marker at whose origin the force acts", required=True))
+    value: Vec3 = key(Vector("force (N)", required=True, level=LAW, dimension=FORCE))
+    axes: str = key(_AXES)
 
     def loads(self, view: View) -> list[Load]:
         force = _in_ground_axes(view, self.marker, self.value, self.axes)
@@ -79,20 +85,6 @@ class BodyTorque(Force):
         return [Pull(self.marker, self.value, self.axes == "body", turns=True)]
 
 
-_AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
-
-
-def _actuator(e: Entry) -> Force | None:
-    path, value = read_joint_or_path(e), e["value"]
-    return None if path is None else Actuator(e.name, path, value)
-
-
-def _force(e: Entry) -> Force | None:
-    value, axes = e.read("value", Vector), e["axes"]
-    marker = e["marker"]
-    return None if marker is None else PointForce(e.name, marker, value, axes)
-
-
 def _torque(e: Entry) -> Force | None:
     if "joint" in e.values:
         e.refuse("axes", "a torque on a joint's coordinate has no axes")
@@ -104,15 +96,10 @@ def _torque(e: Entry) -> Force | None:
 
 
 TYPES = table(
-    ElementType(
+    element(
+        PointForce,
         "force",
         "a force on a body, at the origin of a marker.",
-        {
-            "marker": MarkerReference("marker at whose origin the force acts", required=True),
-            "value": Vector("force (N)", required=True, level=LAW, dimension=FORCE),
-            "axes": _AXES,
-        },
-        _force,
         remedies={
             "marker": "for a force along a joint's coordinate use torque or actuator (N on a length, N m on an angle)"
         },
@@ -134,21 +121,10 @@ TYPES = table(
         _torque,
         one_of=("joint", "body"),
     ),
-    ElementType(
+    element(
+        Actuator,
         "actuator",
         "an actuator with a given force: on a joint's coordinate, or along the line or a path between two markers.",
-        {
-            "joint": ON_JOINT,
-            "between": BETWEEN,
-            "value": Scalar(
-                "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
-                required=True,
-                level=LAW,
-                dimension=PUSH,
-            ),
-            "via": VIA,
-        },
-        _actuator,
-        one_of=("joint", "between"),
+        ANYWHERE,
     ),
 )

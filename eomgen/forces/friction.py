@@ -13,15 +13,15 @@ from ..elements.kinds import LAW, Scalar
 from ..graph.core import Expr
 from ..records import dataclass
 from .dry_friction import LineFriction
-from .force import Force, Load, View
+from .force import Force, View
 from .friction_laws import FRICTION_CHOICE, has_bristles, read_friction
-from .paths import ON_JOINT, Path, read_coordinate
+from .paths import ON_JOINT, PathForce, read_coordinate
 from .reaction_friction import BY_REACTION, read_reaction_friction
 from .springs import Damper
 
 
 @dataclass(frozen=True)
-class JointFriction(Force):
+class JointFriction(PathForce):
     """Friction on a joint's coordinate of rate v (N or N m), such as -[c(v) tanh(v / smoothing) + viscous v].
 
     The tanh is the regularisation of Andersson, Soderberg and Bjorklund (2007), Tribol. Int. 40, 580-587.  It does not
@@ -29,7 +29,6 @@ class JointFriction(Force):
     """
 
     sentence: ClassVar[str] = "Friction in a joint: it opposes the rate $v$ of the coordinate."
-    path: Path
     law: LineFriction
 
     @property
@@ -42,9 +41,6 @@ class JointFriction(Force):
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return -self.law.along(rate)
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.along(*self.path.measure(view)))
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         return self.law.rates_along(self.path.measure(view)[1])

@@ -14,13 +14,13 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
 from ..records import dataclass
-from .force import Force, Load, View
-from .paths import BETWEEN, ON_JOINT, Path, read_angle
+from .force import Load, View
+from .paths import BETWEEN, ON_JOINT, Path, PathForce, read_angle
 from .routes import VIA, read_joint_or_path
 
 
 @dataclass(frozen=True)
-class GeneralElement(Force):
+class GeneralElement(PathForce):
     """A generalized force law(value, rate) - dV/dvalue along the path (N or N m).
 
     Positive pushes the ends apart or drives the coordinate.  ``value`` and ``rate`` are the symbols that stand in the
@@ -32,7 +32,6 @@ class GeneralElement(Force):
     )
     formula: ClassVar[str] = r"F = f(s,\dot{s})"
     uses_value: ClassVar[bool] = True
-    path: Path
     value: Expr
     rate: Expr
     law: Expr
@@ -50,9 +49,6 @@ class GeneralElement(Force):
     def drawn(self) -> list[Seen]:
         seen = self.path.drawn(LAW_BOX, LAW_RING)
         return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.along(*self.path.measure(view)))
 
     def potential(self, view: View) -> Expr | None:
         if self.energy.is_zero or not self.path.is_exact(view):

@@ -13,8 +13,8 @@ from ..elements.kinds import LAW, Scalar
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
-from .force import Force, Load, View
-from .paths import BETWEEN, Path
+from .force import View
+from .paths import BETWEEN, PathForce
 from .routes import VIA, read_path
 
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
@@ -71,7 +71,7 @@ class Activation:
 
 
 @dataclass(frozen=True)
-class Muscle(Force):
+class Muscle(PathForce):
     """A muscle and its rigid tendon, pulling the ends of its path together.
 
         tension = force_max [a fl(l) fv(v) + fp(l) + damping v] cos alpha
@@ -87,7 +87,6 @@ class Muscle(Force):
     )
     formula: ClassVar[str] = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
     uses_value: ClassVar[bool] = True
-    path: Path
     activation: Expr
     force_max: Expr
     fiber_length: Expr
@@ -118,9 +117,6 @@ class Muscle(Force):
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return -self.tension(value, rate)
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.along(*self.path.measure(view)))
 
 
 #: Optimal lengths of the fibres in which they shorten in a second, at most: De Groote and others (2016).

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from ..elements.element_type import Where
 from ..elements.entry import Entry
 from ..elements.kinds import JointReference, Pair
 from ..elements.looks import Drawn, Points
@@ -12,9 +13,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .force import CoordinateLoad, Load, MarkerLoad, View
+from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 
-#: Keys that say along what a force acts.
+#: Keys that say along what a force acts; :data:`COORDINATE` and :data:`ANGLE` read them.
 ON_JOINT = JointReference("a joint of one degree, or a coordinate")
 BETWEEN = Pair("two markers")
 
@@ -139,3 +140,19 @@ def read_angle(e: Entry) -> Path | None:
         return read_coordinate(e, angle=True)
     pair = e.pair()
     return None if pair is None else Turn(*pair)
+
+
+COORDINATE = Where({"joint": ON_JOINT.replace(required=True)}, read_coordinate)
+ANGLE = Where({"joint": ON_JOINT, "between": BETWEEN}, read_angle, one_of=("joint", "between"))
+
+
+@dataclass(frozen=True)
+class PathForce(Force):
+    """A force along a path: :meth:`along` says how large it is at a value and a rate of the path."""
+
+    path: Path
+
+    def loads(self, view: View) -> list[Load]:
+        value, rate = self.path.measure(view)
+        push = self.along(value, rate)
+        return [] if push is None else self.path.loads(view, push)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..elements.element_type import Where
 from ..elements.entry import Entry
 from ..elements.kinds import Via
 from ..elements.looks import Drawn, Points
@@ -15,7 +16,7 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 from .branches import where
 from .force import Load, MarkerLoad, View
-from .paths import Line, Path, read_coordinate
+from .paths import BETWEEN, ON_JOINT, Line, Path, read_coordinate
 
 PI = 3.141592653589793
 
@@ -215,3 +216,7 @@ def read_joint_or_path(e: Entry) -> Path | None:
     if "joint" in e.values and "via" in e.values:
         e.fault("via", "a force on a joint's coordinate has no path", "leave it out, or give between")
     return read_coordinate(e) if "joint" in e.values else read_path(e)
+
+
+LINE = Where({"between": BETWEEN.replace(required=True)}, read_path, {"via": VIA})
+ANYWHERE = Where({"joint": ON_JOINT, "between": BETWEEN}, read_joint_or_path, {"via": VIA}, ("joint", "between"))

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import ClassVar
 
 from ..elements.dimensions import DAMPING, ENERGY, LENGTH, NONE, REACH, STIFFNESS, TIME
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import element, key, keys_of, table
 from ..elements.kinds import LAW, Scalar
 from ..elements.looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..records import dataclass
-from .force import Force, Load, View
-from .paths import BETWEEN, ON_JOINT, Line, Path, read_angle, read_coordinate
-from .routes import VIA, read_path
+from .force import Load, View
+from .paths import ANGLE, COORDINATE, Line, PathForce
+from .routes import LINE
 
 
 @dataclass(frozen=True)
-class Spring(Force):
+class Spring(PathForce):
     """Linear spring: generalized force -k (s - s0) along the path (k in N/m or N m/rad).
 
     The law is conservative while k and s0 depend on parameters only, which the description checks.
@@ -31,16 +29,14 @@ class Spring(Force):
     )
     formula: ClassVar[str] = r"F = -k (s - s_0), \quad V = \frac{1}{2} k (s - s_0)^2"
     uses_value: ClassVar[bool] = True
-    path: Path
-    stiffness: Expr
-    rest: Expr
+    stiffness: Expr = key(Scalar("stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS))
+    rest: Expr = key(Scalar("value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH))
 
     def loads(self, view: View) -> list[Load]:
         if isinstance(self.path, Line) and self.rest.is_zero:
             # linear in the distance, so that the markers may meet
             return self.path.pair(view, vec.scale(-self.stiffness, self.path.reach(view)))
-        value, rate = self.path.measure(view)
-        return self.path.loads(view, self.push(value, rate))
+        return super().loads(view)
 
     def push(self, value: Expr, rate: Expr) -> Expr:
         return -self.stiffness * (value - self.rest)
@@ -60,7 +56,7 @@ class Spring(Force):
 
 
 @dataclass(frozen=True)
-class Damper(Force):
+class Damper(PathForce):
     """Viscous damper: generalized force -c s' along the path (c in N s/m or N m s/rad)."""
 
     sentence: ClassVar[str] = (
@@ -68,12 +64,7 @@ class Damper(Force):
         "with the factor $c$ (`damping`)."
     )
     formula: ClassVar[str] = r"F = -c \dot{s}"
-    path: Path
-    damping: Expr
-
-    def loads(self, view: View) -> list[Load]:
-        value, rate = self.path.measure(view)
-        return self.path.loads(view, self.push(value, rate))
+    damping: Expr = key(Scalar("damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING))
 
     def push(self, value: Expr, rate: Expr) -> Expr:
         return -self.damping * rate
@@ -82,81 +73,36 @@ class Damper(Force):
         return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
 
 
-_STIFFNESS = Scalar("stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS)
-_TURNING_STIFFNESS = _STIFFNESS.replace(dimension=ENERGY)
-_DAMPING = Scalar("damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING)
-_TURNING_DAMPING = _DAMPING.replace(dimension=ENERGY.times(TIME))
-_MARKERS = BETWEEN.replace(required=True)
-_COORDINATE = ON_JOINT.replace(required=True)
-_ANGLE = {"joint": ON_JOINT, "between": BETWEEN}
-
-
-def _spring(path: Callable[[Entry], Path | None], rest: str) -> Callable[[Entry], Spring | None]:
-    def read(e: Entry) -> Spring | None:
-        where, stiffness, length = path(e), e["stiffness"], e[rest]
-        return None if where is None else Spring(e.name, where, stiffness, length)
-
-    return read
-
-
-def _damper(path: Callable[[Entry], Path | None]) -> Callable[[Entry], Damper | None]:
-    def read(e: Entry) -> Damper | None:
-        where, damping = path(e), e["damping"]
-        return None if where is None else Damper(e.name, where, damping)
-
-    return read
-
+_TURNING_STIFFNESS = keys_of(Spring)["stiffness"].replace(dimension=ENERGY)
+_TURNING_DAMPING = keys_of(Damper)["damping"].replace(dimension=ENERGY.times(TIME))
+_LENGTH = Scalar("free length (m), at which the force is 0", default=0, dimension=LENGTH)
+_ANGLE = Scalar("angle (rad) at which the torque is 0", default=0, dimension=NONE)
 
 TYPES = table(
-    ElementType(
+    element(
+        Spring,
         "spring",
         "a linear spring between two markers, or along a path over markers and cylinders.",
-        {
-            "between": _MARKERS,
-            "stiffness": _STIFFNESS,
-            "length": Scalar("free length (m), at which the force is 0", default=0, dimension=LENGTH),
-            "via": VIA,
-        },
-        _spring(read_path, "length"),
+        LINE,
+        {"stiffness": keys_of(Spring)["stiffness"], "length": _LENGTH},
     ),
-    ElementType(
-        "damper",
-        "a viscous damper between two markers, or along a path over markers and cylinders.",
-        {"between": _MARKERS, "damping": _DAMPING, "via": VIA},
-        _damper(read_path),
+    element(
+        Damper, "damper", "a viscous damper between two markers, or along a path over markers and cylinders.", LINE
     ),
-    ElementType(
+    element(
+        Spring,
         "torsional_spring",
         "a linear torsional spring on an angle: of a joint, or of the second marker about the z axis of the first.",
-        {
-            **_ANGLE,
-            "stiffness": _TURNING_STIFFNESS,
-            "angle": Scalar("angle (rad) at which the torque is 0", default=0, dimension=NONE),
-        },
-        _spring(read_angle, "angle"),
-        one_of=("joint", "between"),
+        ANGLE,
+        {"stiffness": _TURNING_STIFFNESS, "angle": _ANGLE},
     ),
-    ElementType(
+    element(
+        Damper,
         "torsional_damper",
         "a viscous torsional damper on an angle: of a joint, or of the second marker about the z axis of the first.",
-        {**_ANGLE, "damping": _TURNING_DAMPING},
-        _damper(read_angle),
-        one_of=("joint", "between"),
+        ANGLE,
+        {"damping": _TURNING_DAMPING},
     ),
-    ElementType(
-        "joint_spring",
-        "a linear spring on one coordinate of a joint, an angle or a length.",
-        {
-            "joint": _COORDINATE,
-            "stiffness": _STIFFNESS,
-            "rest": Scalar("value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH),
-        },
-        _spring(read_coordinate, "rest"),
-    ),
-    ElementType(
-        "joint_damper",
-        "a viscous damper on one coordinate of a joint, an angle or a length.",
-        {"joint": _COORDINATE, "damping": _DAMPING},
-        _damper(read_coordinate),
-    ),
+    element(Spring, "joint_spring", "a linear spring on one coordinate of a joint, an angle or a length.", COORDINATE),
+    element(Damper, "joint_damper", "a viscous damper on one coordinate of a joint, an angle or a length.", COORDINATE),
 )

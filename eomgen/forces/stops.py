@@ -12,13 +12,13 @@ from ..elements.kinds import Scalar
 from ..elements.looks import STOP, Seen
 from ..graph.core import Expr
 from ..records import dataclass
-from .force import Force, Load, View
+from .force import Load, View
 from .normal_laws import NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
-from .paths import ON_JOINT, Path, read_coordinate
+from .paths import ON_JOINT, PathForce, read_coordinate
 
 
 @dataclass(frozen=True)
-class JointStop(Force):
+class JointStop(PathForce):
     """Stops of a joint's coordinate q: beyond ``lower`` or ``upper`` a one-sided force pushes it back (N or N m).
 
     Penetrations are q - upper and lower - q.  A stop never pulls.
@@ -28,7 +28,6 @@ class JointStop(Force):
         "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
     )
     uses_value: ClassVar[bool] = True
-    path: Path
     lower: Expr | None
     upper: Expr | None
     law: NormalLaw
@@ -55,9 +54,6 @@ class JointStop(Force):
     def drawn(self) -> list[Seen]:
         ends = tuple(x for x in (self.lower, self.upper) if x is not None)
         return [self.path.drawn((), STOP)._replace(walls=ends)]
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.along(*self.path.measure(view)))
 
     def potential(self, view: View) -> Expr | None:
         total = view.graph.zero

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
-from ..elements.kinds import MOTION, Fields, Vector, ref
+from ..elements.element_type import key
+from ..elements.kinds import MOTION, Vector, ref
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -126,9 +127,8 @@ class CurveSlider(Guide):
     )
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
     type_name: ClassVar[str] = "curve_slider"
-    options: ClassVar[Fields] = {"curve": CURVE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
-    curve: Shape
+    curve: Shape = key(CURVE)
 
     @property
     def shape(self) -> Shape:
@@ -144,9 +144,8 @@ class SurfaceSlider(Guide):
     )
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
     type_name: ClassVar[str] = "surface_slider"
-    options: ClassVar[Fields] = {"surface": SURFACE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ON_SURFACE
-    surface: Shape
+    surface: Shape = key(SURFACE)
 
     @property
     def shape(self) -> Shape:
@@ -163,10 +162,9 @@ class PointOnCurve(TurningGuide):
     sentence: ClassVar[str] = "The origin of S slides along a curve of P, and S turns freely."
     formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1)"
     type_name: ClassVar[str] = "point_on_curve"
-    options: ClassVar[Fields] = {"curve": CURVE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ALONG_CURVE, *ANGLES)
-    curve: Shape
-    sequence: str = "xyz"
+    curve: Shape = key(CURVE)
+    sequence: str = key(SEQUENCE)
 
     @property
     def shape(self) -> Shape:
@@ -180,10 +178,9 @@ class PointOnSurface(TurningGuide):
     sentence: ClassVar[str] = "The origin of S slides on a surface of P, and S turns freely."
     formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
     type_name: ClassVar[str] = "point_on_surface"
-    options: ClassVar[Fields] = {"surface": SURFACE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ON_SURFACE, *ANGLES)
-    surface: Shape
-    sequence: str = "xyz"
+    surface: Shape = key(SURFACE)
+    sequence: str = key(SEQUENCE)
 
     @property
     def shape(self) -> Shape:

@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 
 from ..base.value_rules import NOT_NEGATIVE
 from ..elements import dimensions
+from ..elements.element_type import keys_of
 from ..elements.kinds import Choice, Fields, Scalar
 from ..elements.looks import JointLook
 from ..graph.core import Expr, Graph
@@ -86,7 +87,7 @@ class Joint(ABC):
     type_name : the word in model files and the Model's method
     has_axis : whether ``axis=`` is accepted
     has_axes : whether ``axes=``, directions of x and y, is accepted instead
-    options : further keys of this type, which are fields of the dataclass
+    options : further keys of this type: the fields that :func:`~eomgen.elements.element_type.key` marks
     coordinates : the coordinates, in order
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
@@ -108,6 +109,9 @@ class Joint(ABC):
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
     quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
     look: ClassVar[JointLook] = JointLook()
+
+    def __init_subclass__(cls) -> None:
+        cls.options = keys_of(cls)
 
     @property
     def velocities(self) -> tuple[Velocity, ...]:

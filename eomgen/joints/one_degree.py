@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.dimensions import LENGTH
-from ..elements.kinds import Fields, Scalar
+from ..elements.element_type import key
+from ..elements.kinds import Scalar
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
@@ -90,17 +91,16 @@ class Screw(Joint):
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True
     )
-    options: ClassVar[Fields] = {
-        "pitch": Scalar(
+    counts_turns: ClassVar[bool] = True
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+    pitch: Expr = key(
+        Scalar(
             "advance of S per turn (m), negative for a left-handed thread",
             required=True,
             not_zero="give a pitch other than 0; a screw without advance is a revolute joint",
             dimension=LENGTH,
         )
-    }
-    counts_turns: ClassVar[bool] = True
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
-    pitch: Expr
+    )
 
     @property
     def lead(self) -> Expr:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.kinds import Fields
+from ..elements.element_type import key
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -57,9 +57,8 @@ class Distance(RodJoint):
         (SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True
     )
     has_axis: ClassVar[bool] = False
-    options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 1
-    length: Expr
+    length: Expr = key(LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         return [apart(self.length, position)]
@@ -75,9 +74,8 @@ class RevoluteSpherical(RodJoint):
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True
     )
-    options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 2
-    length: Expr
+    length: Expr = key(LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         return [apart(self.length, position), *along(position, "z")]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.kinds import Choice, Fields
+from ..elements.element_type import key
+from ..elements.kinds import Choice
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -35,10 +36,9 @@ class RotatingJoint(Joint):
     """
 
     has_axis: ClassVar[bool] = False
-    options: ClassVar[Fields] = {"sequence": SEQUENCE, "rotation": ROTATION}
     place: ClassVar[tuple[Coordinate, ...]] = ()
-    sequence: str = "xyz"
-    rotation: str = "euler_angles"
+    sequence: str = key(SEQUENCE)
+    rotation: str = key(ROTATION)
 
     def __post_init__(self) -> None:
         if self.in_parameters:

@@ -1,6 +1,6 @@
-"""Stage describe, stubs: the tables of types -> element_methods.pyi, for editors and type checkers.
+"""The tables of types -> eomgen/describe/element_methods.pyi, for editors and type checkers.
 
-``python -m eomgen.describe.stubs`` writes it anew; a test holds it to the tables.  It has the first sentence of each
+``python tools/stubs.py`` writes it anew; ``make lint`` compares it with the tables.  It has the first sentence of each
 method; ``help(Model.spring)`` has the rest.
 """
 
@@ -10,12 +10,13 @@ import textwrap
 from inspect import Parameter, cleandoc
 from pathlib import Path
 
-from ..elements.element_type import ElementType
-from .element_methods import ElementMethods, tables
-from .methods import arguments_of, documentation_of
+from eomgen.describe import element_methods
+from eomgen.describe.element_methods import ElementMethods, tables
+from eomgen.describe.methods import arguments_of, documentation_of
+from eomgen.elements.element_type import ElementType
 
-HOME = Path(__file__).with_name("element_methods.pyi")
-_HEAD = '''# Written by python -m eomgen.describe.stubs from the tables of types.
+HOME = Path(element_methods.__file__).with_suffix(".pyi")
+_HEAD = '''# Written by python tools/stubs.py from the tables of types.
 
 from collections.abc import Mapping, Sequence
 from typing import Any

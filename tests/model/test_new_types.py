@@ -1,0 +1,187 @@
+"""A force, a joint, a constraint and a kind of key that are added from outside, each by one class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.base.value_rules import POSITIVE
+from eomgen.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
+from eomgen.describe import schema
+from eomgen.elements.dimensions import LENGTH, STIFFNESS
+from eomgen.elements.element_type import element, key
+from eomgen.elements.kinds import MarkerReference, Scalar
+from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
+from eomgen.forces import FORCES, View
+from eomgen.forces.paths import PathForce
+from eomgen.forces.routes import LINE
+from eomgen.frames import Marker
+from eomgen.graph import vectors as vec
+from eomgen.graph.core import Expr, Graph
+from eomgen.graph.vectors import Mat3, Vec3
+from eomgen.joints import JOINTS, Closure, Coordinate, Joint
+from eomgen.records import dataclass
+
+
+class Percent(Scalar):
+    """A number of hundredths."""
+
+    argument, annotation = "hundredths", "float"
+    schema: ClassVar[dict[str, Any]] = {"type": "number", "minimum": 0}
+
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
+        return reader.graph.constant(reader.number(path, value, positive=True) or 1.0) / 100.0
+
+
+@dataclass(frozen=True)
+class HardeningSpring(PathForce):
+    """Force -f (k s + k3 s^3) of the distance s."""
+
+    sentence: ClassVar[str] = "A spring that hardens by the third power of its length."
+    formula: ClassVar[str] = r"F = -f (k s + k_3 s^3)"
+    stiffness: Expr = key(Scalar("stiffness (N/m)", required=True, dimension=STIFFNESS, allowed=POSITIVE))
+    hardening: Expr = key(Scalar("stiffness per squared length (N/m^3)", default=0))
+    share: Expr = key(Percent("of both, what acts", default=100))
+
+    def push(self, value: Expr, rate: Expr) -> Expr:
+        return -self.share * (self.stiffness * value + self.hardening * value**3)
+
+    def potential(self, view: View) -> Expr:
+        s, _ = self.path.measure(view)
+        return self.share * (0.5 * self.stiffness * s**2 + 0.25 * self.hardening * s**4)
+
+    def drawn(self) -> list[Seen]:
+        return [self.path.drawn(COIL, SPIRAL)]
+
+
+@dataclass(frozen=True)
+class Slanted(Joint):
+    """S slides along z and, by ``slope``, along x of P.  Allows 1, removes 5."""
+
+    sentence: ClassVar[str] = "S slides on a slope of P."
+    formula: ClassVar[str] = r"\mathbf{u} = q (\mathbf{e}_{z} + m \mathbf{e}_{x})"
+    type_name: ClassVar[str] = "slanted"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.0, 2.0, 2.0)),))
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+    slope: Expr = key(Scalar("x for each z", required=True))
+
+    def _along(self, graph: Graph) -> Vec3:
+        return (self.slope, graph.zero, graph.one)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), vec.scale(q[0], self._along(graph))
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), self._along(graph))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        raise TypeError("is not cut here")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2]]
+
+
+@dataclass(frozen=True)
+class Level(Constraint):
+    """A marker stays at a height over ground."""
+
+    sentence: ClassVar[str] = "The marker stays at the height $h$."
+    formula: ClassVar[str] = r"z = h"
+    type_name: ClassVar[str] = "level"
+    marker: Marker = key(MarkerReference("marker that stays at the height", required=True))
+    height: Expr = key(Scalar("height (m)", default=0, dimension=LENGTH))
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        return [Condition("height", view.position(self.marker)[2] - self.height, "length")]
+
+
+@pytest.fixture(autouse=True)
+def added(monkeypatch: pytest.MonkeyPatch) -> None:
+    spring = element(HardeningSpring, "hardening_spring", "a spring that hardens.", LINE)
+    monkeypatch.setitem(FORCES, "hardening_spring", spring)
+    monkeypatch.setitem(JOINTS, "slanted", Slanted)
+    monkeypatch.setitem(CONSTRAINTS, "level", element(Level, "level", "a marker that stays at a height."))
+
+
+def sprung() -> eg.Model:
+    m = eg.Model("sprung")
+    block = m.body("block", mass=2.0)
+    m.prismatic("s", m.ground, block, axis="x")
+    m.hardening_spring("k", m.ground, block, stiffness="k", hardening=3.0, share=50)
+    m.parameter("k", 5.0, unit="N/m")
+    m.initial(s=0.7)
+    return m
+
+
+def test_a_force_acts_by_its_law() -> None:
+    mod = sprung().compile(target="numpy")
+    s = 0.7
+    np.testing.assert_allclose(mod.rhs(0.0, [s, 0.0]), [0.0, -0.5 * (5.0 * s + 3.0 * s**3) / 2.0], rtol=1e-14)
+    np.testing.assert_allclose(mod.energy([s, 0.0])[1], 0.5 * (2.5 * s**2 + 0.75 * s**4), rtol=1e-14)
+
+
+def test_its_method_file_schema_and_documentation_follow() -> None:
+    m = sprung()
+    text = m.to_yaml()
+    assert "k: {type: hardening_spring, between: [ground, block], stiffness: k, hardening: 3.0, share: 50}" in text
+    assert "share : hundredths, optional" in m.hardening_spring.__doc__
+    assert "Add a spring that hardens." in m.hardening_spring.__doc__
+    found = next(
+        one for one in schema.model_schema()["properties"]["forces"]["additionalProperties"]["oneOf"]
+        if one["properties"]["type"] == {"const": "hardening_spring"}
+    )  # fmt: skip
+    assert found["properties"]["share"] == {
+        "type": "number", "minimum": 0, "default": 100, "description": "of both, what acts",
+    }  # fmt: skip
+    assert found["required"] == ["type", "between", "stiffness"]
+    assert "A spring that hardens by the third power" in m.derive().explain().markdown
+    assert m.draw() is not None
+
+
+@pytest.mark.parametrize(
+    ("keys", "code", "path"),
+    [
+        ({"stiffness": "k*a"}, "EG-DIMENSION", "forces.k.stiffness"),
+        ({"stiffness": -1.0}, "EG-RANGE", "forces.k.stiffness"),
+        ({"stiffness": 1.0, "share": "much"}, "EG-REFERENCE", "forces.k.share"),
+    ],
+)
+def test_its_keys_are_judged_by_their_kinds(keys: dict[str, Any], code: str, path: str) -> None:
+    m = sprung()
+    m.parameter("a", 1.0, unit="m")
+    m.parameter("much", 1.0)
+    m.description.sections["forces"][0].values.update(keys)
+    with pytest.raises(eg.ModelError) as error:
+        m.check()
+    assert (path, code) in [(problem.path, problem.code) for problem in error.value.problems]
+
+
+def test_a_joint_moves_as_it_says_and_reads_its_key() -> None:
+    m = eg.Model("slope", gravity=(0, 0, -10))
+    block = m.body("block", mass=1.0)
+    joint = m.slanted("s", m.ground, block, slope="2*h")
+    m.parameter("h", 0.5)
+    assert "slope : scalar" in m.slanted.__doc__
+    mod = m.compile(target="numpy")
+    np.testing.assert_allclose(mod.rhs(0.0, [0.0, 0.0])[1], -5.0, rtol=1e-14)  # g / (1 + slope^2)
+    assert joint.coordinate_names == ("s",)
+    assert "S slides on a slope of P" in m.derive().explain().markdown
+
+
+def test_a_constraint_holds_what_it_says(tmp_path: Path) -> None:
+    m = eg.Model("level")
+    block = m.body("block", mass=1.0, inertia=(1, 1, 1))
+    m.translational("t", m.ground, block)
+    m.level("flat", block, height=0.25)
+    mod = m.compile(target="numpy")
+    x = mod.x0()
+    np.testing.assert_allclose(x[2], 0.25, atol=1e-12)
+    assert mod.rhs(0.0, x)[5] == pytest.approx(0.0, abs=1e-12)
+    assert "The marker stays at the height" in m.derive().explain().markdown
+    m.save(tmp_path / "level.yaml")
+    assert eg.load(tmp_path / "level.yaml").to_yaml() == m.to_yaml()
