@@ -15,7 +15,6 @@ from .description import SECTIONS, Description
 from .dotted_names import undotted
 from .fields import MODEL, SHORT, fields_of
 from .sympy_face import is_sympy, name_of
-from .write_equations import with_intermediates
 from .write_markers import with_named_markers
 from .yaml_nodes import scalar
 
@@ -52,6 +51,8 @@ def yaml_text(description: Description) -> str:
         elif key in description.values:
             value = description.values[key]
             if key == "equations" and isinstance(value, Mapping):
+                from .sympy_text import with_intermediates
+
                 value = with_intermediates(value)
             if key in ("lagrangian", "equations") and value is not None:
                 lines += [f"{key}:", *(f"  {_key(k)}: {_value(v, functions)}" for k, v in value.items())]

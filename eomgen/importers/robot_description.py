@@ -448,13 +448,7 @@ def _turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:
 def _describe_tie(tie: Tie, coordinates: Mapping[str, str], locked: Mapping[str, float]) -> dict[str, Any] | None:
     """The keys of a coupling, a linear one by its factors; None where no joint is left to tie.
 
-    Parameters
-    ----------
-    tie : Tie
-    coordinates : mapping
-        Joint -> coordinate, of joints that move.
-    locked : mapping
-        Joint -> value at which it is held.
+    ``coordinates`` has those of joints that move, ``locked`` the values of the others.
     """
     (left, y), (right, x) = (_collect(s, coordinates, locked) for s in (tie.left, tie.right))
     _, slope, *higher = (*tie.law, 0.0, 0.0)

@@ -184,20 +184,10 @@ def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]
 
 
 def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:
-    """Which rows of ``forms.motion`` are not derivatives of the configuration constraints nor follow from others.
+    """Which rows of ``forms.motion`` do not follow from others or from the configuration constraints.
 
-    Judged on the graph at a generic place, where rows depend on each other only if they do everywhere.
-
-    Returns
-    -------
-    kept : list of int
-    independent : bool
-        Whether those and the configuration constraints are independent of each other.
-
-    Raises
-    ------
-    ModelError
-        A constraint contradicts the others.
+    And whether these rows and the configuration constraints are independent of each other.  Judged on the graph at a
+    generic place, where rows depend on each other only if they do everywhere.
     """
     if not forms.motion and not forms.configuration:
         return [], True

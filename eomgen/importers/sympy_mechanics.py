@@ -47,14 +47,11 @@ def read_forms(method: Any) -> Forms:
     """
     from sympy.physics.mechanics import JointsMethod, KanesMethod, LagrangesMethod, System
 
-    if isinstance(method, System):
-        if method.eom_method is None:
-            raise incomplete("the System has no equations yet; call form_eoms() on it first")
-        return read_forms(method.eom_method)
-    if isinstance(method, JointsMethod):
-        if method.method is None:
-            raise incomplete("the JointsMethod has no equations yet; call form_eoms() on it first")
-        return read_forms(method.method)
+    for kind, part in ((System, "eom_method"), (JointsMethod, "method")):
+        if isinstance(method, kind):
+            if (inner := getattr(method, part)) is None:
+                raise incomplete(f"the {kind.__name__} has no equations yet; call form_eoms() on it first")
+            return read_forms(inner)
     if isinstance(method, KanesMethod):
         return _read_kane(method)
     if isinstance(method, LagrangesMethod):
@@ -215,25 +212,9 @@ def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[
     """The noncontributing forces, solved from the equations of the auxiliary speeds A F + B u' + c = 0.
 
     They are replaced in the equations of motion M u' = f + G F.  Where they depend on u' (B is not 0), F follows from
-    (A + B M^-1 G) F = -(c + B M^-1 f), so that M stays symmetric.
-
-    Parameters
-    ----------
-    forms : Forms
-    given : collection of str
-        Names that are no such forces: coordinates, speeds, inputs.
-    constants : collection of str
-        Names of constants that have a value.
-
-    Returns
-    -------
-    dict
-        SymPy's function or symbol of each force -> its expression, in q, u and u'.
-
-    Raises
-    ------
-    ModelError
-        The forces do not follow from the equations.
+    (A + B M^-1 G) F = -(c + B M^-1 f), so that M stays symmetric.  No such forces are the names of ``given``
+    (coordinates, speeds, inputs) and of ``constants`` with a value.  The result has the expression of each force in q,
+    u and u', by its function or symbol.
     """
     import sympy
     from sympy.solvers.solveset import NonlinearError
