@@ -24,11 +24,11 @@ ROOMS = {
     "mechanics": "constraints derivation equations frames joints kinematics rotations solids",
     "forces": "elements forces",
     "runs": "analysis ensembles identification runtime simulation",
-    "model": "base describe loading robots",
+    "model": "base describe importers loading",
     "code": "base codegen compilation device generation layer targets",
     "shown": "base cli explain printing reading show",
     "core": "alone base graph numeric pipeline records simplify syntax_trees verification",
-    "attack": "base describe robots",
+    "attack": "base describe importers",
 }
 #: Scripts that made reference numbers with other programs, which need not be installed.
 collect_ignore_glob = ["reference/*.py"]
