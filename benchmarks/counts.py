@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.codegen.loops.block_groups import USUAL
+from eomgen.codegen.program import USUAL
 from eomgen.equations import METHODS
 from eomgen.equations.reduction import reduce_to_independent
 from eomgen.graph.count import count

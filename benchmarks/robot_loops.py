@@ -13,7 +13,7 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.codegen.loops.block_groups import REGULAR, USUAL
+from eomgen.codegen.program import REGULAR, USUAL
 from eomgen.graph.count import Operations
 
 from .call import compile_call_loop, over_kernel

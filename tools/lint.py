@@ -26,7 +26,7 @@ SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
     "numeric/closure.py": {1e-8},
-    "codegen/loops/loop_blocks.py": {1e-100},
+    "codegen/loop_systems.py": {1e-100},
     "importers/robot.py": {1e-11},
     "rotations/quaternions.py": {1e-4},
     "verification/digits.py": {1e-6},

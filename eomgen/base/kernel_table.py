@@ -53,6 +53,8 @@ class Kernel(NamedTuple):
         What the result is, one line for headers and documentation.
     late : bool or str
         Left out of a module made in this process until one of those with the same value is called; never of an export.
+    absent : bool
+        Whether models where a size of the result is 0 are without it, as they are without late ones.
     """
 
     name: str
@@ -60,6 +62,12 @@ class Kernel(NamedTuple):
     shape: Callable[[Sizes], tuple[int, ...]]
     result: str
     late: bool | str = False
+    absent: bool = False
+
+    @property
+    def optional(self) -> bool:
+        """Whether a model has it only if no size of its result is 0."""
+        return self.absent or bool(self.late)
 
     def length(self, sizes: Sizes) -> int:
         """How many numbers ``x`` has."""
@@ -95,15 +103,16 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel("coordinate_slopes", ("q",), lambda s: (s.n_coordinate_slopes, s.n_q),
-           "dC/dq of holonomic rows where q' is given"),
+           "dC/dq of holonomic rows where q' is given", absent=True),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows, nonholonomic ones last"),
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
     Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
-    Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events"),
+    Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events", absent=True),
     Kernel("resets", ("q", "v"), lambda s: (s.n_resets,),
-           "new values of states after events, in the order of `resets`"),
-    Kernel("held_errors", ("q", "v"), lambda s: (s.n_held,), "errors and their rates of equations that are closed now"),
+           "new values of states after events, in the order of `resets`", absent=True),
+    Kernel("held_errors", ("q", "v"), lambda s: (s.n_held,), "errors and their rates of equations that are closed now",
+           absent=True),
     Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
         "event_derivatives", ("q", "v"),

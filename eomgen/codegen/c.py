@@ -22,8 +22,8 @@ from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
-from .held_states import held_tables
-from .loops.loop_blocks import LARGE
+from .loop_systems import LARGE
+from .pair_sums import held_tables
 from .program import Block, Program
 from .series import NoSeriesError
 from .single_precision import in_single_precision, refuse_double

@@ -11,8 +11,7 @@ from typing import Any
 
 from .c_text import Printed, used_helpers, with_pieces
 from .files import render
-from .loops.block_groups import REGULAR, USUAL
-from .program import Block, Program
+from .program import REGULAR, USUAL, Block, Program
 
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")

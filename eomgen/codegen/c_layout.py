@@ -8,11 +8,9 @@ from itertools import accumulate
 from typing import Any
 
 from ..layer import SOLVER_HEADERS, read_header
-from .held_states import held_areas
-from .loops.block_groups import SHIFTS
-from .loops.loop_slopes import BY_BODIES
-from .pair_sums import kept_of, sums_again
-from .program import Block, Program
+from .loop_slopes import BY_BODIES
+from .pair_sums import held_areas, kept_of, sums_again
+from .program import SHIFTS, Block, Program
 
 
 def is_straight(program: Program) -> bool:

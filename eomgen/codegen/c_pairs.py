@@ -16,8 +16,19 @@ from ..numeric.polygon_edges import OTHER, OWN
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render
-from .held_states import HELD_RECORD, held_room, is_held
-from .pair_sums import SumAgain, UsedSum, placed_length, plain_numbers, record_of, slots_of, sums_again, used_sums
+from .pair_sums import (
+    HELD_RECORD,
+    SumAgain,
+    UsedSum,
+    held_room,
+    is_held,
+    placed_length,
+    plain_numbers,
+    record_of,
+    slots_of,
+    sums_again,
+    used_sums,
+)
 from .program import Program
 from .statements import cut
 
@@ -27,19 +38,10 @@ Row = tuple[int, ...]
 
 
 class RowRun(NamedTuple):
-    """Some rows that come several times, each time further by steps of their own.
+    """Some rows that come several times, each time further by steps of their own."""
 
-    Attributes
-    ----------
-    rows : sequence of tuple of int
-        Those of the first time.
-    steps : sequence of tuple of int
-        By how much each is further the next time; empty if the rows come once.
-    times : int
-    """
-
-    rows: Sequence[Row]
-    steps: Sequence[Row]
+    rows: Sequence[Row]  #: those of the first time
+    steps: Sequence[Row]  #: by how much each is further the next time; empty if the rows come once
     times: int
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from copy import copy
 from functools import cached_property
 
@@ -12,16 +12,12 @@ from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
-from ..records import dataclass
-from .collect import collect_terms
 from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
-from .loops.body_loops import BodyLoops
-from .loops.embedded_loops import EmbeddedLoops
-from .loops.loop_blocks import LoopBlocks, estimate
+from .loop_systems import BodyLoops, EmbeddedLoops, LoopBlocks, estimate
 from .program import Limits
+from .terms import SystemTerms
 
 
-@dataclass(frozen=True)
 class Choice:
     """What ``auto`` took and why.
 
@@ -30,42 +26,23 @@ class Choice:
     method : str
     operations : mapping of str to int
         Multiplications, additions and divisions of the right-hand side by each method compared; of ``embedding`` only
-        those of the factorisation where they alone are more than all of ``recursive``.  Counted when they are read:
-        where only one method is left nothing depends on them.
+        those of the factorisation where they alone are more than all of ``recursive``.  Counted when they are read
+        where only one method is left, as nothing depends on them then.
     """
 
-    method: str
-    operations: Mapping[str, int]
+    def __init__(self, method: str, counted: dict[str, int] | Callable[[], dict[str, int]]) -> None:
+        self.method, self._counted = method, counted
+
+    @cached_property
+    def operations(self) -> dict[str, int]:
+        return self._counted() if callable(self._counted) else self._counted
+
+    def __reduce__(self) -> tuple[type[Choice], tuple[str, dict[str, int]]]:
+        return Choice, (self.method, self.operations)
 
     def __str__(self) -> str:
         counts = ", ".join(f"{method} {n}" for method, n in self.operations.items())
         return f"{self.method} chosen; operations of the right-hand side: {counts}"
-
-
-class CountedLater(Mapping[str, int]):
-    """Operations that are counted when they are first read; copies and pickles hold plain numbers."""
-
-    def __init__(self, counted: Callable[[], dict[str, int]]) -> None:
-        self._counted = counted
-
-    @cached_property
-    def _found(self) -> dict[str, int]:
-        return self._counted()
-
-    def __getitem__(self, method: str) -> int:
-        return self._found[method]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
-
-    def __len__(self) -> int:
-        return len(self._found)
-
-    def __repr__(self) -> str:
-        return repr(self._found)
-
-    def __reduce__(self) -> tuple[type[dict[str, int]], tuple[dict[str, int]]]:
-        return dict, (self._found,)
 
 
 def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
@@ -88,7 +65,7 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     embedding = None
     if not mobility.n_dof or factors <= Limits().unrolled_loops:
         embedding = METHODS["embedding"](kinematics)
-        embedded = EmbeddedLoops(collect_terms(kinematics, mobility, embedding))
+        embedded = EmbeddedLoops(SystemTerms(kinematics, mobility, embedding))
         if not mobility.n_dof or not embedded.determined:
             return embedding, None
         operations["embedding"] = _count(embedded)
@@ -96,11 +73,11 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     if not has_long_paths(kinematics.parent):
         embedding = embedding or METHODS["embedding"](kinematics)
         recursive = _with_shorter(recursive, embedding)
-    bodies = BodyLoops(collect_terms(kinematics, mobility, recursive))
+    bodies = BodyLoops(SystemTerms(kinematics, mobility, recursive))
     if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
     if "embedding" not in operations:
-        return recursive, Choice("recursive", CountedLater(lambda: {"recursive": _count(bodies)}))
+        return recursive, Choice("recursive", lambda: {"recursive": _count(bodies)})
     operations["recursive"] = _count(bodies)
     assert embedding is not None
     chosen = embedding if operations["embedding"] <= operations["recursive"] else recursive

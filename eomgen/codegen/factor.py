@@ -18,19 +18,11 @@ LONG = 24  #: velocities on the way to ground, on average, with which a mass mat
 
 @dataclass(frozen=True)
 class Factor:
-    """M = L^T D L.
+    """M = L^T D L."""
 
-    Attributes
-    ----------
-    lower : tuple of dict
-        Row i: {j: L[i, j]} for j on the path from i to ground.
-    pivots, reciprocals : tuple of Expr
-        D and 1 / D.
-    """
-
-    lower: tuple[dict[int, Expr], ...]
-    pivots: tuple[Expr, ...]
-    reciprocals: tuple[Expr, ...]
+    lower: tuple[dict[int, Expr], ...]  #: row i: {j: L[i, j]} for j on the path from i to ground
+    pivots: tuple[Expr, ...]  #: D
+    reciprocals: tuple[Expr, ...]  #: 1 / D
 
 
 def path(parent: Sequence[int], index: int) -> list[int]:
@@ -129,24 +121,25 @@ def _larger(a: Expr, b: Expr) -> Expr:
     return a.graph.apply("select", a.graph.apply("lt", a, b), b, a)
 
 
-def factoring_operations(parent: Sequence[int]) -> int:
-    """Operations of L^T D L and one solution, in loops over the paths to ground (Featherstone, RBDA, table 6.5)."""
+def _depths(parent: Sequence[int]) -> list[int]:
+    """How many velocities lie between each one and ground."""
     depths: list[int] = []
-    total = 0
     for above in parent:
-        depth = depths[above] + 1 if above >= 0 else 0
-        depths.append(depth)
-        total += depth + depth * (depth + 1)  # ratios; products and differences
-        total += 4 * depth + 1  # two substitutions, division by the pivot
-    return total
+        depths.append(depths[above] + 1 if above >= 0 else 0)
+    return depths
+
+
+def factoring_operations(parent: Sequence[int]) -> int:
+    """Operations of L^T D L and one solution, in loops over the paths to ground (Featherstone, RBDA, table 6.5).
+
+    Ratios, products and differences; then two substitutions and the division by the pivot.
+    """
+    return sum(n + n * (n + 1) + 4 * n + 1 for n in _depths(parent))
 
 
 def has_long_paths(parent: Sequence[int]) -> bool:
     """Whether the mass matrix has too many entries to be written out: more than :data:`LONG` for each velocity."""
-    depths: list[int] = []
-    for above in parent:
-        depths.append(depths[above] + 1 if above >= 0 else 1)
-    return sum(depths) > LONG * len(depths)
+    return sum(_depths(parent)) > (LONG - 1) * len(parent)
 
 
 def is_unrolled(parent: Sequence[int], limit: int) -> bool:

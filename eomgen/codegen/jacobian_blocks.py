@@ -19,7 +19,7 @@ from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from .factor import Factor, factorize, path, positivity, solve
 from .program import Limits
-from .terms import SystemTerms, acceleration_residual, constraint_forces
+from .terms import SystemTerms
 
 Entries = dict[tuple[int, int], Expr]
 
@@ -27,37 +27,21 @@ PER_PAIR = 60  #: operations of the recursion for each pair of velocities on one
 
 
 class ResidualSlopes:
-    """Derivatives by [q; v] of r1 = M a + h + C_q^T l, r2 = C_q a + gamma and r3 = C_q v + C_t.
-
-    Parameters
-    ----------
-    terms : SystemTerms
-    limits : Limits
-    """
+    """Derivatives by [q; v] of r1 = M a + h + C_q^T l, r2 = C_q a + gamma and r3 = C_q v + C_t."""
 
     def __init__(self, terms: SystemTerms, limits: Limits) -> None:
-        self.terms = terms
-        self.limits = limits
-
-    def _symbols(self, names: Sequence[str]) -> list[Expr]:
-        return [self.terms.graph.symbol(name) for name in names]
+        self.terms, self.limits = terms, limits
 
     @cached_property
     def forces(self) -> ForceSlopes | None:
         """The recursion, where the tree has one that is not too long."""
-        return self.terms.slopes() if self.terms.slopes is not None and self.recursive else None
+        return ForceSlopes(self.terms.kinematics) if self.recursive else None
 
     @cached_property
     def recursive(self) -> bool:
         """Whether the tree has the recursion, and pairs of velocities on one path to ground are few enough for it."""
         pairs = sum(len(path(self.terms.parent, k)) for k in range(self.terms.n_v))
-        return self.terms.slopes is not None and PER_PAIR * pairs <= self.limits.jacobian_recursive
-
-    @property
-    def mass_matrix(self) -> Sequence[Sequence[Expr]]:
-        """M, by composite bodies too."""
-        assert self.forces is not None
-        return self.forces.mass_matrix
+        return self.terms.differentiable and PER_PAIR * pairs <= self.limits.jacobian_recursive
 
     @cached_property
     def operations(self) -> int:
@@ -68,7 +52,7 @@ class ResidualSlopes:
     def by_recursion(self) -> Entries:
         """Derivatives of M a + h by recursion over composite bodies."""
         assert self.forces is not None
-        return self.joined(self.forces, self._symbols(self.terms.a))
+        return self.joined(self.forces, self.terms.symbols(self.terms.a))
 
     def joined(self, forces: ForceSlopes, a: Sequence[Expr]) -> Entries:
         n_q = len(self.terms.q)
@@ -81,18 +65,18 @@ class ResidualSlopes:
 
     def by_formula(self) -> Entries:
         """Derivatives of M a + h from its formula."""
-        return jacobian(list(self.terms.inverse_dynamics), self._symbols((*self.terms.q, *self.terms.v)))
+        return jacobian(list(self.terms.inverse_dynamics), self.terms.symbols((*self.terms.q, *self.terms.v)))
 
     @cached_property
     def entries(self) -> Entries:
         """All that are not identically zero, in terms of (q, v, a, multipliers)."""
         terms = self.terms
-        rest = [*acceleration_residual(terms), *terms.velocity_constraints]
-        wrt = self._symbols((*terms.q, *terms.v))
+        rest = [*terms.acceleration_residual, *terms.velocity_constraints]
+        wrt = self.terms.symbols((*terms.q, *terms.v))
         if not self.recursive:
-            forces = [x + y for x, y in zip(terms.inverse_dynamics, constraint_forces(terms), strict=True)]
+            forces = [x + y for x, y in zip(terms.inverse_dynamics, terms.constraint_forces, strict=True)]
             return jacobian([*forces, *rest], wrt)
-        entries = jacobian([*constraint_forces(terms), *rest], wrt)
+        entries = jacobian([*terms.constraint_forces, *rest], wrt)
         own = self.by_recursion
         if self.is_short(terms.inverse_dynamics):
             other = self.by_formula()
@@ -115,7 +99,7 @@ class ResidualSlopes:
     def by_formula_at(self, accelerations: Sequence[Expr]) -> Entries:
         """Derivatives of M a + h from its formula, at these accelerations."""
         found = self.by_formula()
-        mapping = dict(zip(self._symbols(self.terms.a), accelerations, strict=True))
+        mapping = dict(zip(self.terms.symbols(self.terms.a), accelerations, strict=True))
         return dict(zip(found, substitute(list(found.values()), mapping), strict=True))
 
 
@@ -124,7 +108,7 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
 
     Of the derivatives by recursion and by formula those that make it shorter.
     """
-    symbols = [terms.graph.symbol(name) for name in (*terms.q, *terms.v)]
+    symbols = terms.symbols((*terms.q, *terms.v))
     if not _fits(terms, slopes.limits, len(symbols)):
         return None
     found: list[tuple[Entries, Solved]] = []
@@ -148,10 +132,10 @@ def unrolled_shift(
     """The derivative of a tree's right-hand side by inputs or parameters, and checks, like the Jacobian."""
     if not terms.mass_matrix or not _fits(terms, slopes.limits, len(names)):
         return None
-    symbols = [terms.graph.symbol(name) for name in names]
+    symbols = terms.symbols(names)
     solved = _solve(terms, terms.mass_matrix, terms.bias)
     found = jacobian(list(terms.inverse_dynamics), symbols)
-    a = [terms.graph.symbol(name) for name in terms.a]
+    a = terms.symbols(terms.a)
     values = substitute(list(found.values()), dict(zip(a, solved.accelerations, strict=True)))
     rows = _rows(terms, {}, dict(zip(found, values, strict=True)), solved, len(names))
     return (rows, solved.checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
@@ -187,8 +171,3 @@ def _rows(terms: SystemTerms, rates: Entries, forces: Entries, solved: Solved, w
         for k in range(width)
     ]
     return [column[i] for i in range(n_q + n) for column in columns]
-
-
-def sparsity(outputs: Sequence[Expr]) -> list[int]:
-    """Places in a result whose entries are not identically zero."""
-    return [k for k, x in enumerate(outputs) if not x.is_zero]

@@ -1,82 +1,59 @@
-"""SystemTerms -> blocks: the expressions of every kernel, and of what drivers call."""
+"""SystemTerms -> blocks: the expressions of every kernel, and of what drivers call.
+
+A kernel is a row of :mod:`~eomgen.base.kernel_table`, and here a row of :data:`EXPRESSIONS` where it is straight-line
+code of every model.  The rest are straight-line code of some, of others drivers over blocks (:class:`BlockMaker`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
-from ..base.kernel_table import DAE, NAMED, Sizes
+from ..base.kernel_table import DAE, NAMED
 from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.differentiate import jacobian, jvp
 from ..graph.pair_calls import pairs_of_bodies, without_pairs
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from ..kinematics.inertial_terms import inertial_terms
+from .contact_columns import COLUMNS, ContactColumns, contact_columns
 from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
-from .held_columns import HELD, HeldColumns, held_columns
 from .jacobian_blocks import Entries, ResidualSlopes, unrolled_jacobian, unrolled_shift
-from .loops.block_groups import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, flat
-from .loops.body_loops import BodyLoops
-from .loops.loop_blocks import LoopBlocks
-from .loops.loop_slopes import BY_BODIES, LoopSlopes
-from .loops.regular_loops import RegularLoops
-from .loops.straight_loops import regular_loops, straight_loops
-from .program import Block, Limits, Port
-from .terms import SystemTerms, acceleration_residual, force_residual, port_symbols
+from .loop_motions import MotionLoops, motion_loops
+from .loop_slopes import BY_BODIES, LoopSlopes
+from .loop_systems import BodyLoops, LoopBlocks, straight_loops
+from .program import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, Block, Limits, Port, flat
+from .terms import SystemTerms
 
 
-def dae_kinematics(terms: SystemTerms, rates: Sequence[str], corrections: Sequence[str]) -> list[Expr]:
-    """q' - N (v - S^2 C_q^T mu): kinematics with corrections (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985).
-
-    Parameters
-    ----------
-    terms : SystemTerms
-    rates, corrections : sequences of str
-        Symbols of q' and of mu, one for each holonomic row.
-    """
-    graph = terms.graph
-    v = [graph.symbol(name) for name in terms.v]
-    moved = list(v)
-    for row, name in zip(terms.constraint_jacobian, corrections, strict=False):
-        mu = graph.symbol(name)
-        moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
-    flow = substitute(terms.q_dot, dict(zip(v, moved, strict=True)))
-    return [graph.symbol(name) - f for name, f in zip(rates, flow, strict=True)]
-
-
-def derivatives(terms: SystemTerms, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
+# -- expressions of kernels ---------------------------------------------------------------------------------------
+def _derivatives(terms: SystemTerms, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
     """All derivatives of rows by symbols."""
-    graph = terms.graph
-    entries = jacobian(rows, [graph.symbol(name) for name in names])
-    return [entries.get((i, k), graph.zero) for i in range(len(rows)) for k in range(len(names))]
+    entries = jacobian(rows, terms.symbols(names))
+    return [entries.get((i, k), terms.graph.zero) for i in range(len(rows)) for k in range(len(names))]
 
 
-def by_everything(terms: SystemTerms, rows: Sequence[Expr]) -> list[Expr]:
+def _by_everything(terms: SystemTerms, rows: Sequence[Expr]) -> list[Expr]:
     """Derivatives by coordinates, velocities, time, inputs and parameters."""
-    return derivatives(terms, rows, (*terms.q, *terms.v, terms.t, *terms.u, *terms.p))
+    return _derivatives(terms, rows, (*terms.q, *terms.v, terms.t, *terms.u, *terms.p))
 
 
-def assembly_jacobian(terms: SystemTerms, n_loop_coordinates: int) -> list[Expr]:
-    """Constraints, their rates, and the n_loop_coordinates coordinates of cut joints with theirs, by q, v, u and p."""
-    rows = [*terms.constraints, *terms.velocity_constraints, *terms.loop_coordinates[: 2 * n_loop_coordinates]]
-    return derivatives(terms, rows, (*terms.q, *terms.v, *terms.u, *terms.p))
+def _assembly_jacobian(terms: SystemTerms) -> list[Expr]:
+    """Constraints, their rates, and the coordinates of cut joints with theirs, by q, v, u and p."""
+    measured = terms.loop_coordinates[: 2 * terms.sizes.n_loop_coordinates]
+    rows = [*terms.constraints, *terms.velocity_constraints, *measured]
+    return _derivatives(terms, rows, (*terms.q, *terms.v, *terms.u, *terms.p))
 
 
-def output_derivatives(terms: SystemTerms) -> list[Expr]:
-    """Outputs by q, v, a, u and p, each at fixed others."""
-    return derivatives(terms, terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
-
-
-def strike_rows(terms: SystemTerms, impulses: Sequence[str], of_held: Sequence[str]) -> list[Expr]:
-    """What rules velocities at an instant, a being their change.
+def _strike_rows(terms: SystemTerms) -> list[Expr]:
+    """Equations of the velocities at an instant, a being their change.
 
     The momentum balance with impulses l of constraints, g of gaps with normals n, and those of constraints that close
-    and open; the least scaled change; constraints of velocities; the events' rates; those of what is closed.  Impulses
-    are given by their symbols.
+    and open; the least scaled change; constraints of velocities; the events' rates; those of what is closed.
     """
-    graph = terms.graph
-    v, a, l = ([graph.symbol(name) for name in names] for names in (terms.v, terms.a, terms.multipliers))
-    q = [graph.symbol(name) for name in terms.q]
+    graph, ports = terms.graph, terms.ports
+    v, a, l, q = (terms.symbols(ports[name]) for name in ("v", "a", "multipliers", "q"))
     rates = jvp(terms.events, dict(zip(q, terms.q_dot, strict=True)))
     moving = {graph.symbol(u): graph.symbol(rate) for u, rate in terms.input_rates}
     drift = jvp(terms.events, {graph.symbol(terms.t): graph.one} | moving)
@@ -86,67 +63,99 @@ def strike_rows(terms: SystemTerms, impulses: Sequence[str], of_held: Sequence[s
     for row, one in zip(terms.constraint_jacobian, l, strict=True):
         change = [x + c * one for x, c in zip(change, row, strict=True)]
         least = [x + c * one for x, c in zip(least, row, strict=True)]
-    for i, g in enumerate(map(graph.symbol, impulses)):
+    for i, g in enumerate(map(graph.symbol, ports["impulses"])):
         change = [x - normals.get((i, k), graph.zero) * g for k, x in enumerate(change)]
-    held = terms.held_errors[1::2]
-    by_held = jacobian(held, v[: terms.n_v - terms.n_states])
-    for (i, k), slope in by_held.items():
-        change[k] = change[k] + slope * graph.symbol(of_held[i])
+    closed = terms.held_errors[1::2]
+    for (i, k), slope in jacobian(closed, v[: terms.n_v - terms.n_states]).items():
+        change[k] = change[k] + slope * graph.symbol(ports["held_impulses"][i])
     moved = [x + y for x, y in zip(rates, drift, strict=True)]
-    return [*change, *least, *terms.velocity_constraints, *moved, *held]
+    return [*change, *least, *terms.velocity_constraints, *moved, *closed]
 
 
-def inverse_slopes(terms: SystemTerms, slopes: ResidualSlopes) -> list[Expr] | None:
-    """(n, n_q + 2 n) row-major; None if written out it would be too long.
+def _dae_residual(terms: SystemTerms) -> list[Expr]:
+    """Kinematics with corrections, q' - N (v - S^2 C_q^T mu) (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985), r1, C, C'.
 
-    By recursion over composite bodies, whose mass matrix comes along, or by differentiating the formula.
+    There is a correction mu for each holonomic row.
     """
-    found: list[Entries] = []
-    width = len(terms.q) + terms.n_v
-    if slopes.forces is not None:
-        mass = slopes.mass_matrix
-        found.append(slopes.by_recursion | {(i, width + k): x for i, row in enumerate(mass) for k, x in enumerate(row)})
-    symbols = [terms.graph.symbol(name) for name in (*terms.q, *terms.v, *terms.a)]
-    nodes = len(reachable(terms.graph, (x.id for x in terms.inverse_dynamics)))
-    if len(symbols) * nodes <= slopes.limits.jacobian_recursive:
-        found.append(jacobian(list(terms.inverse_dynamics), symbols))
-    if not found:
-        return None
-    entries = min(found, key=lambda one: count(list(one.values())).total)
-    zero = terms.graph.zero
-    return [entries.get((i, k), zero) for i in range(terms.n_v) for k in range(width + terms.n_v)]
+    rest = [*terms.force_residual, *terms.constraints, *terms.velocity_constraints]
+    moved = v = terms.symbols(terms.v)
+    corrections = map(terms.graph.symbol, terms.ports["corrections"])
+    for row, mu in zip(terms.constraint_jacobian, corrections, strict=False):
+        moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
+    flow = substitute(terms.q_dot, dict(zip(v, moved, strict=True)))
+    rates = map(terms.graph.symbol, terms.ports["q_rate"])
+    return [*(rate - f for rate, f in zip(rates, flow, strict=True)), *rest]
 
 
-def written_derivative(
-    terms: SystemTerms, slopes: ResidualSlopes, name: str, unrolled: bool, touching: bool
-) -> tuple[list[Expr], list[Expr]] | None:
-    """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
-    if touching and name not in SHIFTS:
-        return None
-    if name == "inverse_dynamics_derivatives":
-        found = inverse_slopes(terms, slopes)
-        return None if found is None else (found, [])
-    if not unrolled or name not in ("jacobian", *SHIFTS):
-        return None
-    if name == "jacobian":
-        return unrolled_jacobian(terms, slopes)
-    return unrolled_shift(terms, slopes, terms.u if SHIFTS[name] == "input" else terms.p)
+def _squares(terms: SystemTerms) -> list[Expr]:
+    """|e|^2 of each set of Euler parameters, as rotations have it."""
+    sets = (terms.symbols(terms.q[i : i + 4]) for i, _ in terms.quaternion_slots)
+    return [e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3] for e in sets]
+
+
+def _normalised(terms: SystemTerms) -> list[Expr]:
+    """q with Euler parameters of length 1, and v."""
+    q = terms.symbols(terms.q)
+    for (i, _), square in zip(terms.quaternion_slots, _squares(terms), strict=True):
+        length = terms.graph.apply("sqrt", square)
+        q[i : i + 4] = [x / length for x in q[i : i + 4]]
+    return [*q, *terms.symbols(terms.v)]
+
+
+Expressions = Callable[[SystemTerms], Sequence[Expr]]
+
+#: Kernels that are straight-line code of every model.
+EXPRESSIONS: Mapping[str, Expressions] = {
+    "mass_matrix": lambda s: flat(s.mass_matrix),
+    "bias": lambda s: s.bias,
+    "inverse_dynamics": lambda s: s.inverse_dynamics,
+    "energy": lambda s: (s.kinetic, s.potential),
+    "centroidal": lambda s: s.centroidal,
+    "constraints": lambda s: s.constraints,
+    "constraint_jacobian": lambda s: flat(s.constraint_jacobian),
+    "coordinate_slopes": lambda s: flat(s.coordinate_slopes),
+    "velocity_constraints": lambda s: s.velocity_constraints,
+    "poses": lambda s: s.poses,
+    "loop_coordinates": lambda s: s.loop_coordinates,
+    "loop_coordinate_jacobian": lambda s: flat(s.loop_coordinate_jacobian),
+    "alignment": lambda s: s.alignment,
+    "motion_outputs": lambda s: s.outputs,
+    "canonical": lambda s: s.canonical,
+    "dae_residual": _dae_residual,
+    "finite_forces": lambda s: s.finite_forces,
+    "meeting_time": lambda s: s.meeting_times,
+    "near_pairs": lambda s: s.near_pairs,
+    "bias_apart": lambda s: without_pairs(s.bias, s.near_pairs),
+    "motion_axes": lambda s: s.motion_axes,
+    "events": lambda s: s.events,
+    "resets": lambda s: s.resets,
+    "held_errors": lambda s: s.held_errors,
+    "event_slopes": lambda s: _derivatives(s, s.events, (*s.q, *s.v)),
+    "event_derivatives": lambda s: _by_everything(s, [*s.events, *s.resets]),
+    "strike_derivatives": lambda s: _by_everything(s, _strike_rows(s)),
+    "assembly_jacobian": _assembly_jacobian,
+    "output_derivatives": lambda s: _derivatives(s, s.outputs, (*s.q, *s.v, *s.a, *s.u, *s.p)),
+    "needed_wrenches": lambda s: s.wrenches.needed if s.wrenches else (),
+    "wrench_geometry": lambda s: s.wrenches.geometry if s.wrenches else (),
+    "inertial_terms": lambda s: inertial_terms(s.kinematics),
+    "scales": lambda s: (*s.coordinate_scales, *s.constraint_scales),
+}
+#: Kernels that are straight-line code of every tree.
+OF_TREES: Mapping[str, Expressions] = {
+    "project": _normalised,
+    "embedded_mass_matrix": lambda s: [s.mass_matrix[i][k] for i in s.preferred for k in s.preferred],
+    "kinematics": lambda s: s.symbols((*s.q, *s.v, *s.a)),
+}
 
 
 class BlockMaker:
     """Makes the blocks of one system, each when it is asked for."""
 
-    def __init__(self, terms: SystemTerms, sizes: Sizes, limits: Limits) -> None:
-        self.terms = terms
-        self.sizes = sizes
-        self.limits = limits
+    def __init__(self, terms: SystemTerms, limits: Limits) -> None:
+        self.terms, self.limits = terms, limits
+        self.has_loops = terms.n_c > 0  #: whether there are constraint rows
 
     # -- choices --------------------------------------------------------------------------------------------------
-    @property
-    def has_loops(self) -> bool:
-        """Whether there are constraint rows."""
-        return self.sizes.n_c > 0
-
     @property
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
@@ -159,16 +168,14 @@ class BlockMaker:
         return straight_loops(self.terms, self.limits.unrolled_loops) if self.limits.unrolled_loops else None
 
     @cached_property
-    def _regular(self) -> RegularLoops | None:
+    def _by_motions(self) -> MotionLoops | None:
         """The shorter form that is tried before that one."""
-        return regular_loops(self._loops, self.limits.unrolled_loops)
+        return motion_loops(self._loops, self.limits.unrolled_loops)
 
     @cached_property
     def _loop_slopes(self) -> LoopSlopes | None:
         """The derivatives of that form along directions, if it goes by articulated bodies."""
-        if not isinstance(self._loops, BodyLoops):
-            return None
-        return LoopSlopes(self._loops, self.port("dq").symbols, self.port("dv").symbols)
+        return LoopSlopes(self._loops) if isinstance(self._loops, BodyLoops) else None
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:
@@ -182,9 +189,8 @@ class BlockMaker:
             return True
         if not self.has_loops and self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
             return False
-        residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
-        nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
-        return self.sizes.n_x * nodes > self.limits.jacobian_nodes
+        nodes = len(reachable(self.terms.graph, (r.id for r in self._residuals)))
+        return self.terms.sizes.n_x * nodes > self.limits.jacobian_nodes
 
     @cached_property
     def _touching(self) -> bool:
@@ -192,10 +198,10 @@ class BlockMaker:
         return pairs_of_bodies(self.terms.graph) > self.limits.jacobian_pairs
 
     @cached_property
-    def held(self) -> HeldColumns | None:
+    def contacts(self) -> ContactColumns | None:
         """The columns of states of contacts, where the Jacobian of a tree is made direction by direction."""
         plain = self.limits.unrolled_loops > 0 and not self.has_loops  # drivers over arrays take all terms
-        return held_columns(self.terms) if plain and self.by_direction else None
+        return contact_columns(self.terms) if plain and self.by_direction else None
 
     @cached_property
     def slopes(self) -> ResidualSlopes:
@@ -216,62 +222,34 @@ class BlockMaker:
         solution = solve(factor, [-h for h in bias])
         return (terms.turned.accelerations(solution) if terms.turned else solution), [*self._turned, *checks]
 
-    def _symbols(self, names: Sequence[str]) -> list[Expr]:
-        return [self.terms.graph.symbol(name) for name in names]
-
-    @cached_property
-    def _force_residual(self) -> list[Expr]:
-        return force_residual(self.terms)
-
-    @cached_property
-    def _acceleration_residual(self) -> list[Expr]:
-        return acceleration_residual(self.terms)
-
-    @cached_property
-    def _squares(self) -> list[Expr]:
-        """|e|^2 of each set of Euler parameters, as rotations have it."""
-        sets = (self._symbols(self.terms.q[i : i + 4]) for i, _ in self.terms.quaternion_slots)
-        return [e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3] for e in sets]
+    @property
+    def _residuals(self) -> list[Expr]:
+        """r1, r2, r3."""
+        terms = self.terms
+        return [*terms.force_residual, *terms.acceleration_residual, *terms.velocity_constraints]
 
     @property
     def _turned(self) -> list[Expr]:
         """Conditions: no set of Euler parameters is zero, which no result need show where no rotation matters."""
         graph = self.terms.graph
-        return [graph.apply("lt", graph.zero, square) for square in self._squares]
+        return [graph.apply("lt", graph.zero, square) for square in _squares(self.terms)]
 
-    @cached_property
-    def _dae_residual(self) -> list[Expr]:
-        rest = [*self._force_residual, *self.terms.constraints, *self.terms.velocity_constraints]
-        return [*dae_kinematics(self.terms, self.port("q_rate").symbols, self.port("corrections").symbols), *rest]
-
-    def _dae_tangent(self) -> Block:
-        given = [self.port(name) for name in DAE]
-        y = [symbol for port in given for symbol in port.symbols]
-        along = Port("directions", tuple(f"d({symbol})" for symbol in y))
-        seeds = dict(zip(self._symbols(y), self._symbols(along.symbols), strict=True))
-        outputs = tuple(jvp(self._dae_residual, seeds))
-        return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
-
-    def _through(self, ports: str) -> list[Expr]:
-        return self._symbols([symbol for name in ports.split() for symbol in self.port(name).symbols])
-
-    def _normalised(self) -> list[Expr]:
-        """q with Euler parameters of length 1."""
-        q = self._symbols(self.terms.q)
-        for (i, _), square in zip(self.terms.quaternion_slots, self._squares, strict=True):
-            length = self.terms.graph.apply("sqrt", square)
-            q[i : i + 4] = [x / length for x in q[i : i + 4]]
-        return q
+    def _seeds(self, *names: str) -> dict[Expr, Expr]:
+        """What changes, of q, v, a, u, p -> the symbol of its change."""
+        terms, seeds = self.terms, dict[Expr, Expr]()
+        for name in names:
+            symbols, changes = terms.symbols(getattr(terms, name)), terms.symbols(terms.ports[f"d{name}"])
+            seeds |= dict(zip(symbols, changes, strict=True))
+        return seeds
 
     # -- blocks ---------------------------------------------------------------------------------------------------
+    @cached_property
+    def _ports(self) -> Mapping[str, tuple[str, ...]]:
+        return {**self.terms.ports, **({"loads": self.contacts.loads} if self.contacts else {})}
+
     def port(self, name: str) -> Port:
         """The symbols behind the name of a port."""
-        return Port(name, self._port_symbols[name])
-
-    @cached_property
-    def _port_symbols(self) -> Mapping[str, tuple[str, ...]]:
-        loads = {"loads": self.held.loads} if self.held is not None else {}
-        return {**port_symbols(self.terms, self.sizes.n_h), **loads}
+        return Port(name, self._ports[name])
 
     def _internal(
         self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = (), guards: Sequence[Expr] = ()
@@ -281,72 +259,66 @@ class BlockMaker:
 
     def public(self, name: str) -> Block | None:
         """The public kernel of this name if it is straight-line code for this system, else None."""
+        found = self._straight(name)
+        if found is None:
+            return None
+        outputs, checks = found
         kernel = NAMED[name]
+        ports = tuple(map(self.port, kernel.inputs))
+        return Block(name, ports, tuple(outputs), kernel.shape(self.terms.sizes), tuple(checks))
+
+    def _straight(self, name: str) -> tuple[Sequence[Expr], Sequence[Expr]] | None:
+        """Outputs and checks of a kernel; None if a driver makes it."""
         terms = self.terms
-        always: dict[str, Callable[[], Sequence[Expr]]] = {
-            "mass_matrix": lambda: flat(terms.mass_matrix),
-            "bias": lambda: terms.bias,
-            "inverse_dynamics": lambda: terms.inverse_dynamics,
-            "energy": lambda: (terms.kinetic, terms.potential),
-            "centroidal": lambda: terms.centroidal,
-            "constraints": lambda: terms.constraints,
-            "constraint_jacobian": lambda: flat(terms.constraint_jacobian),
-            "coordinate_slopes": lambda: flat(terms.coordinate_slopes),
-            "velocity_constraints": lambda: terms.velocity_constraints,
-            "poses": lambda: terms.poses,
-            "loop_coordinates": lambda: terms.loop_coordinates,
-            "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
-            "alignment": lambda: terms.alignment,
-            "motion_outputs": lambda: terms.outputs,
-            "canonical": lambda: terms.canonical,
-            "dae_residual": lambda: self._dae_residual,
-            "finite_forces": lambda: terms.finite_forces,
-            "meeting_time": lambda: terms.meeting_times,
-            "near_pairs": lambda: terms.near_pairs,
-            "bias_apart": lambda: without_pairs(terms.bias, terms.near_pairs),
-            "motion_axes": lambda: terms.motion_axes,
-            "events": lambda: terms.events,
-            "resets": lambda: terms.resets,
-            "held_errors": lambda: terms.held_errors,
-            "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),
-            "event_derivatives": lambda: by_everything(terms, [*terms.events, *terms.resets]),
-            "strike_derivatives": lambda: by_everything(
-                terms, strike_rows(terms, self.port("impulses").symbols, self.port("held_impulses").symbols)
-            ),
-            "assembly_jacobian": lambda: assembly_jacobian(terms, self.sizes.n_loop_coordinates),
-            "output_derivatives": lambda: output_derivatives(terms),
-            "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
-            "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
-            "inertial_terms": lambda: terms.inertial() if terms.inertial else (),
-            "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
-        }
-        trees: dict[str, Callable[[], Sequence[Expr]]] = {
-            "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
-            "embedded_mass_matrix": lambda: [terms.mass_matrix[i][k] for i in terms.preferred for k in terms.preferred],
-            "kinematics": lambda: self._symbols((*terms.q, *terms.v, *terms.a)),
-        }
-        checks: list[Expr] = []
         if terms.by_columns and name in ("mass_matrix", "embedded_mass_matrix"):
             return None
-        if name in always:
-            outputs = always[name]()
-            checks = self._turned if name == "bias" else []  # drivers of large trees go by it
-        elif name in trees and not self.has_loops:
-            outputs = trees[name]()
-        elif name == "rhs" and self.unrolled:
+        if name in EXPRESSIONS:
+            return EXPRESSIONS[name](terms), self._turned if name == "bias" else ()  # drivers of large trees go by it
+        if name in OF_TREES and not self.has_loops:
+            return OF_TREES[name](terms), ()
+        if name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
-            outputs = [*terms.q_dot, *accelerations]
-        elif (found := written_derivative(terms, self.slopes, name, self.unrolled, self._touching)) is not None:
-            outputs, checks = found[0], [*self._turned, *found[1]]
-        elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
-            outputs = terms.outputs
-        elif name == "outputs" and self.unrolled:
+            return [*terms.q_dot, *accelerations], checks
+        if (found := self._written_derivative(name)) is not None:
+            return found[0], [*self._turned, *found[1]]
+        if name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
+            return terms.outputs, ()
+        if name == "outputs" and self.unrolled:
             accelerations, checks = self._accelerations
-            outputs = substitute(terms.outputs, dict(zip(self._symbols(terms.a), accelerations, strict=True)))
-        else:
+            return substitute(terms.outputs, dict(zip(terms.symbols(terms.a), accelerations, strict=True))), checks
+        return None
+
+    def _written_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
+        """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
+        if self._touching and name not in SHIFTS:
             return None
-        ports = tuple(map(self.port, kernel.inputs))
-        return Block(name, ports, tuple(outputs), kernel.shape(self.sizes), tuple(checks))
+        if name == "inverse_dynamics_derivatives":
+            found = self._inverse_slopes()
+            return None if found is None else (found, [])
+        if not self.unrolled or name not in ("jacobian", *SHIFTS):
+            return None
+        if name == "jacobian":
+            return unrolled_jacobian(self.terms, self.slopes)
+        return unrolled_shift(self.terms, self.slopes, self.terms.u if SHIFTS[name] == "input" else self.terms.p)
+
+    def _inverse_slopes(self) -> list[Expr] | None:
+        """(n, n_q + 2 n) row-major; None if written out it would be too long.
+
+        By recursion over composite bodies, whose mass matrix comes along, or by differentiating the formula.
+        """
+        terms, slopes, found = self.terms, self.slopes, list[Entries]()
+        width = len(terms.q) + terms.n_v
+        if slopes.forces is not None:
+            mass = {(i, width + k): x for i, row in enumerate(slopes.forces.mass_matrix) for k, x in enumerate(row)}
+            found.append(slopes.by_recursion | mass)
+        symbols = terms.symbols((*terms.q, *terms.v, *terms.a))
+        nodes = len(reachable(terms.graph, (x.id for x in terms.inverse_dynamics)))
+        if len(symbols) * nodes <= self.limits.jacobian_recursive:
+            found.append(jacobian(list(terms.inverse_dynamics), symbols))
+        if not found:
+            return None
+        entries = min(found, key=lambda one: count(list(one.values())).total)
+        return [entries.get((i, k), terms.graph.zero) for i in range(terms.n_v) for k in range(width + terms.n_v)]
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
@@ -375,13 +347,13 @@ class BlockMaker:
             terms = ("mass_matrix", "bias", "scales")
             return {
                 "rhs": terms,
-                "jacobian": (*terms, residual) if self.held is None else ("scales", residual, *HELD),
+                "jacobian": (*terms, residual) if self.contacts is None else ("scales", residual, *COLUMNS),
                 "outputs": (*terms, "accelerated_outputs"),
             }[name]
         project = ("scales", "position", "rate")
         accelerate = formed if self.outputs_need_accelerations else ()
         mass = "mass_times" if self.terms.by_columns else "mass_matrix"
-        direct = (*USUAL, *(REGULAR if self._regular else ())) if self._loops is not None else ()
+        direct = (*USUAL, *(REGULAR if self._by_motions else ())) if self._loops is not None else ()
         along = (*direct, *BY_BODIES) if self._loop_slopes is not None else ()
         return {
             "rhs": (*project, *formed, *direct),
@@ -403,81 +375,74 @@ class BlockMaker:
 
     def internal(self, name: str) -> Block:
         """A block that only drivers call; layouts in the generated source."""
-        terms, n = self.terms, self.sizes.n_v
+        terms, block = self.terms, self._internal
         match name:
             case "terms":  # M lower packed, h, C_q, gamma
-                mass = self.slopes.mass_matrix if terms.by_columns else terms.mass_matrix
-                lower = [mass[i][k] for i in range(n) for k in range(i + 1)]
+                mass = terms.mass_matrix
+                if terms.by_columns:
+                    assert self.slopes.forces is not None
+                    mass = self.slopes.forces.mass_matrix
+                lower = [mass[i][k] for i in range(terms.n_v) for k in range(i + 1)]
                 every = [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
-                return self._internal(name, "q v", every, self._turned)
+                return block(name, "q v", every, self._turned)
             case "position":  # C, C_q
-                return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
+                return block(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
             case "closing" | "dynamics" | "regular_closing" | "regular_dynamics":
-                form = self._loops if name in USUAL else self._regular
+                form = self._loops if name in USUAL else self._by_motions
                 assert form is not None
                 if name.endswith("closing"):  # a Newton step
-                    return self._internal(name, "q", form.closing(), guards=form.guards)
+                    return block(name, "q", form.closing(), guards=form.guards)
                 outputs, checks = form.dynamics()  # v, a, whether these are sound
-                return self._internal(name, "q v", outputs, [*self._turned, *checks])
+                return block(name, "q v", outputs, [*self._turned, *checks])
             case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":
                 assert self._loop_slopes is not None
                 return self._loop_slopes.block(name, list(map(self.port, ("q", "v", "dq", "dv"))), self._turned)
             case "gamma":
-                return self._internal(name, "q v", terms.gamma)
+                return block(name, "q v", terms.gamma)
             case "rate":  # C_t
-                return self._internal(name, "q", terms.constraint_rate)
+                return block(name, "q", terms.constraint_rate)
             case "system":  # entries of K, then r, then sizes of equations and of unknowns
                 assert terms.system is not None
-                system = terms.system
-                return self._internal(name, "q v", [*system.entries, *system.right, *system.sizes])
+                return block(name, "q v", [*terms.system.entries, *terms.system.right, *terms.system.sizes])
             case "joint_accelerations":
                 assert terms.system is not None
-                return self._internal(name, "q v z", terms.system.accelerations)
+                return block(name, "q v z", terms.system.accelerations)
             case "accelerated_outputs":
-                return self._internal(name, "q v a", terms.outputs)
+                return block(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
-                return self._internal(name, "q v a multipliers", self.slopes.packed())
+                return block(name, "q v a multipliers", self.slopes.packed())
             case "held_terms" | "held_operands" | "held_loads":
-                assert self.held is not None
-                ports, outputs = self.held.block(name, terms)
-                return self._internal(name, ports, outputs, self._turned if name == "held_terms" else ())
+                assert self.contacts is not None
+                ports, results = self.contacts.block(name, terms)
+                return block(name, ports, results, self._turned if name == "held_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
-                return self._dae_tangent()
+                given = [self.port(port) for port in DAE]
+                y = [symbol for port in given for symbol in port.symbols]
+                along = Port("directions", tuple(f"d({symbol})" for symbol in y))
+                seeds = dict(zip(terms.symbols(y), terms.symbols(along.symbols), strict=True))
+                results = jvp(_dae_residual(terms), seeds)
+                return Block(name, (*given, along), tuple(results), (len(results),), public=False)
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
-                seeds = dict(zip(self._through("q v a"), self._through("dq dv da"), strict=True))
-                return self._internal(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))
+                seeds = self._seeds("q", "v", "a")
+                return block(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))
             case "mass_times":  # M a
-                along = {a: a for a in self._symbols(terms.a)}
-                return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
+                return block(name, "q a", jvp(terms.inverse_dynamics, {a: a for a in terms.symbols(terms.a)}))
             case "rates":  # q'
-                return self._internal(name, "q v", terms.rates)
+                return block(name, "q v", terms.rates)
             case "moved" | "rates_along":  # N dv; dq' along (dq, dv)
-                held = dict.fromkeys(self._symbols(terms.q), terms.graph.zero) if name == "moved" else {}
-                return self._internal(name, "q v a multipliers dq dv", jvp(terms.rates, self._directions | held))
+                fixed = dict.fromkeys(terms.symbols(terms.q), terms.graph.zero) if name == "moved" else {}
+                return block(name, "q v a multipliers dq dv", jvp(terms.rates, self._seeds("q", "v") | fixed))
             case "acceleration_tangent":  # dv' along (dq, dv)
                 accelerations, checks = self._accelerations
-                return self._internal(name, "q v dq dv", jvp(accelerations, self._directions), checks)
+                return block(name, "q v dq dv", jvp(accelerations, self._seeds("q", "v")), checks)
             case "residual_tangent":  # dr1, dr2, dr3 along (dq, dv)
-                residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
-                return self._internal(name, "q v a multipliers dq dv", jvp(residuals, self._directions))
+                return block(name, "q v a multipliers dq dv", jvp(self._residuals, self._seeds("q", "v")))
             case "input_shift" | "parameter_shift":  # dC, dr1, dr2, dr3 along du or dp
-                residuals = [*terms.constraints, *self._force_residual, *self._acceleration_residual]
-                residuals += terms.velocity_constraints
-                port, seeds = self._seeds(name.removesuffix("_shift"))
-                return self._internal(name, f"q v a multipliers {port}", jvp(residuals, seeds))
+                of = name[0].replace("i", "u")
+                changes = jvp([*terms.constraints, *self._residuals], self._seeds(of))
+                return block(name, f"q v a multipliers d{of}", changes)
             case "input_acceleration" | "parameter_acceleration":  # dv' along du or dp
                 accelerations, checks = self._accelerations
-                port, seeds = self._seeds(name.removesuffix("_acceleration"))
-                return self._internal(name, f"q v {port}", jvp(accelerations, seeds), checks)
+                of = name[0].replace("i", "u")
+                return block(name, f"q v d{of}", jvp(accelerations, self._seeds(of)), checks)
         raise KeyError(name)
-
-    def _seeds(self, what: str) -> tuple[str, dict[Expr, Expr]]:
-        """The port of the changes of inputs or parameters, and what changes -> the symbol of its change."""
-        port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
-        return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
-
-    @property
-    def _directions(self) -> dict[Expr, Expr]:
-        """q and v -> the symbols of their changes."""
-        seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
-        return dict(zip(self._symbols((*self.terms.q, *self.terms.v)), self._symbols(seeds), strict=True))

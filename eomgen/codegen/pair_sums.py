@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 from ..errors import cannot
 from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..graph.traverse import reachable
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
-from .loops.loop_slopes import BY_BODIES
+from .contact_columns import WRENCH
+from .loop_slopes import BY_BODIES
 from .program import Program
 
 
@@ -150,24 +152,7 @@ def record_of(function: PairFunction) -> int:
 
 
 class PairLists:
-    """The lists of one block, behind the rest of its work.
-
-    Parameters
-    ----------
-    graph : Graph
-    statements : iterable of int
-        All nodes of the block.
-    start : int
-        Where the work of the block ends without them.
-
-    Attributes
-    ----------
-    end : int
-        Where it ends with them.
-    again : mapping of str to str
-        Sums of which derivatives are taken along one direction after another at one place, and the operands of C that
-        say where the count of near pairs and the pairs are kept (``pairs_again.c.j2``).
-    """
+    """The lists of one block of these statements, behind the rest of its work, which ends at ``start``."""
 
     def __init__(self, graph: Graph, statements: Iterable[int], start: int) -> None:
         self._graph = graph
@@ -188,7 +173,9 @@ class PairLists:
                 end += function.count
             work = max(work, work_of(function))
         self._work = end
-        self.end = end + work
+        self.end = end + work  #: where the work of the block ends with them
+        #: sums of which derivatives are taken along one direction after another at one place, and the operands of C
+        #: that say where the count of near pairs and the pairs are kept (``pairs_again.c.j2``)
         self.again: Mapping[str, str] = {}
 
     def call(self, i: int) -> PairCall | None:
@@ -262,3 +249,65 @@ class PairLists:
             *filled,
             f"pairs_{function.name}_{slope};",
         ]
+
+
+# -- columns of a Jacobian by states of contacts ------------------------------------------------------------------
+HELD_RECORD = 3 + 2 * WRENCH  #: number of a state, two bodies, and what each gets
+
+
+def is_held(program: Program, function: PairFunction) -> bool:
+    """Whether a sum has states whose columns are made from its pairs."""
+    return program.held is not None and function.name in {one.function.name for one in program.held.sums}
+
+
+def held_room(function: PairFunction) -> int:
+    """For how many states of near pairs there is room."""
+    return function.room * max(kind.states for kind in function.kinds)
+
+
+def held_areas(program: Program) -> list[tuple[str, int]]:
+    """Areas of ``tree_jacobian_held``."""
+    if program.held is None:
+        return []
+    functions = [one.function for one in program.held.sums]
+    return [
+        ("HELD_OPERANDS", len(program.held.operands)),
+        ("HELD_GIVEN", max(function.count for function in functions)),
+        ("HELD_LIST", 1 + HELD_RECORD * max(map(held_room, functions))),
+        ("HELD_WORK", max(map(work_of, functions))),
+    ]
+
+
+def held_tables(program: Program) -> dict[str, Any] | None:
+    """What ``held.c.j2`` writes."""
+    held = program.held
+    if held is None:
+        return None
+    sums, at, load = [], 0, 0
+    for one in held.sums:
+        function = one.function
+        sums.append(
+            {
+                "name": function.name,
+                "places": one.places,
+                "slots": one.slots,
+                "at": at,
+                "load": load,
+                "begun": POSE * function.bodies,
+                "numbers": len(plain_numbers(function)),
+                "first_state": function.first_state,
+            }
+        )
+        at += len(one.places)
+        load += WRENCH * function.bodies
+    states = [k for group in held.groups for k in group]
+    return {
+        "sums": sums,
+        "groups": held.groups,
+        "starts": list(accumulate(map(len, held.groups), initial=0)),
+        "states": states,
+        "firsts": list(accumulate((len(held.rows[k]) for k in states), initial=0)),
+        "rows": [row for k in states for row in held.rows[k]],
+        "record": HELD_RECORD,
+        "loads": len(held.loads),
+    }

@@ -5,9 +5,10 @@ Values that depend on parameters alone are hoisted: computed once for a set of p
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
+from itertools import chain
 from math import prod
 from typing import Any
 
@@ -17,20 +18,31 @@ from ..graph.core import Expr, Graph
 from ..graph.count import Operations, count
 from ..graph.traverse import LEAVES, reachable
 from ..records import dataclass
-from .held_columns import HeldColumns
-from .loops.block_groups import REGULAR, USUAL
+from .contact_columns import ContactColumns
+
+COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
+RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
+
+#: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
+USUAL, REGULAR = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")
+
+#: Kernels that are derivatives by something other than the state -> what.
+SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
+
+#: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
+ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
+
+#: Blocks that only trees have whose accelerations are known without their mass matrix.
+BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
+
+
+def flat(rows: Iterable[Sequence[Expr]]) -> tuple[Expr, ...]:
+    """Rows one after the other."""
+    return tuple(chain.from_iterable(rows))
 
 
 def hoist(graph: Graph, roots: Sequence[Expr], parameters: Sequence[str]) -> tuple[tuple[Expr, ...], frozenset[int]]:
-    """Find the maximal operations of parameters only.
-
-    Returns
-    -------
-    hoisted : tuple of Expr
-        Operations of parameters and numbers only that something else uses, ascending by id.
-    parameter_only : frozenset of int
-        Ids of all operations of parameters and numbers only.
-    """
+    """Operations of parameters and numbers only that something else uses, ascending by id; and ids of all of them."""
     nodes = graph.nodes
     names = frozenset(parameters)
     fixed: set[int] = set()  # leaves included
@@ -69,10 +81,6 @@ def count_apart(outputs: Sequence[Expr], parameter_only: frozenset[int]) -> Oper
 
 def _difference(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
     return {name: n - b.get(name, 0) for name, n in a.items() if n != b.get(name, 0)}
-
-
-#: Blocks that only trees have whose accelerations are known without their mass matrix.
-BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
 
 
 @dataclass(frozen=True)
@@ -120,25 +128,17 @@ class Port:
 
 @dataclass(frozen=True)
 class Block:
-    """A straight-line function of the concatenated inputs of its ports.
-
-    Attributes
-    ----------
-    checks : tuple of Expr
-        Where one is <= 0 the function reports a singular mass matrix (status 2); NaN shows in the result.
-    guards : tuple of Expr
-        Looked at before all else: where one is <= 0 nothing need be found, and C for one state ends there (status 2).
-    public : bool
-        Whether users call it; else only drivers do.
-    """
+    """A straight-line function of the concatenated inputs of its ports."""
 
     name: str
     ports: tuple[Port, ...]
     outputs: tuple[Expr, ...]
     shape: tuple[int, ...]
+    #: where one is <= 0 the function reports a singular mass matrix (status 2); NaN shows in the result
     checks: tuple[Expr, ...] = ()
+    #: looked at before all else: where one is <= 0 nothing need be computed, and C for one state ends there (status 2)
     guards: tuple[Expr, ...] = ()
-    public: bool = True
+    public: bool = True  #: whether users call it; else only drivers do
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -163,18 +163,12 @@ class Block:
 
 @dataclass(frozen=True)
 class KernelDriver:
-    """A public function that target code with loops and Newton iterations computes from blocks.
-
-    Attributes
-    ----------
-    blocks : tuple of str
-        Names of the blocks it calls.
-    """
+    """A public function that target code with loops and Newton iterations computes from blocks."""
 
     name: str
     ports: tuple[Port, ...]
     shape: tuple[int, ...]
-    blocks: tuple[str, ...]
+    blocks: tuple[str, ...]  #: names of the blocks it calls
 
     @property
     def n_in(self) -> int:
@@ -189,24 +183,10 @@ class KernelDriver:
 
 @dataclass(frozen=True)
 class Program:
-    """Everything a target needs.
+    """Everything a target needs."""
 
-    Attributes
-    ----------
-    name : str
-        Prefix of all public functions.
-    metadata : dict
-        What model.json says: names, sizes, units, values, shapes and operations of the kernels.
-    hoisted : tuple of Expr
-        Values of parameters only, computed once per parameter set and kept in ``c[n_p:]``.
-    parameter_only : frozenset of int
-        Ids of all nodes that no block evaluates: the hoisted values and what they are made of.
-    counts : mapping of str to Operations
-        Per block, hoisted work apart under ``precompute``.
-    """
-
-    name: str
-    metadata: dict[str, Any]
+    name: str  #: prefix of all public functions
+    metadata: dict[str, Any]  #: of model.json: names, sizes, units, values, shapes and operations of the kernels
     graph: Graph
     time: str
     coordinates: tuple[str, ...]
@@ -216,11 +196,11 @@ class Program:
     sizes: Sizes
     blocks: tuple[Block, ...]
     drivers: tuple[KernelDriver, ...]
-    hoisted: tuple[Expr, ...]
-    parameter_only: frozenset[int]
+    hoisted: tuple[Expr, ...]  #: of parameters only, computed once per parameter set and kept in ``c[n_p:]``
+    parameter_only: frozenset[int]  #: ids of all nodes that no block evaluates: hoisted values, what they are made of
     preferred: tuple[int, ...]
     parent: tuple[int, ...]
-    counts: Mapping[str, Operations]
+    counts: Mapping[str, Operations]  #: per block, hoisted work apart under ``precompute``
     quaternion_slots: tuple[tuple[int, int], ...] = ()
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
@@ -228,7 +208,7 @@ class Program:
     limits: Limits = field(default_factory=Limits)
     system: LinearSystem | None = None
     projects: bool = True
-    held: HeldColumns | None = None
+    held: ContactColumns | None = None
 
     @property
     def has_loops(self) -> bool:

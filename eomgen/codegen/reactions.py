@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import correlated
-from ..base.limits.constraints import MEASURED, STRUCTURE
+from ..base.limits.constraints import STRUCTURE
 from ..base.limits.numbers import SINGULAR
 from ..base.limits.systems import UNTOUCHED
 from ..base.operations import CONDITION, OPERATIONS
-from ..describe.mechanism import Event, Mechanism
+from ..describe.mechanism import Mechanism
 from ..equations import METHODS
 from ..equations.tree_equations import TreeEquations
 from ..errors import ModelError, Problem
 from ..forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
-from ..forces.branches import where
 from ..forces.joint_reactions import is_carried, multiplier_of, reaction_of
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
@@ -39,8 +38,8 @@ from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches, Row6
 from ..numeric.row_chains import SparseRows
 from .factor import factorize, solve
-from .held_constraints import LinearValues, closed, hold, solve_switched, switched_matrix
 from .laws import MANY, laws_in, pieces_of, solve_laws
+from .switched_constraints import AfterEvents, LinearValues, solve_rows
 
 
 def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
@@ -49,19 +48,13 @@ def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[
     if given is None or not given.multipliers:
         return {}
     graph, rows = kinematics.graph, kinematics.constraints.jacobian
-    gram = [[_dot(graph.zero, one, other) for other in rows] for one in rows]
-    right = [-_dot(graph.zero, row, equations.inverse_dynamics) for row in rows]
+    gram = [[dot(one, other) for other in rows] for one in rows]
+    right = [-dot(row, equations.inverse_dynamics) for row in rows]
     values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
     names = {f"constraint_{k + 1}": name for k, name in enumerate(given.multipliers)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
     }
-
-
-def _dot(total: Expr, one: tuple[Expr, ...], other: tuple[Expr, ...]) -> Expr:
-    for x, y in zip(one, other, strict=True):
-        total = total + x * y
-    return total
 
 
 PROBES = 3  #: states at which components are looked at
@@ -80,14 +73,8 @@ def refuse_undetermined(
 ) -> None:
     """Refuse what depends on multipliers that no equation determines, unless they are 0 in the smallest reactions.
 
-    Parameters
-    ----------
-    every : mapping
-        Wrench of each joint, along the axes of S.
-    idle : sequence
-        The multipliers of equations that vanish, on which these wrenches depend.
-    values : mapping
-        What the symbols of reactions and multipliers stand for, in terms of ``idle`` too.
+    ``every`` are the wrenches of joints along the axes of S in terms of ``idle``, the multipliers of equations that
+    vanish; ``values`` what the symbols of reactions and multipliers stand for, in terms of these too.
 
     Raises
     ------
@@ -292,12 +279,8 @@ def refuse_redundant(
 ) -> None:
     """Refuse what depends on reactions that constraints which follow from others leave open.
 
-    Parameters
-    ----------
-    multipliers : sequence
-        The symbol of each constraint row's multiplier.
-    values : mapping
-        What the symbols of reactions and multipliers stand for, in terms of these.
+    ``multipliers`` are the symbols of the rows' multipliers, ``values`` what the symbols of reactions and multipliers
+    stand for, in terms of these.
 
     Raises
     ------
@@ -347,138 +330,6 @@ def _shared(
     return found if judged else every
 
 
-#: Equations of a mechanism onto which velocities are brought together with closed ones; of more they are judged only.
-MOST = 120
-
-
-class RowAfter(NamedTuple):
-    """One equation after an event: 1 where it has to hold, C' and its slopes by v, C and its size."""
-
-    on: Expr
-    jacobian: Sequence[Expr]
-    rate: Expr
-    error: Expr  #: C; 0 for equations of velocities
-    change: Expr  #: of it by the event
-    size: Expr
-
-
-@dataclass(frozen=True)
-class AfterEvents:
-    """The velocities after events.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-    rows : sequence of SwitchedRow
-    columns : matrix
-        By row, the accelerations that a unit of its multiplier makes.
-    """
-
-    kinematics: Kinematics
-    rows: Sequence[SwitchedRow]
-    columns: Matrix
-
-    def velocities(self) -> dict[str, tuple[tuple[str, Expr], ...]]:
-        """New velocities by event, of those that close constraints or give coordinates or velocities new values."""
-        k = self.kinematics
-        moving = {*k.names, *k.velocity_names}
-        switched = [s.state for s in k.mechanism.switched]
-        found = dict[str, tuple[tuple[str, Expr], ...]]()
-        for event in k.mechanism.events:
-            given = dict(event.reset)
-            closes = any(given.get(state) == k.graph.one for state in switched)
-            if closes or not moving.isdisjoint(given):
-                found[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
-        return found
-
-    def _after(self, event: Event, closes: bool) -> list[Expr]:
-        k, given = self.kinematics, dict(event.reset)
-        new = {k.graph.symbol(name): value for name, value in given.items()}
-        v = given_v = substitute(list(k.v), new)
-        own = [self._closed(row, given, new) for row in self.rows]
-        lasting = list[RowAfter]()
-        if not {*k.names, *k.velocity_names}.isdisjoint(given):
-            lasting = self._lasting(own, new)
-            held = [one._replace(on=closed(row)) for one, row in zip(own, self.rows, strict=True)] if closes else own
-            acting = [*(lasting if len(lasting) <= MOST else ()), *held]
-            v = self._moved(v, v, acting, [self._shortest(one) for one in acting])
-        if closes:  # an impact
-            v = self._moved(v, given_v, own, substituted(self.columns, new))
-        fits = k.graph.one
-        for one in (*lasting, *own):
-            fits = fits * self._fulfilled(one, given_v, v)
-        no_number = k.graph.apply("log", fits)  # 0 where all are fulfilled
-        return [x + no_number for x in v]
-
-    def _moved(
-        self, v: Sequence[Expr], known: Sequence[Expr], acting: Sequence[RowAfter], columns: Matrix
-    ) -> list[Expr]:
-        """Velocities that fulfil equations, from v by multiples of columns; their rates are those at ``known``."""
-        rates = [_rate(one, known, v) for one in acting]
-        inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
-                 for one in acting]  # fmt: skip
-        A = switched_matrix(inner, [one.on for one in acting])
-        (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
-        return [
-            total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]) for j, before in enumerate(v)
-        ]
-
-    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
-        """Equations that may be no numbers while they are open: those of what closes now."""
-        on = given.get(row.state, closed(row))
-        rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
-        before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
-        return RowAfter(on, J, rate, error, error - before, self._size(row.kind))
-
-    def _lasting(self, own: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
-        """The equations of the mechanism that are connected with closed ones, beside which they have to hold."""
-        c, found = self.kinematics.constraints, []
-        on = own[0].on
-        for one in own[1:]:
-            on = where(one.on, 1.0, on)
-        reached = {k for row in self.rows for k, x in enumerate(row.jacobian) if not x.is_zero}
-        known = [{k for k, x in enumerate(row) if not x.is_zero} for row in c.jacobian]
-        while more := set[int]().union(*(row for row in known if row & reached)) - reached:
-            reached |= more
-        for i, (J, rate, kind) in enumerate(zip(c.jacobian, c.velocity, c.kinds, strict=True)):
-            if not known[i] & reached:
-                continue
-            value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
-            now, speed, *slopes = substitute([value, rate, *J], new)
-            found.append(RowAfter(on, slopes, speed, now, now - value, self._size(kind)))
-        return found
-
-    def _shortest(self, one: RowAfter) -> list[Expr]:
-        """Of an equation, the change of velocities in its direction, lengths in the length of the mechanism."""
-        sizes = (self._size(kind) for kind in self.kinematics.velocity_kinds)
-        return [-(j * size * size) for j, size in zip(one.jacobian, sizes, strict=True)]
-
-    def _size(self, kind: str) -> Expr:
-        return self.kinematics.length_scale if kind == "length" else self.kinematics.graph.one
-
-    def _fulfilled(self, one: RowAfter, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
-        """1 where an equation holds after the event, or need not hold, else 0."""
-        graph, sizes = self.kinematics.graph, [one.size]
-        for j, v, w in zip(one.jacobian, before, after, strict=True):
-            if not j.is_zero:
-                sizes.append(graph.apply("abs", j) * (graph.apply("abs", v) + graph.apply("abs", w)))
-        holds = graph.apply("le", graph.apply("abs", _rate(one, before, after)), MEASURED * total(sizes))
-        if not one.change.is_zero:  # an error that was there before may stay, and may go
-            off = graph.apply("min", graph.apply("abs", one.change), graph.apply("abs", one.error))
-            holds = holds * graph.apply("le", off, MEASURED * one.size)
-        return where(one.on, holds, 1.0)
-
-
-def _rate(one: RowAfter, known: Sequence[Expr], v: Sequence[Expr]) -> Expr:
-    """C' at velocities v, from that at known ones."""
-    return total([one.rate, *(j * (x - y) for j, x, y in zip(one.jacobian, v, known, strict=True) if not j.is_zero)])
-
-
-def substituted(matrix: Matrix, new: Mapping[Expr, Expr]) -> Matrix:
-    """A matrix with new values of symbols."""
-    return [substitute(list(row), new) for row in matrix]
-
-
 def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     """Replace the reactions that laws speak of by what they are at a state.
 
@@ -519,7 +370,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         if rows:
             by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
             after = AfterEvents(kinematics, rows, by_multipliers).velocities()
-        still, gain = hold(found, rows, len(laws))
+        still, gain = solve_rows(found, rows, len(laws))
         gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)

@@ -100,14 +100,8 @@ WORTH = 60
 def find_repeats(letters: Sequence[Hashable], longest: int, worth: int = WORTH) -> list[tuple[int, int, int]]:
     """Start, period and count of stretches that repeat themselves, in order, none overlapping another.
 
-    Parameters
-    ----------
-    letters : sequence
-        What each statement is like, equal for those that may be alike.
-    longest : int
-        The longest period.
-    worth : int
-        How many statements a repeat spares at least.
+    ``letters`` are equal for statements that may be alike, ``longest`` is the longest period, and a repeat spares
+    ``worth`` statements at least.
     """
     numbers: dict[Hashable, int] = {}
     text = np.array([numbers.setdefault(x, len(numbers)) for x in letters], dtype=np.int32)
@@ -306,54 +300,27 @@ class _Runs:
 
 @dataclass(frozen=True)
 class SegmentKind:
-    """Segments that are the same function of what they read.
+    """Segments that are the same function of what they read."""
 
-    Attributes
-    ----------
-    members : tuple of tuple of int
-        Statements of every segment, in order of evaluation.
-    reads : tuple of tuple of int
-        Ids that every segment reads from outside, numbered alike.
-    exports : tuple of int
-        Indices of statements that later segments read; place ``k`` of the block of member ``m`` holds entry k.
-    start : int
-        Where in the work array the blocks of the members begin.
-    """
-
-    members: tuple[tuple[int, ...], ...]
-    reads: tuple[tuple[int, ...], ...]
+    members: tuple[tuple[int, ...], ...]  #: statements of every segment, in order of evaluation
+    reads: tuple[tuple[int, ...], ...]  #: ids that every segment reads from outside, numbered alike
+    #: indices of statements that later segments read; place ``k`` of the block of member ``m`` holds entry k
     exports: tuple[int, ...]
-    start: int
+    start: int  #: where in the work array the blocks of the members begin
 
 
 @dataclass(frozen=True)
 class Segments:
-    """All of a block.
-
-    Attributes
-    ----------
-    kinds : tuple of SegmentKind
-    runs : tuple of (int, int)
-        Number of a kind, and how many of its members come next.
-    angles : tuple of int
-        Symbols whose sines and cosines are computed first, from places 0 and ``len(angles)`` of the work array on.
-    places : mapping of int to Place
-        Where each value is that a segment reads from outside.
-    results : mapping of int to tuple of int
-        Node id -> places in the result.
-    checks : frozenset of int
-    lists : PairLists
-        Of sums over pairs; each is a segment of its own.
-    work : int
-    """
+    """All of a block."""
 
     kinds: tuple[SegmentKind, ...]
-    runs: tuple[tuple[int, int], ...]
+    runs: tuple[tuple[int, int], ...]  #: number of a kind, and how many of its members come next
+    #: symbols whose sines and cosines are computed first, from places 0 and ``len(angles)`` of the work array on
     angles: tuple[int, ...]
-    places: Mapping[int, Place]
-    results: Mapping[int, tuple[int, ...]]
+    places: Mapping[int, Place]  #: where each value is that a segment reads from outside
+    results: Mapping[int, tuple[int, ...]]  #: node id -> places in the result
     checks: frozenset[int]
-    lists: PairLists
+    lists: PairLists  #: of sums over pairs; each is a segment by itself
     work: int
 
     @property
@@ -376,18 +343,10 @@ def find_segments(
     longest: int,
     searched: bool = True,
 ) -> Segments:
-    """The segments of a block and the kinds that they are of.
+    """The segments of a block, of so many statements at most, and the kinds that they are of.
 
-    Parameters
-    ----------
-    skipped : frozenset of int
-        Operations that are not evaluated here.
-    given : mapping of int to Place
-        Symbols and hoisted values.
-    longest : int
-        Most statements in a segment.
-    searched : bool
-        Whether statements between marks are searched for what repeats itself.
+    Operations ``skipped`` are not evaluated here, symbols and hoisted values are ``given`` at places; statements
+    between marks are ``searched`` for what repeats itself.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}

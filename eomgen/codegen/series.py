@@ -25,51 +25,26 @@ MOST_FACTORS = 16
 
 
 class Term(NamedTuple):
-    """One value along the motion.
+    """One value along the motion."""
 
-    Attributes
-    ----------
-    kind : str
-        An operation of the graph, or "number", "given" (constant along the motion), "time", "state".
-    operands : tuple of int
-        Earlier terms.
-    numerators : tuple of (int, int)
-        Of functions, one an operand: sign, and the term that multiplies the operand's rate, -1 for 1; the sum of these
-        products is the rate, or is divided by the term `divisor`.  They may be later ones.
-    divisor : int
-    node : int
-        Id in the graph of what is given.
-    value : float
-        Of a number; of a state its place.
-    varies : bool
-        Whether it changes along the motion.
-    """
-
-    kind: str
-    operands: tuple[int, ...] = ()
+    kind: str  #: an operation of the graph, or "number", "given" (constant along the motion), "time", "state"
+    operands: tuple[int, ...] = ()  #: earlier terms
+    #: of functions, one an operand: sign, and the term that multiplies the operand's rate, -1 for 1; the sum of these
+    #: products is the rate, or is divided by the term `divisor`.  They may be later ones
     numerators: tuple[tuple[int, int], ...] = ()
     divisor: int = -1
-    node: int = -1
-    value: float = 0.0
-    varies: bool = False
+    node: int = -1  #: id in the graph of what is given
+    value: float = 0.0  #: of a number; of a state its place
+    varies: bool = False  #: whether it changes along the motion
 
 
 @dataclass(frozen=True)
 class Series:
-    """The terms of a right-hand side.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-    rates : tuple of int
-        The term of each component of x'.
-    checks : tuple of int
-        Terms that must be positive.
-    """
+    """The terms of a right-hand side."""
 
     terms: tuple[Term, ...]
-    rates: tuple[int, ...]
-    checks: tuple[int, ...]
+    rates: tuple[int, ...]  #: the term of each component of x'
+    checks: tuple[int, ...]  #: terms that must be positive
 
 
 def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = False) -> set[int]:

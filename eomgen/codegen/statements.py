@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from math import prod
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, operations_with
@@ -26,20 +27,10 @@ Operand = tuple[int, int, int]  #: of the first branch, of the second, sign of t
 
 
 class Pairs(NamedTuple):
-    """Statements that are computed together.
+    """Statements that are computed together, by that of the first branch."""
 
-    Attributes
-    ----------
-    second : mapping of int to int
-        Statement of the first branch -> that of the second.
-    sign : mapping of int to int
-        Statement of the first branch -> 1, or -1 where the vector holds minus the value of the second.
-    operands : mapping of int to list of Operand
-        Statement of the first branch -> its operands.
-    """
-
-    second: Mapping[int, int]
-    sign: Mapping[int, int]
+    second: Mapping[int, int]  #: that of the second branch
+    sign: Mapping[int, int]  #: 1, or -1 where the vector holds minus the value of the second
     operands: Mapping[int, list[Operand]]
 
     def in_order(self, graph: Graph, sequence: Sequence[int]) -> list[int]:
@@ -239,7 +230,7 @@ class _Finder:
                 for k, number in enumerate(numbers):
                     if number:
                         signs[k] = 1 if nodes[ours[k]][1] * nodes[theirs[k]][1] >= 0.0 else -1
-                self.sign[a] = 1 if nodes[a][0] in ("sin", "cos") else _product(signs)
+                self.sign[a] = 1 if nodes[a][0] in ("sin", "cos") else prod(signs)
                 if nodes[a][0] == "mul" and any(numbers):
                     free.add(a)
             free.difference_update(ours)
@@ -312,41 +303,20 @@ class _Finder:
         )
 
 
-def _product(signs: Iterable[int]) -> int:
-    result = 1
-    for s in signs:
-        result *= s
-    return result
-
-
 Slot = int | str  #: a place in an array, or the text of one
 FindPairs = Callable[[Sequence[int], Collection[int]], Pairs | None]
 
 
 @dataclass(frozen=True)
 class PrintedFunction:
-    """A run of statements, printed as one function.
+    """A run of statements, printed as one function."""
 
-    Attributes
-    ----------
-    statements : tuple of int
-        Node ids in order.
-    loads, stores : mapping of int to Slot
-        Node id -> slot of the work array.
-    results : mapping of int to tuple of Slot
-        Node id -> places in the result.
-    checks : frozenset of int
-        Ids that must not be <= 0.
-    inlined : frozenset of int
-        Conditions that stand only in selections and checks, so need no variable of their own.
-    """
-
-    statements: tuple[int, ...]
-    loads: Mapping[int, Slot]
+    statements: tuple[int, ...]  #: node ids in order
+    loads: Mapping[int, Slot]  #: node id -> slot of the work array
     stores: Mapping[int, Slot]
-    results: Mapping[int, tuple[Slot, ...]]
-    checks: frozenset[int]
-    inlined: frozenset[int]
+    results: Mapping[int, tuple[Slot, ...]]  #: node id -> places in the result
+    checks: frozenset[int]  #: ids that must not be <= 0
+    inlined: frozenset[int]  #: conditions that stand only in selections and checks, so need no variable
 
 
 @dataclass(frozen=True)
@@ -372,18 +342,10 @@ def cut(
 ) -> Pieces:
     """Order the statements behind outputs and checks and cut them into pieces.
 
-    Parameters
-    ----------
-    skipped : frozenset of int
-        Operations that are not evaluated here (hoisted values and what they are made of).
-    statements : int
-        Most statements in one piece; what is longer is cut into pieces of at most half of that, which compile faster.
-    lists : sequence of Expr
-        What is made too, for its own sake.
-    find : callable, optional
-        Statements, results and checks -> pairs that stay together and cross in places side by side.
-    guards : sequence of Expr
-        Checks that come before all that they do not need.
+    Operations ``skipped`` are not evaluated here, being hoisted; ``lists`` are made too.  A piece has so many
+    ``statements`` at most; what is longer is cut into pieces of at most half of that, which compile faster.  ``find``
+    makes of statements, results and checks the pairs that stay together and cross in places side by side.  ``guards``
+    are checks that come before all that they do not need.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
@@ -491,20 +453,11 @@ def references(program: Program, inputs: Sequence[str]) -> dict[int, str]:
 CIRCULAR = ("sin", "cos")
 
 
-@dataclass(frozen=True)
-class Angles:
-    """What is computed together.
+class Angles(NamedTuple):
+    """Angles whose sines and cosines are computed together."""
 
-    Attributes
-    ----------
-    first : tuple of int
-        Statements that the angles are made of, in order; they come before all others.
-    arguments : tuple of int
-        Ids of the angles.
-    """
-
-    first: tuple[int, ...]
-    arguments: tuple[int, ...]
+    first: tuple[int, ...]  #: statements that the angles are made of, in order; they come before all others
+    arguments: tuple[int, ...]  #: ids of the angles
 
 
 def gather_angles(graph: Graph, piece: PrintedFunction, pairs: Pairs | None = None) -> Angles:

@@ -1,99 +1,157 @@
-"""All expressions and names that functions are generated from: SystemTerms, and the symbols of each port."""
+"""Kinematics, Mobility and TreeEquations -> SystemTerms: all expressions that functions are generated from."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 
+from ..base.kernel_table import Sizes
+from ..base.operations import operations_with
+from ..describe.input_names import rate_of
 from ..equations.articulated import ConstraintRow, TreeMotion
-from ..equations.tree_equations import LinearSystem
-from ..equations.tree_slopes import ForceSlopes
+from ..equations.tree_equations import TreeEquations
+from ..equations.tree_slopes import can_differentiate
 from ..errors import UsageError
-from ..graph.core import Expr, Graph
-from ..kinematics.link_axes import Turned
+from ..forces.branches import where
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.substitute import substitute
+from ..graph.traverse import reachable
+from ..kinematics import Kinematics
+from ..kinematics.closing_gradients import shortest_rows
+from ..kinematics.closing_rates import shortest_gamma
+from ..kinematics.kinematics import ForceTerms
+from ..kinematics.loads import drives_cut_joint
+from ..kinematics.mobility import Mobility
+from ..kinematics.near_pairs import motion_axes, near_pairs
+from ..kinematics.row_groups import row_groups
+from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
-from ..kinematics.wrenches import JointWrenches
-from ..records import dataclass
+from ..kinematics.wrenches import find_wrenches
+from .factor import has_long_paths
+from .reactions import multiplier_values
 
 Row = tuple[Expr, ...]
+LARGEST = 1e300  #: size of a load that still counts as a number
 
 
-@dataclass(frozen=True)
 class SystemTerms:
     """A mechanism's equations as expressions of one graph, with the names of their symbols.
 
     n is the number of velocities, m the number of constraint rows, redundant ones included.  There are as many
-    coordinates, with q' = v, but for Euler parameters, where q' = N(q) v.  Quantities at acceleration level use the
-    symbols `a`, multipliers do not appear in any expression.
+    coordinates, with q' = v, but for Euler parameters, where q' = N(q) v.  First-order states are the last of the
+    velocities, of unit inertia, and no coordinate's rates.  Quantities at acceleration level use the symbols `a`,
+    multipliers do not appear in any expression.
+
+    Where paths to ground are long the mass matrix of a recursive form is made column by column; with loops only in C.
     """
 
-    graph: Graph
-    t: str  #: symbol of time
-    q: tuple[str, ...]  #: n coordinates, and one more for each ball
-    v: tuple[str, ...]  #: n velocities
-    a: tuple[str, ...]  #: n accelerations
-    multipliers: tuple[str, ...]  #: m names for the multipliers, one per row
-    u: tuple[str, ...]  #: inputs
-    p: tuple[str, ...]  #: parameters
+    def __init__(
+        self, kinematics: Kinematics, mobility: Mobility, equations: TreeEquations, *, in_c: bool = True
+    ) -> None:
+        k, c, loop, mechanism = kinematics, kinematics.constraints, kinematics.loop_coordinates, kinematics.mechanism
+        #: (n_spots,) of q: the lists of pairs of shapes that are near each other
+        self.near_pairs: Row = tuple(near_pairs(k))
+        states = k.state_names
+        recursive = equations.accelerations or (c.labels and equations.constrained and in_c and not states)
+        by_columns = recursive and has_long_paths(k.parent)
+        self.kinematics = k
+        self.graph = k.graph
+        self.t = "t"  #: symbol of time
+        self.q = k.names  #: coordinates
+        self.v = k.velocity_names
+        self.a = tuple(map(acceleration_name, k.velocity_names))
+        self.multipliers = tuple(f"lambda[{i}]" for i in range(len(c.labels)))
+        self.u, self.p = k.input_names, k.parameter_names
+        #: (n, n) of q; none where it is made column by column from the inverse dynamics
+        self.mass_matrix: tuple[Row, ...] = () if by_columns else equations.mass_matrix
+        self.bias = equations.bias  #: (n,) h of (q, v): M a + h = 0 for a tree
+        self.inverse_dynamics = equations.inverse_dynamics  #: (n,) M a + h of (q, v, a)
+        self.kinetic, self.potential = equations.kinetic_energy, equations.potential_energy
+        self.constraints = c.values  #: (m_h,) C of q and t, the holonomic rows, which come first
+        #: (m, n) C_q: dC/dq N, and A of the nonholonomic rows A v + b = 0
+        self.constraint_jacobian: tuple[Row, ...] = shortest_rows(k)
+        self.constraint_rate = c.time_derivative  #: (m,) C_t, the partial derivative by t; b of the nonholonomic rows
+        self.velocity_constraints = c.velocity  #: (m,) C_q v + C_t
+        self.gamma: Row = shortest_gamma(k)  #: (m,) of (q, v): C'' = C_q a + gamma
+        self.poses = _poses(k)  #: homogeneous matrices body -> ground, row-major
+        self.outputs = resolved([o.expression for o in mechanism.outputs], k, equations)  #: (n_y,) of (q, v, a)
+        #: y, y' and y'' of the coordinates of cut joints, of (q, v, a)
+        self.loop_coordinates = (*loop.values, *loop.rates, *loop.accelerations)
+        self.loop_coordinate_jacobian: tuple[Row, ...] = loop.jacobian  #: dy/dq
+        self.alignment = c.aligned  #: of q: positive unless an axis of a cut joint is flipped
+        size = {"length": k.length_scale, "angle": k.graph.one}
+        #: (n,) typical size of each coordinate, of parameters only
+        self.coordinate_scales: Row = tuple(size[kind] for kind in k.velocity_kinds)
+        self.constraint_scales = row_scales(k)  #: (m,) typical size of each row's residual, of parameters only
+        self.row_groups = row_groups(k)  #: per row which it is compared with, as in kinematics/row_groups.py; none: all
+        self.n_dof = mobility.n_dof  #: degrees of freedom; n - n_dof is the rank of C_q
+        #: n_dof indices into v: independent velocities, in the order of v_i
+        self.preferred: tuple[int, ...] = independent_places(k, mobility)
+        #: per velocity the next one towards ground (-1: none), always a smaller index; a drive on a cut joint ties
+        #: branches, so that all are one chain
+        self.parent: tuple[int, ...] = tuple(range(-1, len(k.v) - 1)) if drives_cut_joint(k) else k.parent
+        self.centroidal = _centroidal(k)  #: (18 + 3n,) or none without mass
+        self.quaternion_slots = k.quaternion_slots  #: where Euler parameters start in q, their angular velocity in v
+        #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with each other
+        self.given_rates = k.given_rates
+        #: q' where there are Euler parameters or states, or where it is given
+        self.rates: Row = k.rates if k.quaternion_slots or k.given_rates else ()
+        self.coordinate_slopes = c.slopes  #: with ``given_rates``: (m_h, n_q) dC/dq
+        self.finite_forces: Row = tuple(flag for _, flag in flag_forces(k))
+        #: how long a step may be that passes over no contact; penetration, thickness and numbers of the deepest shapes
+        self.meeting_times = tuple(_meeting_times(k))
+        #: (6 n,) of q, with near pairs: the twist that each velocity causes, at the origin
+        self.motion_axes: Row = tuple(motion_axes(k)) if self.near_pairs else ()
+        self.accelerations = equations.accelerations  #: (n,) with M a + h = 0, of a method that has it without M
+        self.pivots = equations.pivots  #: (n,) of q, with ``accelerations``: positive where M is positive definite
+        self.wrenches = find_wrenches(k)  #: what joints exert, formed when it is read
+        self.system = equations.system  #: of a method that solves it for the accelerations
+        self.turned = equations.turned  #: the tree's system in other velocities, in which it is solved; else None
+        #: constraint rows -> a, by articulated bodies; else None
+        self.constrained: Callable[..., TreeMotion] | None = equations.constrained if c.labels else None
+        self.differentiable = not states and can_differentiate(k)  #: whether ForceSlopes holds
+        self.events = resolved([e.expression for e in mechanism.events], k, equations)
+        self.resets = resolved([x for _, _, x in resets(k)], k, equations)  #: new values of states after events
+        #: of each closed row of constraints that close and open, its error and its rate
+        self.held_errors = resolved(list(k.held_errors), k, equations)
+        self.canonical = equations.canonical  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+        self.projects = c.stabilised is None  #: whether rhs takes the projected state; not with Baumgarte's method
+        self.n_states = 0
+        if states:
+            self._append_states(states, k.state_rates)
 
-    mass_matrix: tuple[Row, ...]  #: (n, n) of q; none where it is made column by column from the inverse dynamics
-    bias: Row  #: (n,) h of (q, v): M a + h = 0 for a tree
-    inverse_dynamics: Row  #: (n,) M a + h of (q, v, a)
-    kinetic: Expr  #: T of (q, v)
-    potential: Expr  #: V of q
-
-    constraints: Row  #: (m_h,) C of q and t, the holonomic rows, which come first
-    constraint_jacobian: tuple[Row, ...]  #: (m, n) C_q: dC/dq N, and A of the nonholonomic rows A v + b = 0
-    constraint_rate: Row  #: (m,) C_t, the partial derivative by t; b of the nonholonomic rows
-    velocity_constraints: Row  #: (m,) C_q v + C_t
-    gamma: Row  #: (m,) of (q, v): C'' = C_q a + gamma
-
-    poses: Row  #: (16 * bodies,) homogeneous matrices body -> ground, row-major
-    outputs: Row  #: (n_y,) of (q, v, a)
-    loop_coordinates: Row  #: (3 n_loop_coordinates,) y, y' and y'' of the coordinates of cut joints, of (q, v, a)
-    loop_coordinate_jacobian: tuple[Row, ...]  #: (n_loop_coordinates, n) dy/dq
-    alignment: Row  #: (n_alignments,) of q: positive unless an axis of a cut joint is flipped
-
-    coordinate_scales: Row  #: (n,) typical size of each coordinate, of parameters only
-    constraint_scales: Row  #: (m,) typical size of each row's residual, of parameters only
-    n_dof: int  #: degrees of freedom; n - n_dof is the rank of C_q
-    preferred: tuple[int, ...]  #: n_dof indices into v: independent velocities, in the order of v_i
-    parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
-    quaternion_slots: tuple[
-        tuple[int, int], ...
-    ] = ()  #: where Euler parameters start in q, and their angular velocity in v
-    rates: Row = ()  #: q' where there are Euler parameters or states, or where it is given
-    given_rates: bool = False  #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with
-    #: each other
-    paired: tuple[int, ...] = ()  #: with ``given_rates``: per velocity the coordinate whose rate it is, -1 for none
-    coordinate_slopes: tuple[Row, ...] = ()  #: with ``given_rates``: (m_h, n_q) dC/dq
-
-    centroidal: Row = ()  #: (18 + 3n,) of (q, v), all bodies, ground axes; empty for a system without mass: centre of
-    #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
-    finite_forces: Row = ()  #: (n_finite_forces,) of (q, v): 1 where a force element's loads are finite, else 0
-
-    accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
-    wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
-    inertial: Callable[[], Sequence[Expr]] | None = None  #: (22 n_bodies,) motion of bodies and their parameters
-    pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
-    system: LinearSystem | None = None  #: of a method that solves it for the accelerations
-    slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion
-    canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
-    turned: Turned | None = None  #: the tree's system in other velocities, in which it is solved; else None
-    constrained: Callable[..., TreeMotion] | None = None  #: constraint rows -> a, by articulated bodies; else None
-    events: Row = ()  #: of (q, v): their zeros are the events of the model
-    resets: Row = ()  #: of (q, v): new values of states after events
-    held_errors: Row = ()  #: of (q, v): of each closed row of constraints that close and open, its error and its rate
-    meeting_times: Row = ()  #: (0 or 5,) of (q, v, a): how long a step may be that passes over no contact, and
-    #: penetration, thickness and numbers of the deepest two shapes
-    near_pairs: Row = ()  #: of q: the lists of pairs of shapes that are near each other
-    motion_axes: Row = ()  #: (6 n,) of q, with such lists: the twist that each velocity causes, at the origin
-    input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
-    impacts: bool = False  #: whether an event is a gap with a restitution
-    row_groups: tuple[int, ...] = ()  #: per row which it is compared with, as in kinematics/row_groups.py; none: all
-    n_states: int = 0  #: first-order states, the last of the velocities: of unit inertia, no coordinate's rate
-    projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
+    def _append_states(self, names: Sequence[str], rates: Sequence[Expr]) -> None:
+        """First-order states of these names and rates (n_s,), of (t, q, v, s, u)."""
+        graph, n, count = self.graph, self.n_v, len(names)
+        zeros, ones = (graph.zero,) * count, (graph.one,) * count
+        self.rates = self.q_dot
+        accelerations = tuple(map(acceleration_name, names))
+        pairs = list(zip(map(graph.symbol, accelerations), rates, strict=True))
+        opposed, left = tuple(-f for f in graph.marked(rates)), tuple(a - f for a, f in graph.marked(pairs))
+        if self.mass_matrix or not n:
+            unit = ((*[graph.zero] * (n + k), graph.one, *zeros[k + 1 :]) for k in range(count))
+            self.mass_matrix = (*((*row, *zeros) for row in self.mass_matrix), *unit)
+        if self.centroidal:  # centre (3), its Jacobian (3, n), what follows
+            columns = [(*self.centroidal[3 + k * n : 3 + (k + 1) * n], *zeros) for k in range(3)]
+            self.centroidal = (*self.centroidal[:3], *sum(columns, ()), *self.centroidal[3 + 3 * n :])
+        self.v, self.a = (*self.v, *names), (*self.a, *accelerations)
+        self.bias, self.inverse_dynamics = (*self.bias, *opposed), (*self.inverse_dynamics, *left)
+        self.constraint_jacobian = tuple((*row, *zeros) for row in self.constraint_jacobian)
+        self.loop_coordinate_jacobian = tuple((*row, *zeros) for row in self.loop_coordinate_jacobian)
+        self.coordinate_scales = (*self.coordinate_scales, *ones)
+        self.n_dof, self.n_states = self.n_dof + count, count
+        self.preferred, self.parent = (*self.preferred, *range(n, n + count)), (*self.parent, *[-1] * count)
+        self.motion_axes = (*self.motion_axes, *zeros * 6) if self.motion_axes else ()
+        self.turned = None
+        if self.accelerations is not None:
+            self.accelerations, self.pivots = (*self.accelerations, *rates), (*self.pivots, *ones)
+        if self.system is not None:  # of which the rates of the states are no unknowns
+            self.system = replace(self.system, accelerations=(*self.system.accelerations, *rates))
+        if self.constrained is not None:
+            self.constrained = partial(_constrained, self.constrained, n, tuple(rates))
 
     @property
     def n_v(self) -> int:
@@ -105,11 +163,11 @@ class SystemTerms:
         """Number of constraint rows, redundant and nonholonomic ones included."""
         return len(self.constraint_jacobian)
 
-    @property
+    @cached_property
     def coordinate_of(self) -> tuple[int, ...]:
         """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints and states."""
         if self.given_rates:
-            return self.paired
+            return self.kinematics.coordinate_of
         turning = {k for _, j in self.quaternion_slots for k in range(j, j + 3)}
         turning |= set(range(self.n_v - self.n_states, self.n_v))
         parameters = {k for i, _ in self.quaternion_slots for k in range(i, i + 4)}
@@ -132,130 +190,104 @@ class SystemTerms:
         )
 
     @property
-    def n_loop_coordinates(self) -> int:
-        """Number of coordinates of cut joints."""
-        return len(self.loop_coordinate_jacobian)
-
-    @property
     def by_columns(self) -> bool:
         """Whether the mass matrix is not written out: entries would be many, and little needs them."""
         return (self.accelerations or self.constrained) is not None and self.n_v > 0 and not self.mass_matrix
 
-    def check_shapes(self) -> None:
-        """Refuse terms whose sizes contradict each other.
+    @cached_property
+    def sizes(self) -> Sizes:
+        """The sizes that shapes of functions are made of."""
+        impacts = any(e.restitution is not None for e in self.kinematics.mechanism.events)
+        ruled = not self.given_rates and (impacts or bool(self.resets and self.n_c))
+        n_held = len(self.held_errors)
+        return Sizes(
+            n_q=len(self.q),
+            n_v=self.n_v,
+            n_x=len(self.q) + self.n_v,
+            n_u=len(self.u),
+            n_p=len(self.p),
+            n_y=len(self.outputs),
+            n_c=self.n_c,
+            n_h=len(self.constraints),
+            n_dof=self.n_dof,
+            n_bodies=len(self.poses) // 16,
+            n_loop_coordinates=len(self.loop_coordinate_jacobian),
+            n_alignments=len(self.alignment),
+            n_com=3 if self.centroidal else 0,
+            n_finite_forces=len(self.finite_forces),
+            n_coordinate_slopes=len(self.coordinate_slopes),
+            n_wrenches=self.wrenches.needed_size if self.wrenches else 0,
+            n_wrench_geometry=self.wrenches.size if self.wrenches else 0,
+            n_momenta=len(self.canonical) // 2,
+            n_events=len(self.events),
+            n_resets=len(self.resets),
+            n_held=n_held,
+            # of models whose events change velocities that impulses or constraints rule
+            n_strike=2 * self.n_v + self.n_c + len(self.events) + n_held // 2 if ruled else 0,
+            n_states=self.n_states,
+            n_spots=len(self.near_pairs),
+            n_dae=len(self.q) + self.n_v + self.n_c + len(self.constraints),
+        )
 
-        Raises
-        ------
-        UsageError
-            Names the field and the sizes.
-        """
-        n, m = self.n_v, self.n_c
-        sizes = {
-            "q": (len(self.rates) if self.given_rates else n - self.n_states + len(self.quaternion_slots), len(self.q)),
-            "a": (len(self.a), n),
-            "multipliers": (len(self.multipliers), m),
-            "mass_matrix": (len(self.mass_matrix), 0 if self.by_columns else n),
-            "bias": (len(self.bias), n),
-            "inverse_dynamics": (len(self.inverse_dynamics), n),
-            "constraint_jacobian": (len(self.constraint_jacobian), m),
-            "constraint_rate": (len(self.constraint_rate), m),
-            "velocity_constraints": (len(self.velocity_constraints), m),
-            "gamma": (len(self.gamma), m),
-            "loop_coordinates": (len(self.loop_coordinates), 3 * self.n_loop_coordinates),
-            "centroidal": (len(self.centroidal), 18 + 3 * n if self.centroidal else 0),
-            "coordinate_scales": (len(self.coordinate_scales), n),
-            "constraint_scales": (len(self.constraint_scales), m),
-            "preferred": (len(self.preferred), self.n_dof),
-            "parent": (len(self.parent), n),
-            "accelerations": (n if self.accelerations is None else len(self.accelerations), n),
-            "pivots": (len(self.pivots), 0 if self.accelerations is None else n),
+    @property
+    def input_rates(self) -> list[tuple[str, str]]:
+        """Inputs with the input that is their rate."""
+        return [(name, rate_of(name)) for name in self.u if rate_of(name) in self.u]
+
+    def symbols(self, names: Sequence[str]) -> list[Expr]:
+        """Symbols by their names."""
+        return list(map(self.graph.symbol, names))
+
+    @cached_property
+    def ports(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of symbols by the name of the port."""
+        independent, coordinate_of = self.preferred, self.coordinate_of
+        corrections = tuple(f"correction[{i}]" for i in range(len(self.constraints)))
+        changed = {"dq": self.q, "dv": self.v, "du": self.u, "dp": self.p, "da": self.a}
+        rates = {"q_rate": self.q, "multiplier_rates": self.multipliers, "correction_rates": corrections}
+        return {
+            "q": self.q,
+            "v": self.v,
+            "a": self.a,
+            "q_i": tuple(self.q[coordinate_of[i]] for i in independent if i < self.n_v - self.n_states),
+            "v_i": tuple(self.v[i] for i in independent),
+            "a_i": tuple(self.a[i] for i in independent),
+            "q_guess": tuple(f"guess({q})" for q in self.q),
+            "multipliers": self.multipliers,
+            "z": self.system.unknowns if self.system else (),
+            "corrections": corrections,
+            "cj": ("cj",),
+            "impulses": tuple(f"impulse[{i}]" for i in range(len(self.events))),
+            "held_impulses": tuple(f"held_impulse[{i}]" for i in range(len(self.held_errors) // 2)),
+            **{port: tuple(f"d({name})" for name in names) for port, names in changed.items()},
+            **{port: tuple(f"rate({name})" for name in names) for port, names in rates.items()},
         }
-        wrong = [f"{field} has {given} entries, {expected} expected" for field, (given, expected) in sizes.items()
-                 if given != expected]  # fmt: skip
-        for name in ("mass_matrix", "constraint_jacobian", "loop_coordinate_jacobian"):
-            wrong += [f"row {k} of {name} has {len(row)} entries, {n} expected"
-                      for k, row in enumerate(getattr(self, name)) if len(row) != n]  # fmt: skip
-        if m == 0 and self.n_dof != n:
-            wrong.append(f"n_dof is {self.n_dof}, but {n} coordinates have no constraints")
-        if not 0 <= self.n_dof <= n or not set(self.preferred) <= set(range(n)):
-            wrong.append(f"preferred {self.preferred} are not {self.n_dof} indices below {n}")
-        if any(not -1 <= parent < k for k, parent in enumerate(self.parent)):
-            wrong.append(f"parent {self.parent} has an entry that is not smaller than its own index")
-        if wrong:
-            raise UsageError("; ".join(wrong))
 
+    def _with_multipliers(self, forces: Sequence[Expr]) -> list[Expr]:
+        forces = list(forces)
+        for row, l in zip(self.constraint_jacobian, map(self.graph.symbol, self.multipliers), strict=True):
+            forces = [r + c * l for r, c in zip(forces, row, strict=True)]
+        return forces
 
-def port_symbols(terms: SystemTerms, n_h: int) -> Mapping[str, tuple[str, ...]]:
-    """Symbols by the name of the port; n_h holonomic rows have corrections."""
-    independent, coordinate_of = terms.preferred, terms.coordinate_of
-    return {
-        "q": terms.q,
-        "v": terms.v,
-        "a": terms.a,
-        "q_i": tuple(terms.q[coordinate_of[i]] for i in independent if i < terms.n_v - terms.n_states),
-        "v_i": tuple(terms.v[i] for i in independent),
-        "a_i": tuple(terms.a[i] for i in independent),
-        "q_guess": tuple(f"guess({q})" for q in terms.q),
-        "multipliers": terms.multipliers,
-        "z": terms.system.unknowns if terms.system else (),
-        "corrections": tuple(f"correction[{i}]" for i in range(n_h)),
-        "q_rate": tuple(f"rate({q})" for q in terms.q),
-        "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
-        "correction_rates": tuple(f"rate(correction[{i}])" for i in range(n_h)),
-        "cj": ("cj",),
-        "impulses": tuple(f"impulse[{i}]" for i in range(len(terms.events))),
-        "held_impulses": tuple(f"held_impulse[{i}]" for i in range(len(terms.held_errors) // 2)),
-        "dq": tuple(f"d({q})" for q in terms.q),
-        "dv": tuple(f"d({v})" for v in terms.v),
-        "du": tuple(f"d({u})" for u in terms.u),
-        "dp": tuple(f"d({p})" for p in terms.p),
-        "da": tuple(f"d({a})" for a in terms.a),
-    }
+    @cached_property
+    def constraint_forces(self) -> list[Expr]:
+        """C_q^T l (n,)."""
+        return self._with_multipliers([self.graph.zero] * self.n_v)
 
+    @cached_property
+    def force_residual(self) -> list[Expr]:
+        """r1 = M a + h + C_q^T l (n,)"""
+        return self._with_multipliers(self.inverse_dynamics)
 
-def with_states(terms: SystemTerms, names: Sequence[str], rates: Sequence[Expr]) -> SystemTerms:
-    """The terms with states of these names and rates (n_s,), of (t, q, v, s, u); as they are without states."""
-    if not names:
-        return terms
-    graph, n, count = terms.graph, terms.n_v, len(names)
-    nothing: Row = (graph.zero,) * count
-    accelerations = tuple(graph.symbol(acceleration_name(name)) for name in names)
-    unit = tuple((graph.zero,) * (n + k) + (graph.one,) + (graph.zero,) * (count - 1 - k) for k in range(count))
-    pairs = list(zip(accelerations, rates, strict=True))
-    opposed, left = tuple(-f for f in graph.marked(rates)), tuple(a - f for a, f in graph.marked(pairs))
-    mass = tuple((*row, *nothing) for row in terms.mass_matrix) + (unit if terms.mass_matrix or not n else ())
-    return replace(
-        terms,
-        v=(*terms.v, *names),
-        a=(*terms.a, *map(acceleration_name, names)),
-        mass_matrix=mass,
-        bias=(*terms.bias, *opposed),
-        inverse_dynamics=(*terms.inverse_dynamics, *left),
-        constraint_jacobian=tuple((*row, *nothing) for row in terms.constraint_jacobian),
-        loop_coordinate_jacobian=tuple((*row, *nothing) for row in terms.loop_coordinate_jacobian),
-        coordinate_scales=(*terms.coordinate_scales, *(graph.one,) * count),
-        n_dof=terms.n_dof + count,
-        preferred=(*terms.preferred, *range(n, n + count)),
-        parent=(*terms.parent, *(-1,) * count),
-        motion_axes=(*terms.motion_axes, *[graph.zero] * (6 * count if terms.motion_axes else 0)),
-        rates=terms.q_dot,
-        centroidal=_centroidal(terms.centroidal, n, nothing),
-        accelerations=None if terms.accelerations is None else (*terms.accelerations, *rates),
-        pivots=(*terms.pivots, *(graph.one,) * count) if terms.accelerations is not None else (),
-        system=None if terms.system is None else _system(terms.system, rates),
-        slopes=None,
-        turned=None,
-        constrained=None if terms.constrained is None else partial(_constrained, terms.constrained, n, tuple(rates)),
-        n_states=count,
-    )
-
-
-def _centroidal(given: Row, n: int, nothing: Row) -> Row:
-    """Centre (3), its Jacobian (3, n) with columns for the states, and what follows."""
-    if not given:
-        return ()
-    rows = (given[3 + k * n : 3 + (k + 1) * n] for k in range(3))
-    return (*given[:3], *(x for row in rows for x in (*row, *nothing)), *given[3 + 3 * n :])
+    @cached_property
+    def acceleration_residual(self) -> list[Expr]:
+        """r2 = C_q a + gamma (m,)"""
+        a, r2 = self.symbols(self.a), []
+        for row, r in zip(self.constraint_jacobian, self.gamma, strict=True):
+            for c, x in zip(row, a, strict=True):
+                r = r + c * x
+            r2.append(r)
+        return r2
 
 
 def _constrained(
@@ -278,35 +310,105 @@ def _constrained(
     )
 
 
-def _system(system: LinearSystem, rates: Sequence[Expr]) -> LinearSystem:
-    """The linear system of a method: the rates of the states are no unknowns of it."""
-    return replace(system, accelerations=(*system.accelerations, *rates))
+def independent_places(kinematics: Kinematics, mobility: Mobility) -> tuple[int, ...]:
+    """Places of the independent velocities."""
+    return tuple(kinematics.velocity_labels.index(n) for n in mobility.independent)
 
 
-def constraint_forces(terms: SystemTerms) -> list[Expr]:
-    """C_q^T l (n,)."""
-    forces = [terms.graph.zero] * terms.n_v
-    for row, name in zip(terms.constraint_jacobian, terms.multipliers, strict=True):
-        l = terms.graph.symbol(name)
-        forces = [r + c * l for r, c in zip(forces, row, strict=True)]
-    return forces
+def flag_forces(kinematics: Kinematics) -> list[tuple[str, Expr]]:
+    """Names of the elements whose loads need not be finite, and flags of (t, q, v, u): 1 where they are, else 0."""
+    found = []
+    for terms in kinematics.forces:
+        total = _size(terms)
+        if total is not None:
+            finite = total.graph.apply("lt", total, LARGEST)  # false for what is not a number
+            found.append((terms.force.name, finite))
+    return found
 
 
-def force_residual(terms: SystemTerms) -> list[Expr]:
-    """r1 = M a + h + C_q^T l (n,)"""
-    r1 = list(terms.inverse_dynamics)
-    for row, name in zip(terms.constraint_jacobian, terms.multipliers, strict=True):
-        l = terms.graph.symbol(name)
-        r1 = [r + c * l for r, c in zip(r1, row, strict=True)]
-    return r1
+def _size(terms: ForceTerms) -> Expr | None:
+    """Sum of the sizes of all entries, None if it is finite wherever the state is."""
+    entries: list[Expr] = []
+    for load in terms.marker_loads:
+        entries += [*load.force, *load.torque]
+    entries += [load.value for load in terms.coordinate_loads]
+    if not entries:
+        return None
+    graph = entries[0].graph
+    fragile = operations_with(lambda row: row.fragile)
+    if not any(graph.nodes[i][0] in fragile for i in reachable(graph, [e.id for e in entries])):
+        return None
+    total = graph.zero
+    for entry in entries:
+        total = total + graph.apply("abs", entry)
+    return total
 
 
-def acceleration_residual(terms: SystemTerms) -> list[Expr]:
-    """r2 = C_q a + gamma (m,)"""
-    a = [terms.graph.symbol(name) for name in terms.a]
-    r2 = []
-    for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
-        for c, x in zip(row, a, strict=True):
-            r = r + c * x
-        r2.append(r)
-    return r2
+def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
+    """Event, state and its new value, of all resets."""
+    names = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
+    places = {name: k for k, name in enumerate(names)}
+    found: list[tuple[int, int, Expr]] = []
+    for i, event in enumerate(kinematics.mechanism.events):
+        for name, value in (dict(event.reset) | dict(kinematics.velocities_after.get(event.name, ()))).items():
+            if name not in places:
+                raise UsageError(
+                    f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "
+                    f"reset {', '.join(places)}",
+                    code="EG-EVENT",
+                )
+            found.append((i, places[name], value))
+    return found
+
+
+def resolved(given: Sequence[Expr], kinematics: Kinematics, equations: TreeEquations) -> Row:
+    """Expressions in terms of the tree's q, v, a."""
+    expressions = kinematics.resolve(given)
+    graph = kinematics.graph
+    energies = {
+        graph.symbol("kinetic_energy()"): equations.kinetic_energy,
+        graph.symbol("potential_energy()"): equations.potential_energy,
+        graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
+    }
+    return tuple(substitute(expressions, energies | multiplier_values(kinematics, equations)))
+
+
+def _meeting_times(kinematics: Kinematics) -> list[Expr]:
+    """How long a step may be that passes over no contact, and the deepest two shapes, if there are such contacts."""
+    total: list[Expr] = []
+    start = 0
+    for force in kinematics.mechanism.forces:
+        shapes = force.met_shapes()
+        if not shapes:
+            continue
+        time, depth, thickness, *pair = force.meeting(kinematics.motion)
+        mine = [time, depth, thickness, *(start + number for number in pair)]
+        start += len(shapes)
+        if total:
+            deeper = time.graph.apply("lt", total[1], depth)
+            rest = [where(deeper, new, old) for new, old in zip(mine[1:], total[1:], strict=True)]
+            mine = [time.graph.apply("min", total[0], time), *rest]
+        total = mine
+    return kinematics.resolve(total)
+
+
+def _centroidal(kinematics: Kinematics) -> Row:
+    """Centre of mass, its Jacobian, momenta and inertia of a mechanism that has mass, ground axes."""
+    total = kinematics.motion.momentum
+    if total.mass.is_zero:
+        return ()
+    rows = [*total.jacobian(len(kinematics.v)), total.linear, total.angular, *total.inertia]
+    return (*total.centre, *(x for row in rows for x in row))
+
+
+def _poses(kinematics: Kinematics) -> Row:
+    """Body frames in ground axes as 4 x 4 matrices, row by row, in the order the bodies were declared."""
+    graph = kinematics.graph
+    entries: list[Expr] = []
+    for k, body in enumerate(kinematics.mechanism.bodies):
+        origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+        pose = kinematics.poses.marker(origin)
+        for row, x in zip(pose.rotation, pose.position, strict=True):
+            entries += [*row, x]
+        entries += [graph.zero, graph.zero, graph.zero, graph.one]
+    return tuple(entries)

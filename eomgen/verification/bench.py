@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,17 +14,23 @@ from ..base.kernel_table import NAMED
 from ..base.limits.analyses import NUDGE
 from ..base.limits.constraints import EXACT
 from ..base.limits.numbers import TINY
-from ..codegen.collect import collect_terms
+from ..codegen.kernels import EXPRESSIONS
+from ..codegen.terms import SystemTerms
 from ..graph.core import Expr
 from .cases import Case
 from .digits import FOLDED, UNIT, bounded
 from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:
-    from ..codegen.terms import SystemTerms
     from ..derivation import Derivation
     from ..runtime.bound_model import BoundModel
 
+#: Kernels that are compared with the expressions that they were made from.
+GRAPH_KERNELS = (
+    "bias", "inverse_dynamics", "energy", "poses", "constraints", "constraint_jacobian", "velocity_constraints",
+    "loop_coordinates", "loop_coordinate_jacobian", "alignment", "motion_outputs", "centroidal", "canonical", "events",
+    "needed_wrenches", "wrench_geometry", "inertial_terms",
+)  # fmt: skip
 DEEP = 3  #: states that are looked at in many digits
 
 
@@ -44,7 +50,7 @@ class Bench:
         self.layout = module.layout
         self.kinematics = equations.kinematics
         self.mechanism = equations.kinematics.mechanism
-        self.terms: SystemTerms = collect_terms(equations.kinematics, equations.mobility, equations.tree)
+        self.terms = SystemTerms(equations.kinematics, equations.mobility, equations.tree)
         self.system = PreciseSystem(equations, self.terms)
         self._bounds: dict[str, tuple[Array, Array]] = {}
 
@@ -83,34 +89,9 @@ class Bench:
     @cached_property
     def graph_kernels(self) -> dict[str, Callable[[], Sequence[Expr]]]:
         """Kernels that are expressions of the graph, by name."""
-        terms = self.terms
-
-        def flat(rows: Sequence[Sequence[Expr]]) -> list[Expr]:
-            return [x for row in rows for x in row]
-
-        found: dict[str, Callable[[], Sequence[Expr]]] = {
-            "bias": lambda: terms.bias,
-            "inverse_dynamics": lambda: terms.inverse_dynamics,
-            "energy": lambda: (terms.kinetic, terms.potential),
-            "poses": lambda: terms.poses,
-            "constraints": lambda: terms.constraints,
-            "constraint_jacobian": lambda: flat(terms.constraint_jacobian),
-            "velocity_constraints": lambda: terms.velocity_constraints,
-            "loop_coordinates": lambda: terms.loop_coordinates,
-            "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
-            "alignment": lambda: terms.alignment,
-            "motion_outputs": lambda: terms.outputs,
-            "centroidal": lambda: terms.centroidal,
-            "canonical": lambda: terms.canonical,
-            "events": lambda: terms.events,
-            "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
-            "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
-            "inertial_terms": lambda: terms.inertial() if terms.inertial else (),
-        }
-        if not terms.by_columns:
-            found["mass_matrix"] = lambda: flat(terms.mass_matrix)
+        found = [*GRAPH_KERNELS, *(() if self.terms.by_columns else ("mass_matrix",))]
         names = self.module.core.names
-        return {k: f for k, f in found.items() if k in names and 0 not in self.layout.shape(k)}
+        return {k: partial(EXPRESSIONS[k], self.terms) for k in found if k in names and 0 not in self.layout.shape(k)}
 
     # -- labels -------------------------------------------------------------------------------------------------------
     def labels(self, kernel: str) -> list[str]:

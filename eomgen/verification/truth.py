@@ -74,7 +74,8 @@ class Truth(PreciseState):
     def measured(self, values: Values) -> Numbers:
         """Coordinates of cut joints."""
         terms = self.system.terms
-        return self.system.evaluate("measured", lambda: terms.loop_coordinates[: terms.n_loop_coordinates], values)
+        n = terms.sizes.n_loop_coordinates
+        return self.system.evaluate("measured", lambda: terms.loop_coordinates[:n], values)
 
     @cached_property
     def measured_slopes(self) -> list[Numbers]:

@@ -90,14 +90,14 @@ FAULTS = (
         "tests/mechanics/test_change_points.py::test_in_every_method[recursive-cython]",
     ),
     Fault(
-        "residual-slopes-multipliers", "constraint_forces",
+        "residual-slopes-multipliers", "SystemTerms._with_multipliers",
         "[r + c * l for r, c in zip(forces, row, strict=True)]",
         "[r - c * l for r, c in zip(forces, row, strict=True)]",
         "derivatives of C_q^T l have the wrong sign",
         "tests/code/test_accelerations.py::test_derivatives_are_differences[slider_crank]",
     ),
     Fault(
-        "residual-slopes-gamma", "acceleration_residual",
+        "residual-slopes-gamma", "SystemTerms.acceleration_residual",
         "r = r + c * x",
         "r = r",
         "derivatives of C_q a + gamma lack C_qq a",

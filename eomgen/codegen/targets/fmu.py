@@ -80,34 +80,17 @@ def refuse_impacts(program: Program) -> None:
 
 
 class Variable(NamedTuple):
-    """One variable.
+    """One variable."""
 
-    Attributes
-    ----------
-    name : str
-        Unlike all others.
-    reference : int
-        Its value reference; the groups stand as in templates/fmu/fmu_model.h.j2.
-    group : {'x', 'rate', 'u', 'p', 'y', 'time', 'event'}
-    unit, doc : str
-    start : float or None
-    bounds : pair of float
-        The least and the greatest value, infinite where there is none.
-    exact : bool
-        Of a state: whether its start value holds; others follow from these where loops are closed.
-    state : int or None
-        Of a rate: the reference of its state.
-    """
-
-    name: str
-    reference: int
-    group: str
+    name: str  #: unlike all others
+    reference: int  #: its value reference; the groups stand as in templates/fmu/fmu_model.h.j2
+    group: str  #: x, rate, u, p, y, time or event
     unit: str = ""
     doc: str = ""
     start: float | None = None
     bounds: tuple[float, float] = (-math.inf, math.inf)
-    exact: bool = True
-    state: int | None = None
+    exact: bool = True  #: of a state: whether its start value holds; others follow from these where loops are closed
+    state: int | None = None  #: of a rate: the reference of its state
 
     @property
     def unknown_at_start(self) -> bool:
@@ -116,14 +99,7 @@ class Variable(NamedTuple):
 
 
 def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
-    """All variables.
-
-    Parameters
-    ----------
-    program : Program
-    start : sequence of float
-        x where the model starts.
-    """
+    """All variables; the model starts at x = ``start``."""
     metadata, units, docs = program.metadata, program.metadata["units"], program.metadata["docs"]
     x_names, taken = metadata["x_names"], set(metadata["x_names"])
     exact, bounds = find_exact(program), bounds_of(metadata)
@@ -157,23 +133,11 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
 
 def find_exact(program: Program) -> list[bool]:
     """Of each state, whether its start value holds: the others follow so that loops are closed."""
-    sizes = program.sizes
+    sizes, independent = program.sizes, set(program.preferred)
     if not program.has_loops:
         return [True] * sizes.n_x
-    independent = set(program.preferred)
-    of_v = [k in independent for k in range(sizes.n_v)]
-    of_q = [True] * sizes.n_q
-    if sizes.n_h:
-        of_q = [False] * sizes.n_q
-        for k in independent:
-            if (place := coordinate_of(program, k)) >= 0:  # no coordinate has the rate of a turning frame
-                of_q[place] = True
-    return [*of_q, *of_v]
-
-
-def coordinate_of(program: Program, velocity: int) -> int:
-    """The coordinate that a velocity is the rate of."""
-    return program.coordinate_of[velocity] if program.coordinate_of else velocity
+    places = {program.coordinate_of[k] for k in independent} if sizes.n_h else {*range(sizes.n_q)}
+    return [*(k in places for k in range(sizes.n_q)), *(k in independent for k in range(sizes.n_v))]
 
 
 def _rate_unit(unit: str) -> str:
@@ -195,35 +159,38 @@ def describe_model(program: Program, version: str, token: str, variables: Sequen
                    experiment: Mapping[str, float]) -> str:  # fmt: skip
     """The text of modelDescription.xml."""
     two = version == "2.0"
-    metadata = program.metadata
     about = {"fmiVersion": version, "modelName": program.name, "guid" if two else "instantiationToken": token}
-    doc = one_line(str(metadata.get("doc") or ""))
+    doc = one_line(str(program.metadata.get("doc") or ""))
     about |= {"description": doc} if doc else {}
     about |= {"generationTool": TOOL, "variableNamingConvention": "flat"}
-    if two:
-        about["numberOfEventIndicators"] = str(program.sizes.n_events)
-    root = ElementTree.Element("fmiModelDescription", about)
-    _add_kinds(root, program.name, two, files)
-    _add_units(root, variables)
-    categories = ElementTree.SubElement(root, "LogCategories")
-    ElementTree.SubElement(categories, "Category", name="logStatusError", description="what went wrong")
-    ElementTree.SubElement(categories, "Category", name="logAll", description="everything")
-    ElementTree.SubElement(root, "DefaultExperiment", {k: repr(float(v)) for k, v in experiment.items()})
-    section = ElementTree.SubElement(root, "ModelVariables")
-    for variable in variables:
-        (_add_scalar if two else _add_float)(section, variable)
-    (_add_structure_2 if two else _add_structure_3)(root, variables)
-    return _text(root)
+    about |= {"numberOfEventIndicators": str(program.sizes.n_events)} if two else {}
+    units = sorted({v.unit for v in variables if v.unit})
+    logged = {"logStatusError": "what went wrong", "logAll": "everything"}
+    return _text(
+        _tag(
+            "fmiModelDescription",
+            about,
+            *_kinds(program.name, two, files),
+            *([_tag("UnitDefinitions", {}, *map(_unit, units))] if units else []),
+            _tag("LogCategories", {}, *(_tag("Category", {"name": k, "description": v}) for k, v in logged.items())),
+            _tag("DefaultExperiment", {k: repr(float(v)) for k, v in experiment.items()}),
+            _tag("ModelVariables", {}, *(_variable(v, two) for v in variables)),
+            _tag("ModelStructure", {}, *_structure(variables, two)),
+        )
+    )
 
 
 def describe_build(name: str, files: Sequence[str]) -> str:
     """The text of sources/buildDescription.xml of FMI 3.0."""
-    root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
-    build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=name)
-    sources = ElementTree.SubElement(build, "SourceFileSet", language="C99")
-    for file in files:
-        ElementTree.SubElement(sources, "SourceFile", name=file)
-    return _text(root)
+    sources = _tag("SourceFileSet", {"language": "C99"}, *(_tag("SourceFile", {"name": file}) for file in files))
+    build = _tag("BuildConfiguration", {"modelIdentifier": name}, sources)
+    return _text(_tag("fmiBuildDescription", {"fmiVersion": "3.0"}, build))
+
+
+def _tag(name: str, attributes: Mapping[str, str], *children: ElementTree.Element) -> ElementTree.Element:
+    made = ElementTree.Element(name, dict(attributes))
+    made.extend(children)
+    return made
 
 
 def _text(root: ElementTree.Element) -> str:
@@ -231,99 +198,65 @@ def _text(root: ElementTree.Element) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_kinds(root: ElementTree.Element, name: str, two: bool, files: Sequence[str]) -> None:
+def _kinds(name: str, two: bool, files: Sequence[str]) -> list[ElementTree.Element]:
     """Model exchange and co-simulation, with what each can do."""
     word, plural = ("state", "") if two else ("State", "s")
     able = {"modelIdentifier": name, f"canGetAndSetFMU{word}": "true", f"canSerializeFMU{word}": "true"}
     able[f"providesDirectionalDerivative{plural}"] = "true"
     able |= {"canNotUseMemoryManagementFunctions": "true"} if two else {}
     exchange = {"completedIntegratorStepNotNeeded": "false"} if two else {"needsCompletedIntegratorStep": "true"}
-    tags = [
-        ElementTree.SubElement(root, "ModelExchange", able | exchange),
-        ElementTree.SubElement(root, "CoSimulation", able | {"canHandleVariableCommunicationStepSize": "true"}),
-    ]
-    for tag in tags if two else ():
-        listed = ElementTree.SubElement(tag, "SourceFiles")
-        for file in files:
-            ElementTree.SubElement(listed, "File", name=file)
+    further = {"ModelExchange": exchange, "CoSimulation": {"canHandleVariableCommunicationStepSize": "true"}}
+
+    def sources() -> list[ElementTree.Element]:
+        return [_tag("SourceFiles", {}, *(_tag("File", {"name": file}) for file in files))] if two else []
+
+    return [_tag(kind, able | more, *sources()) for kind, more in further.items()]
 
 
-def _add_units(root: ElementTree.Element, variables: Sequence[Variable]) -> None:
-    """Every unit with its powers of base units and its size."""
-    units = sorted({v.unit for v in variables if v.unit})
-    if not units:
-        return
-    section = ElementTree.SubElement(root, "UnitDefinitions")
-    for text in units:
-        unit = read_unit(text)
-        powers = {_BASE[k]: p for k, p in unit.dimension._asdict().items() if k in _BASE and p}
-        angles = sum((-1 if slash else 1) * int(power or 1) for slash, power in _ANGLE.findall(text))
-        powers |= {"rad": angles} if angles else {}
-        base = {k: str(int(p)) for k, p in powers.items() if p == int(p)}
-        base |= {"factor": repr(unit.size)} if unit.size != 1.0 else {}
-        one = ElementTree.SubElement(section, "Unit", name=text)
-        if all(p == int(p) for p in powers.values()):
-            ElementTree.SubElement(one, "BaseUnit", base)
+def _unit(text: str) -> ElementTree.Element:
+    """A unit with its powers of base units and its size."""
+    unit = read_unit(text)
+    powers = {_BASE[k]: p for k, p in unit.dimension._asdict().items() if k in _BASE and p}
+    angles = sum((-1 if slash else 1) * int(power or 1) for slash, power in _ANGLE.findall(text))
+    powers |= {"rad": angles} if angles else {}
+    if any(p != int(p) for p in powers.values()):
+        return _tag("Unit", {"name": text})
+    base = {k: str(int(p)) for k, p in powers.items()} | ({"factor": repr(unit.size)} if unit.size != 1.0 else {})
+    return _tag("Unit", {"name": text}, _tag("BaseUnit", base))
 
 
-def _attributes(variable: Variable) -> dict[str, str]:
-    """What both versions say of a variable, but for its type."""
-    given = {"name": variable.name, "valueReference": str(variable.reference)}
-    given |= {"description": one_line(variable.doc)} if variable.doc else {}
-    given["causality"] = _CAUSALITY.get(variable.group, "local")
-    given["variability"] = "tunable" if variable.group == "p" else "continuous"
-    if variable.group == "p":
-        given["initial"] = "exact"
-    elif variable.group == "x":
-        given["initial"] = "exact" if variable.exact else "approx"
-    elif variable.group in ("rate", "y", "event"):
-        given["initial"] = "calculated"
-    return given
-
-
-def _number_attributes(variable: Variable) -> dict[str, str]:
-    """Unit, bounds and start value."""
-    unit = {"unit": variable.unit} if variable.unit else {}
+def _variable(variable: Variable, two: bool) -> ElementTree.Element:
+    about = {"name": variable.name, "valueReference": str(variable.reference)}
+    about |= {"description": one_line(variable.doc)} if variable.doc else {}
+    about["causality"] = _CAUSALITY.get(variable.group, "local")
+    about["variability"] = "tunable" if variable.group == "p" else "continuous"
+    initial = {"p": "exact", "x": "exact" if variable.exact else "approx"}
+    initial |= dict.fromkeys(("rate", "y", "event"), "calculated")
+    about |= {"initial": initial[variable.group]} if variable.group in initial else {}
+    number = {"unit": variable.unit} if variable.unit else {}
     bounds = zip(("min", "max"), variable.bounds, strict=True)
-    unit |= {word: repr(float(bound)) for word, bound in bounds if math.isfinite(bound)}
-    return unit | ({"start": repr(variable.start)} if variable.start is not None else {})
+    number |= {word: repr(float(bound)) for word, bound in bounds if math.isfinite(bound)}
+    number |= {"start": repr(variable.start)} if variable.start is not None else {}
+    number |= {} if variable.state is None else {"derivative": str(variable.state + two)}
+    return _tag("ScalarVariable", about, _tag("Real", number)) if two else _tag("Float64", about | number)
 
 
-def _add_scalar(section: ElementTree.Element, variable: Variable) -> None:
-    of = {} if variable.state is None else {"derivative": str(variable.state + 1)}
-    tag = ElementTree.SubElement(section, "ScalarVariable", _attributes(variable))
-    ElementTree.SubElement(tag, "Real", _number_attributes(variable) | of)
-
-
-def _add_float(section: ElementTree.Element, variable: Variable) -> None:
-    of = {} if variable.state is None else {"derivative": str(variable.state)}
-    ElementTree.SubElement(section, "Float64", _attributes(variable) | _number_attributes(variable) | of)
-
-
-def _add_structure_2(root: ElementTree.Element, variables: Sequence[Variable]) -> None:
-    structure = ElementTree.SubElement(root, "ModelStructure")
+def _structure(variables: Sequence[Variable], two: bool) -> list[ElementTree.Element]:
+    """Which variables are outputs, rates, unknown at the start and, of FMI 3.0, event indicators."""
     groups = {
-        "Outputs": [v for v in variables if v.group == "y"],
-        "Derivatives": [v for v in variables if v.group == "rate"],
-        "InitialUnknowns": [v for v in variables if v.unknown_at_start],
+        "Output": [v for v in variables if v.group == "y"],
+        "ContinuousStateDerivative": [v for v in variables if v.group == "rate"],
+        "InitialUnknown": [v for v in variables if v.unknown_at_start],
+        "EventIndicator": [v for v in variables if v.group == "event"],
     }
-    for title, found in groups.items():
-        if found:
-            section = ElementTree.SubElement(structure, title)
-            for v in found:
-                ElementTree.SubElement(section, "Unknown", index=str(v.reference + 1))
-
-
-def _add_structure_3(root: ElementTree.Element, variables: Sequence[Variable]) -> None:
-    structure = ElementTree.SubElement(root, "ModelStructure")
-    for tag, found in (
-        ("Output", [v for v in variables if v.group == "y"]),
-        ("ContinuousStateDerivative", [v for v in variables if v.group == "rate"]),
-        ("InitialUnknown", [v for v in variables if v.unknown_at_start]),
-        ("EventIndicator", [v for v in variables if v.group == "event"]),
-    ):
-        for v in found:
-            ElementTree.SubElement(structure, tag, valueReference=str(v.reference))
+    if not two:
+        return [_tag(tag, {"valueReference": str(v.reference)}) for tag, found in groups.items() for v in found]
+    titles = zip(("Outputs", "Derivatives", "InitialUnknowns"), groups.values(), strict=False)
+    return [
+        _tag(title, {}, *(_tag("Unknown", {"index": str(v.reference + 1)}) for v in found))
+        for title, found in titles
+        if found
+    ]
 
 
 _METHODS = ("DOP853", "RK45", "Radau")  #: those that co-simulation can run; DOP853 stands for others
@@ -338,9 +271,28 @@ def run_settings(program: Program) -> dict[str, Any]:
 
 def model_context(program: Program, start: Sequence[float], token: str) -> dict[str, Any]:
     """What the header is rendered with."""
-    metadata, settings = program.metadata, run_settings(program)
-    atol = settings["atol"]
-    free = _free(program)
+    metadata, sizes, settings, prefix = program.metadata, program.sizes, run_settings(program), program.name.upper()
+    kernels, atol = {k.name for k in program.kernels}, settings["atol"]
+    events, resets, clocks = (metadata.get(key, []) for key in ("events", "resets", "clocks"))
+    n_x, n_v, n_u, n_p, n_y = sizes.n_x, sizes.n_v, sizes.n_u, sizes.n_p, sizes.n_y
+    # where loops are closed by holding the independent velocities, whose coordinates the others follow
+    follows = sizes.n_h > 0 and sizes.n_h == sizes.n_c and "kinematics" in kernels
+    free = list(program.preferred) if follows else []
+    width = n_x + n_v + n_u + n_p
+    length = float(metadata["length_scale"] or 1.0)
+    kinds = [*metadata["coordinate_kinds"], *metadata["velocity_kinds"]]
+    lists: dict[str, Iterable[int]] = {
+        "INDEPENDENT": map(int, find_exact(program)),
+        "FREE_Q": (program.coordinate_of[k] for k in free),
+        "FREE_V": free,
+        "DIRECTION": (event["direction"] for event in events),
+        "MOST": (int(event["terminal"]) for event in events),
+        "RESETS": (int(event["resets"]) for event in events),
+        "RESET_OF": (row[0] for row in resets),
+        "RESET_X": (row[1] for row in resets),
+        "CLOCK_EVENT": (clock["event"] for clock in clocks),
+        "CLOCK_COUNTER": (clock["counter"] for clock in clocks),
+    }
     return {
         "name": program.name,
         "token": token,
@@ -348,94 +300,40 @@ def model_context(program: Program, start: Sequence[float], token: str) -> dict[
         "rtol": repr(float(settings["rtol"])),
         "atol": repr(float(min(atol) if isinstance(atol, list) else atol)),
         "max_step": repr(float(settings.get("max_step") or _NO_LIMIT)),
-        "switches": _switches(program, free),
-        "numbers": _header_sizes(program, len(free)),
-        "tables": [
-            ("START_X", number_texts(start)),
-            ("START_U", number_texts(metadata["u_values"])),
-            ("START_P", number_texts(metadata["p_values"])),
-            ("NOMINAL", number_texts(_nominal(program))),
-        ],
-        "lists": _lists(program, free),
+        "switches": {  # numbers that the preprocessor decides by
+            "CO_SIMULATION": 1,
+            "HAS_OUTPUTS": int(n_y > 0),
+            "HAS_JACOBIAN": int("jacobian" in kernels),
+            "HAS_MEETING_TIME": int("meeting_time" in kernels),
+            "HAS_PROJECT": int("project" in kernels),
+            "HAS_KINEMATICS": int(follows),
+            "N_EVENTS": sizes.n_events,
+            "N_RESETS": sizes.n_resets,
+            "N_CLOCKS": len(clocks),
+            "N_U": n_u,
+            "N_P": n_p,
+        },
+        "numbers": {  # sizes of the model and of the instance's work
+            "N_X": n_x,
+            "N_Q": sizes.n_q,
+            "N_V": n_v,
+            "N_Y": n_y,
+            "N_DOF": len(free),
+            "N_CONST": f"{prefix}_N_CONST",
+            "N_WORK": f"{prefix}_N_WORK",
+            "N_VALUES": max(n_y + max(n_p + n_u, sizes.n_events), 3 * sizes.n_events),
+            "N_TRIAL": max(3 * len(free) + 2 * sizes.n_q + 2 * n_v, sizes.n_resets, n_x + n_v + width),
+            "N_MATRIX": f"{max(n_x * max(n_x, n_u, n_p), n_y * width)} + {prefix}_N_CONST",
+        },
+        "tables": {
+            "START_X": number_texts(start),
+            "START_U": number_texts(metadata["u_values"]),
+            "START_P": number_texts(metadata["p_values"]),
+            # typical sizes of the states: 1 rad, the size of the mechanism, and their rates a second
+            "NOMINAL": number_texts(length if kind == "length" else 1.0 for kind in kinds),
+        },
+        "lists": {name: ", ".join(map(str, values)) or "0" for name, values in lists.items()},
     }
-
-
-def _free(program: Program) -> list[int]:
-    """The velocities whose coordinates the others follow, where loops are closed by holding these."""
-    sizes = program.sizes
-    follows = sizes.n_h > 0 and sizes.n_h == sizes.n_c and "kinematics" in {k.name for k in program.kernels}
-    return list(program.preferred) if follows else []
-
-
-def _switches(program: Program, free: Sequence[int]) -> list[tuple[str, int]]:
-    """Numbers that the preprocessor decides by."""
-    sizes, kernels = program.sizes, {k.name for k in program.kernels}
-    follows = sizes.n_h > 0 and sizes.n_h == sizes.n_c and "kinematics" in kernels
-    return [
-        ("CO_SIMULATION", 1),
-        ("HAS_OUTPUTS", int(sizes.n_y > 0)),
-        ("HAS_JACOBIAN", int("jacobian" in kernels)),
-        ("HAS_MEETING_TIME", int("meeting_time" in kernels)),
-        ("HAS_PROJECT", int("project" in kernels)),
-        ("HAS_KINEMATICS", int(follows)),
-        ("N_EVENTS", sizes.n_events),
-        ("N_RESETS", sizes.n_resets),
-        ("N_CLOCKS", len(program.metadata.get("clocks", []))),
-        ("N_U", sizes.n_u),
-        ("N_P", sizes.n_p),
-    ]
-
-
-def _header_sizes(program: Program, n_free: int) -> list[tuple[str, int | str]]:
-    """Sizes of the model and of the instance's work."""
-    sizes, prefix = program.sizes, program.name.upper()
-    width = sizes.n_x + sizes.n_v + sizes.n_u + sizes.n_p
-    values = max(sizes.n_y + max(sizes.n_p + sizes.n_u, sizes.n_events), 3 * sizes.n_events)
-    trial = max(3 * n_free + 2 * sizes.n_q + 2 * sizes.n_v, sizes.n_resets, sizes.n_x + sizes.n_v + width)
-    matrix = max(sizes.n_x * max(sizes.n_x, sizes.n_u, sizes.n_p), sizes.n_y * width)
-    return [
-        ("N_X", sizes.n_x),
-        ("N_Q", sizes.n_q),
-        ("N_V", sizes.n_v),
-        ("N_Y", sizes.n_y),
-        ("N_DOF", n_free),
-        ("N_CONST", f"{prefix}_N_CONST"),
-        ("N_WORK", f"{prefix}_N_WORK"),
-        ("N_VALUES", values),
-        ("N_TRIAL", trial),
-        ("N_MATRIX", f"{matrix} + {prefix}_N_CONST"),
-    ]
-
-
-def _lists(program: Program, free: Sequence[int]) -> list[tuple[str, str]]:
-    """Tables of whole numbers."""
-    metadata = program.metadata
-    events, resets, clocks = (metadata.get(key, []) for key in ("events", "resets", "clocks"))
-    return [
-        ("INDEPENDENT", _whole(map(int, find_exact(program)))),
-        ("FREE_Q", _whole(coordinate_of(program, k) for k in free)),
-        ("FREE_V", _whole(free)),
-        ("DIRECTION", _whole(event["direction"] for event in events)),
-        ("MOST", _whole(int(event["terminal"]) for event in events)),
-        ("RESETS", _whole(int(event["resets"]) for event in events)),
-        ("RESET_OF", _whole(row[0] for row in resets)),
-        ("RESET_X", _whole(row[1] for row in resets)),
-        ("CLOCK_EVENT", _whole(clock["event"] for clock in clocks)),
-        ("CLOCK_COUNTER", _whole(clock["counter"] for clock in clocks)),
-    ]
-
-
-def _nominal(program: Program) -> list[float]:
-    """Typical sizes of the states: 1 rad, the size of the mechanism, and their rates a second."""
-    metadata = program.metadata
-    length = float(metadata["length_scale"] or 1.0)
-    kinds = [*metadata["coordinate_kinds"], *metadata["velocity_kinds"]]
-    return [length if kind == "length" else 1.0 for kind in kinds]
-
-
-def _whole(values: Iterable[int]) -> str:
-    """The inside of a C initialiser of integers, which must not be empty."""
-    return ", ".join(map(str, values)) or "0"
 
 
 #: Sources that are the same for all models.
@@ -443,38 +341,15 @@ _COMMON = ("eomgen_fmu.c", "fmu_start.c", "fmu_events.c", "fmu_travel.c", "fmu_d
 _STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_steppers.c")
 
 
-class FmuFiles(NamedTuple):
-    """The files of a unit.
-
-    Attributes
-    ----------
-    files : dict of str to str
-        Text by path in the unit; the C files and headers lie under ``sources/``.
-    compiled : tuple of str
-        The C files to compile, without their folder.
-    """
-
-    files: dict[str, str]
-    compiled: tuple[str, ...]
-
-
-def emit_fmu(program: Program, start: Sequence[float], version: str) -> FmuFiles:
-    """The files of a unit.
-
-    Parameters
-    ----------
-    program : Program
-    start : (n_x,) sequence of float
-        x where the model starts, on its constraints.
-    version : {'2.0', '3.0'}
-        Of FMI.
+def emit_fmu(program: Program, start: Sequence[float], version: str) -> dict[str, str]:
+    """The files of a unit that starts at x = ``start``, by path; C files and headers lie under ``sources/``.
 
     Raises
     ------
     ModelError
         See :func:`refuse_impacts`.
     UsageError
-        An unknown version.
+        An unknown version of FMI.
     """
     version = check_version(version)
     refuse_impacts(program)
@@ -498,7 +373,7 @@ def emit_fmu(program: Program, start: Sequence[float], version: str) -> FmuFiles
         files["sources/buildDescription.xml"] = describe_build(program.name, compiled)
     files["resources/model.json"] = facts
     files["documentation/index.html"] = _page(program, variables)
-    return FmuFiles(files, compiled)
+    return files
 
 
 def _token(version: str, *parts: Any) -> str:
@@ -624,11 +499,11 @@ def fmu_bytes(
     """The content of the file that :func:`write_fmu` writes; the same model gives the same bytes."""
     refuse_impacts(program)
     program, start = _begin_signals(program, module)
-    unit = emit_fmu(program, [float(x) for x in start], version)
-    files: dict[str, bytes] = {name: text.encode() for name, text in unit.files.items()}
+    texts = emit_fmu(program, [float(x) for x in start], version)
+    files = {name: text.encode() for name, text in texts.items()}
     folder = _FOLDERS.get((sys.platform, platform.machine()), (None, None))[version == "3.0"]
     if folder is not None:
-        code = {Path(name).name: text for name, text in unit.files.items() if name.endswith((".c", ".h"))}
+        code = {Path(name).name: text for name, text in texts.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
         library = compile_c_library(code, program.name, options, progress).product
         files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()

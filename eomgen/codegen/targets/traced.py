@@ -30,13 +30,13 @@ OF_LOOPS = {"rhs": "rhs_of_loops", "project": "project_state", "outputs": "outpu
 
 
 class Traced(NamedTuple):
-    """A public function: the lengths of its arguments between t and u, the shape, what it is, how it is made."""
+    """A public function."""
 
     name: str
-    arguments: dict[str, int]
+    arguments: dict[str, int]  #: their lengths, of those between t and u
     shape: tuple[int, ...]
-    result: str
-    function: str
+    result: str  #: what it is
+    function: str  #: how it is made
 
 
 def casadi_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
@@ -49,27 +49,19 @@ def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     return _package(program, context, "jax")
 
 
-def emit_traced(program: Program, library: str, steps: int = STEPS) -> str:
-    """The text of the module ``<name>`` for a library.
-
-    Parameters
-    ----------
-    program : Program
-        With the kernels :data:`~eomgen.targets.TRACED_KERNELS`.
-    library : {'casadi', 'jax'}
-    steps : int, optional
-        Newton steps onto the constraints of closed loops, at least 3.
+def emit_traced(program: Program, library: str) -> str:
+    """The text of the module ``<name>`` for 'casadi' or 'jax', of the kernels :data:`~eomgen.targets.TRACED_KERNELS`.
 
     Raises
     ------
     UsageError
         Something in the model has no form that a library can trace.
     """
-    return render("traced/__init__.py.j2", _context(program, library, steps))
+    return render("traced/__init__.py.j2", _context(program, library))
 
 
 def _package(program: Program, context: dict[str, Any], library: str) -> dict[str, str]:
-    context = _context(program, library, STEPS) | {k: v for k, v in context.items() if k == "description"}
+    context = _context(program, library) | {k: v for k, v in context.items() if k == "description"}
     return {
         "py.typed": "",
         "__init__.py": render("traced/__init__.py.j2", context),
@@ -78,7 +70,7 @@ def _package(program: Program, context: dict[str, Any], library: str) -> dict[st
     }
 
 
-def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
+def _context(program: Program, library: str) -> dict[str, Any]:
     _require_traceable(program, library)
     metadata, blocks, sizes = program.metadata, program.block_names, program.sizes
     functions = [f for f, _ in used_calls(program).values()]
@@ -89,10 +81,7 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
     minimal = has_loops and "kinematics" in drivers
     public = _public(program, minimal)
     moving = [k for k in program.preferred if k < n_v - program.n_states]
-    independent_q = [program.coordinate_of[k] if program.coordinate_of else k for k in moving]
-    if minimal and not program.coordinate_of:
-        inputs = next(d for d in program.drivers if d.name == "kinematics").ports[0].symbols
-        independent_q = [program.coordinates.index(name) for name in inputs]
+    independent_q = [program.coordinate_of[k] for k in moving]
     twins = program.twins
     return {
         "name": program.name,
@@ -101,7 +90,7 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
         "library": library,
         "library_name": LIBRARIES[library][0],
         "requirement": LIBRARIES[library][1],
-        "steps": steps,
+        "steps": STEPS,
         "p_values": _numbers(metadata.get("p_values")),
         "u_values": _numbers(metadata.get("u_values")),
         "x0": _numbers(example_state(program)),

@@ -1,4 +1,4 @@
-"""the columns of a tree's Jacobian that belong to states of contacts, from their pairs alone.
+"""The columns of a tree's Jacobian that belong to states of contacts, from their pairs alone.
 
 A state of a pair of shapes, or of a cell of soil, acts on bodies by what its pairs exert, and otherwise on the states
 of its own pair.  So the rows of states follow from as many directions as a pair has states, all pairs at a time (A. R.
@@ -20,13 +20,13 @@ from ..numeric.pair_sums import POSE
 from .terms import SystemTerms
 
 #: Blocks of M of the bodies and h, of the operands of the sums, and of the residual along wrenches on their bodies.
-HELD = ("held_terms", "held_operands", "held_loads")
+COLUMNS = ("held_terms", "held_operands", "held_loads")
 LEAST = 48  #: states of contacts from which the driver is worth its text
 WRENCH = 6  #: numbers of what a body gets
 LOADED = -1  #: in a set of velocities: what a body gets
 
 
-class HeldSum(NamedTuple):
+class StatedSum(NamedTuple):
     """A sum over pairs that have states."""
 
     function: PairFunction
@@ -34,30 +34,15 @@ class HeldSum(NamedTuple):
     slots: tuple[int, ...]  #: of each state the velocity, -1 of a number that is only summed
 
 
-class HeldColumns(NamedTuple):
-    """Which columns these are, and what the driver needs.
+class ContactColumns(NamedTuple):
+    """Which columns these are, and what the driver needs."""
 
-    Attributes
-    ----------
-    sums : tuple of HeldSum
-    groups : tuple of tuple of int
-        States, as numbers of velocities, that may be seeded at a time.
-    rows : mapping
-        State -> the states whose rates depend on it.
-    operands : tuple of Expr
-        Those of the places of all sums.
-    loads : tuple of str
-        Symbols of the wrenches of all bodies of all sums.
-    along : tuple of Expr
-        The bodies' residual along these wrenches.
-    """
-
-    sums: tuple[HeldSum, ...]
-    groups: tuple[tuple[int, ...], ...]
-    rows: dict[int, tuple[int, ...]]
-    operands: tuple[Expr, ...]
-    loads: tuple[str, ...]
-    along: tuple[Expr, ...]
+    sums: tuple[StatedSum, ...]
+    groups: tuple[tuple[int, ...], ...]  #: states, as numbers of velocities, that may be seeded at a time
+    rows: dict[int, tuple[int, ...]]  #: state -> the states whose rates depend on it
+    operands: tuple[Expr, ...]  #: those of the places of all sums
+    loads: tuple[str, ...]  #: symbols of the wrenches of all bodies of all sums
+    along: tuple[Expr, ...]  #: the bodies' residual along these wrenches
 
     def block(self, name: str, terms: SystemTerms) -> tuple[str, list[Expr]]:
         """Ports and outputs of one of the blocks."""
@@ -67,7 +52,7 @@ class HeldColumns(NamedTuple):
         return ("q v", [*self.operands]) if name == "held_operands" else ("q v a multipliers loads", [*self.along])
 
 
-def held_columns(terms: SystemTerms) -> HeldColumns | None:
+def contact_columns(terms: SystemTerms) -> ContactColumns | None:
     """The columns of states of contacts, or None where they are few, or where the states act in other ways too."""
     graph, n, begun = terms.graph, terms.n_v, terms.n_v - terms.n_states
     if terms.n_c or terms.n_states < LEAST or terms.by_columns or terms.system or terms.given_rates:
@@ -75,7 +60,7 @@ def held_columns(terms: SystemTerms) -> HeldColumns | None:
     index = {graph.symbol(name).id: k for k, name in enumerate(terms.v) if k >= begun}
     residual = list(terms.inverse_dynamics)
     order = reachable(graph, [y.id for y in residual])
-    sums: list[HeldSum] = []
+    sums: list[StatedSum] = []
     operands: list[Expr] = []
     for i in order:
         call = pair_call(graph, graph.nodes[i][0])
@@ -84,7 +69,7 @@ def held_columns(terms: SystemTerms) -> HeldColumns | None:
         function, given = call.function, graph.nodes[graph.nodes[i][1]][1:]
         start, first = POSE * function.bodies, function.first_state
         places = tuple(k for k in range(first) if k < start or function.data[k - start] is None)
-        sums.append(HeldSum(function, places, tuple(index.get(k, -1) for k in given[first:])))
+        sums.append(StatedSum(function, places, tuple(index.get(k, -1) for k in given[first:])))
         operands += [Expr(graph, given[k]) for k in places]
     if len({one.function.name for one in sums}) < len(sums):
         return None
@@ -104,11 +89,11 @@ def held_columns(terms: SystemTerms) -> HeldColumns | None:
     loads, along = _along(graph, residual[:begun], order, sums)
     if along is None:
         return None
-    return HeldColumns(tuple(sums), groups, {k: tuple(v) for k, v in rows.items()}, tuple(operands), loads, along)
+    return ContactColumns(tuple(sums), groups, {k: tuple(v) for k, v in rows.items()}, tuple(operands), loads, along)
 
 
 def _dependences(
-    graph: Graph, order: Sequence[int], sums: Sequence[HeldSum], index: dict[int, int]
+    graph: Graph, order: Sequence[int], sums: Sequence[StatedSum], index: dict[int, int]
 ) -> dict[int, frozenset[int]] | None:
     """The states of pairs that nodes depend on but for what pairs exert on bodies; None where that is not known."""
     slots = {one.function.name: one.slots for one in sums}
@@ -154,7 +139,7 @@ def _groups(rows: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
 
 
 def _along(
-    graph: Graph, residual: Sequence[Expr], order: Sequence[int], sums: Sequence[HeldSum]
+    graph: Graph, residual: Sequence[Expr], order: Sequence[int], sums: Sequence[StatedSum]
 ) -> tuple[tuple[str, ...], tuple[Expr, ...] | None]:
     """Symbols of wrenches, and the residual along them: None where their effect depends on themselves."""
     starts: dict[str, int] = {}

@@ -14,17 +14,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 
-from ...base.limits.constraints import TIKHONOV
-from ...equations.articulated import ConstraintRow
-from ...graph.core import Expr
-from ...graph.differentiate import jacobian, jvp
-from ...graph.pair_calls import list_operands
-from ...graph.substitute import substitute
-from ...graph.traverse import reachable
-from ..linear_algebra import times
-from ..program import Block, Port
-from ..terms import acceleration_residual, force_residual
-from .body_loops import BodyLoops
+from ..base.limits.constraints import TIKHONOV
+from ..equations.articulated import ConstraintRow
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian, jvp
+from ..graph.pair_calls import list_operands
+from ..graph.substitute import substitute
+from ..graph.traverse import reachable
+from .linear_algebra import times
+from .loop_systems import BodyLoops
+from .program import Block, Port
 
 Outputs = list[Expr]
 
@@ -33,29 +32,16 @@ BY_BODIES = ("loop_slopes", "slopes_by_position", "slopes_by_velocity")
 
 
 class LoopSlopes:
-    """The blocks behind the Jacobian of a mechanism with loops.
+    """The blocks behind the Jacobian of a mechanism with loops, which has a motion by articulated bodies."""
 
-    Parameters
-    ----------
-    loops : BodyLoops
-        With a motion by articulated bodies.
-    dq, dv : sequences of str
-        Symbols of a direction.
-    """
-
-    def __init__(self, loops: BodyLoops, dq: Sequence[str], dv: Sequence[str]) -> None:
-        self.loops = loops
-        self.terms = loops.terms
-        self.dq, self.dv = self._symbols(dq), self._symbols(dv)
-        self.q, self.v, self.a = (self._symbols(names) for names in (self.terms.q, self.terms.v, self.terms.a))
-
-    def _symbols(self, names: Sequence[str]) -> list[Expr]:
-        return [self.terms.graph.symbol(name) for name in names]
+    def __init__(self, loops: BodyLoops) -> None:
+        self.loops, terms = loops, loops.terms
+        self.terms = terms
+        self.dq, self.dv, self.q, self.v, self.a = (
+            terms.symbols(terms.ports[name]) for name in ("dq", "dv", "q", "v", "a")
+        )
 
     # -- directions -----------------------------------------------------------------------------------------------
-    def _at_rest(self, rows: int) -> list[Expr]:
-        return [self.terms.graph.zero] * rows
-
     def _positions(self) -> list[Expr]:
         """The change of the projected q; Euler parameters keep their part along themselves."""
         loops, terms = self.loops, self.terms
@@ -68,7 +54,7 @@ class LoopSlopes:
             for c in range(3):
                 z[j + c] = _sum(N[i + m, j + c] * factor * de[m] for m in range(4) if (i + m, j + c) in N)
         if loops.h:
-            z = loops.nearest(z, self._at_rest(loops.h), loops.h, *loops.holonomic)
+            z = loops.nearest(z, [terms.graph.zero] * loops.h, loops.h, *loops.holonomic)
         moved = substitute(rates, dict(zip(self.v, z, strict=True)))
         for i, _ in terms.quaternion_slots:
             e, de = self.q[i : i + 4], self.dq[i : i + 4]
@@ -80,7 +66,7 @@ class LoopSlopes:
         """The change of the projected v, q changing by dq."""
         turned = jvp(self.terms.velocity_constraints, dict(zip(self.q, dq, strict=True)))
         r = [x * i for x, i in zip(turned, self.loops.inverse, strict=True)]
-        return self.loops.nearest(dv, r, len(r), self.loops.factor, self.loops.corrections)
+        return self.loops.nearest(dv, r, len(r), *self.loops.of_velocities)
 
     # -- accelerations --------------------------------------------------------------------------------------------
     def _changed(self, r1: Sequence[Expr], r2: Sequence[Expr]) -> list[Expr]:
@@ -97,14 +83,14 @@ class LoopSlopes:
             ]
             more = terms.constrained(again, term, loaded=False).accelerations
             da = [x + y for x, y in zip(da, more, strict=True)]
-        return loops.nearest(da, rest, len(rest), loops.factor, 1)
+        return loops.nearest(da, rest, len(rest), loops.solver[0], 1)
 
     def _along(self, dq: Sequence[Expr], dv: Sequence[Expr]) -> Outputs:
         """dq' and da along a projected direction."""
         terms, motion = self.terms, self.loops.motion
         assert motion is not None
-        l = self._symbols(terms.multipliers)
-        r1, r2 = force_residual(terms), acceleration_residual(terms)
+        l = self.terms.symbols(terms.multipliers)
+        r1, r2 = terms.force_residual, terms.acceleration_residual
         seeds = dict(zip((*self.q, *self.v), (*dq, *dv), strict=True))
         changes = jvp([*terms.q_dot, *r1, *r2], seeds)
         n_q, n = len(self.q), terms.n_v
@@ -117,13 +103,8 @@ class LoopSlopes:
     def _columns(self) -> tuple[Outputs, Outputs]:
         zero, dq = self.terms.graph.zero, self._positions()
         by_position = self._along(dq, self._velocities(dq, [zero] * len(self.v)))
-        still = self.loops.nearest(
-            list(self.dv),
-            self._at_rest(len(self.loops.J)),
-            len(self.loops.J),
-            self.loops.factor,
-            self.loops.corrections,
-        )
+        rows = len(self.loops.J)
+        still = self.loops.nearest(list(self.dv), [zero] * rows, rows, *self.loops.of_velocities)
         return by_position, self._along([zero] * len(self.q), still)
 
     # -- stages ---------------------------------------------------------------------------------------------------
@@ -169,7 +150,7 @@ class LoopSlopes:
             n = self.terms.n_v
             every = (*outputs[:n], *outputs[2 * n :], *self.coefficients)
             return Block(name, tuple(ports[:2]), every, (len(every),), (*checks, *more), public=False)
-        mapping = dict(zip(self.coefficients, self._symbols(self.names), strict=True))
+        mapping = dict(zip(self.coefficients, self.terms.symbols(self.names), strict=True))
         which = BY_BODIES.index(name) - 1
         changes = substitute(self._columns[which], mapping)
         given = (Port("coefficients", self.names), ports[2 + which])

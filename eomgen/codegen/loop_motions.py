@@ -1,11 +1,11 @@
 """loops whose state is far from any change point -> the shortest straight-line form.
 
 All motions are v = B y with the preferred velocities y: B follows from the rows by orthogonal combinations
-(:mod:`..linear_algebra`), block by block, so that every leg of a platform is paid for alone.  With weights W = S^-2 of
+(:mod:`.linear_algebra`), block by block, so that every leg of a platform is paid for alone.  With weights W = S^-2 of
 the coordinates the nearest motion is the one with B^T W (v - B y) = 0, of as many unknowns as there are freedoms; so
 the step onto the constraints, velocities and accelerations share B, and no matrix has the size of the rows.
 
-Where columns of B are long, or what they follow from is nearly dependent, the forms of :mod:`.loop_blocks` take over.
+Where columns of B are long, or what they follow from is nearly dependent, the forms of :mod:`.loop_systems` take over.
 """
 
 from __future__ import annotations
@@ -13,27 +13,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from ...base.limits.constraints import LOST
-from ...base.limits.crossings import NEAR_SQUARE
-from ...graph.core import Expr
-from ...graph.substitute import substitute
-from ..linear_algebra import OrthogonalFactor, Row, SparseFactor, connected, factorize, fronts, times, work
-from .embedded_loops import SPREAD, embedded_accelerations
-from .leg_motions import Leg, Motions
-from .loop_blocks import LoopBlocks, largest, total_magnitude
+from ..base.limits.constraints import LOST
+from ..base.limits.crossings import NEAR_SQUARE
+from ..graph.core import Expr
+from ..graph.count import count
+from ..graph.substitute import substitute
+from .linear_algebra import (
+    Leg,
+    Motions,
+    OrthogonalFactor,
+    Row,
+    SparseFactor,
+    connected,
+    factorize,
+    fronts,
+    times,
+    work,
+)
+from .loop_systems import SPREAD, LoopBlocks, embedded_accelerations, largest, total_magnitude
 
 ENDLESS = 1e300  #: the length of a step that is not known here
 ROW = 64  #: columns beside one from which on rows tell what is near, as columns of 160 four-bars no longer can
+SAVED = 0.7  #: part of the operations of the usual blocks that others take at most which are tried before them
+LONGER = 4  #: times as many multiplications as usual blocks these may take: 320 four-bars in a row take 0.6 of the time
 
 
-class RegularLoops:
-    """The expressions of both blocks.
-
-    Parameters
-    ----------
-    loops : LoopBlocks
-        Those that take over.
-    """
+class MotionLoops:
+    """The expressions of both blocks; ``loops`` take over."""
 
     def __init__(self, loops: LoopBlocks) -> None:
         self.loops, self.terms = loops, loops.terms
@@ -202,3 +208,21 @@ class RegularLoops:
         if self.loops.redundant:  # whose rates may contradict each other
             conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
         return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks
+
+
+def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
+    """The form of right-hand sides away from change points, where the usual one takes many more operations.
+
+    Mechanisms of few velocities have no use for it: their usual form is left for pivots near change points.
+    """
+    if loops is None or not loops.gentle:
+        return None
+    regular = MotionLoops(loops)
+    if not regular.possible or regular.estimate > LONGER * longest:
+        return None
+    return regular if _operations(regular) < SAVED * _operations(loops) else None
+
+
+def _operations(blocks: LoopBlocks | MotionLoops) -> int:
+    outputs, checks = blocks.dynamics()
+    return count(blocks.closing()).total + count([*outputs, *checks]).total

@@ -1,1 +1,0 @@
-"""The linear systems of closed loops in straight lines: by bodies, embedded, or by independent motions."""
