@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.codegen.program import USUAL
+from eomgen.codegen.program import BY_SYSTEM
 from eomgen.equations import METHODS
 from eomgen.equations.reduction import reduce_to_independent
 from eomgen.graph.count import count
@@ -74,7 +74,7 @@ def loops(quick: bool) -> Rows:
         with TemporaryDirectory() as folder:
             (file := Path(folder, "robot.xml")).write_text(LOOP_ROBOTS[name]().text())
             counts = pipeline.build(eg.load(file).derive(), "c", ["rhs"]).counts
-        yield row, (taken(counts), sum(counts[block].total for block in USUAL))
+        yield row, (taken(counts), sum(counts[block].total for block in BY_SYSTEM))
 
 
 def jacobians(quick: bool) -> Rows:

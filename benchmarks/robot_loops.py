@@ -13,7 +13,7 @@ import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.codegen.program import REGULAR, USUAL
+from eomgen.codegen.program import BY_MOTIONS, BY_SYSTEM
 from eomgen.graph.count import Operations
 
 from .call import compile_call_loop, over_kernel
@@ -76,7 +76,7 @@ class Pinocchio:
 
 def taken(counts: Mapping[str, Operations]) -> int:
     """Operations of a call of rhs near the constraints, away from change points, with one Newton step."""
-    blocks = REGULAR if counts.keys() >= set(REGULAR) else USUAL
+    blocks = BY_MOTIONS if counts.keys() >= set(BY_MOTIONS) else BY_SYSTEM
     return sum(counts[name].total for name in blocks)
 
 

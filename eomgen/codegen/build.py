@@ -122,7 +122,7 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
         system=terms.system,
         projects=terms.projects,
         n_states=terms.n_states,
-        held=maker.contacts if COLUMNS[0] in blocks else None,
+        contacts=maker.contacts if COLUMNS[0] in blocks else None,
     )
 
 

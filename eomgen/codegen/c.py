@@ -23,7 +23,7 @@ from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .loop_systems import LARGE
-from .pair_sums import held_tables
+from .pair_sums import contact_tables
 from .program import Block, Program
 from .series import NoSeriesError
 from .single_precision import in_single_precision, refuse_double
@@ -237,7 +237,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "quaternion_slots": program.quaternion_slots,
         "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
         "has_loops": program.has_loops and program.projects,
-        "held": held_tables(program),
+        "held": contact_tables(program),
         "system": program.system if "system" in program.block_names else None,
         "kernels": [
             {

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
 from math import floor, log2, prod
 
 from ..base.limits.crossings import REACH, SHORTEST
 from ..graph.count import Operations
 from ..numeric.passing import PAIRS
+from .factor import factoring_operations
 from .program import Block, Program
 
 #: Bytes of the registers that a function saves, its return address and alignment, on processors of up to 32 registers.
@@ -37,7 +38,7 @@ def operations_of(program: Program, name: str) -> str:
         return f"{_counted(program.counts[program.twins.get(name, name)])}"
     together = _counted(sum((program.counts[part] for part in kernel.blocks), Operations()))
     if not program.has_loops and name == "rhs" and "tree" not in program.block_names and not program.tree_by_columns:
-        return f"{together}, and {_factoring(program.parent)} to solve for the accelerations"
+        return f"{together}, and {factoring_operations(program.parent)} to solve for the accelerations"
     return f"{together} in straight-line parts, which it may repeat"
 
 
@@ -55,15 +56,6 @@ def _counted(operations: Operations) -> str:
         "comparisons and choices": sum(operations.choices.values()),
     }
     return ", ".join(f"{n} {what}" for what, n in parts.items() if n) or "no operations"
-
-
-def _factoring(parent: Sequence[int]) -> int:
-    """Additions, multiplications and divisions of M = L^T D L along the tree, and of one solution with it."""
-    above: list[int] = []
-    for k in parent:
-        above.append(0 if k < 0 else above[k] + 1)
-    # ratios, a multiplication and an addition for each entry above; two passes over L and one over D
-    return sum(n + n * (n + 1) for n in above) + sum(4 * n + 1 for n in above)
 
 
 def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dict[str, int]:

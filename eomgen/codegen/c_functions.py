@@ -13,7 +13,6 @@ import numpy as np
 from ..errors import incomplete
 from ..graph.functions import Function
 from ..graph.pair_calls import pair_call
-from ..graph.traverse import reachable
 from ..numeric.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from .files import render
 from .program import Program
@@ -23,11 +22,7 @@ Calls = dict[str, tuple[Function, list[Orders]]]  # by name of the function, its
 
 def used_calls(program: Program) -> Calls:
     """The functions that a program calls, with the orders of derivatives that it needs, by name."""
-    graph = program.graph
-    if not graph.calls:
-        return {}
-    roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
-    operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
+    graph, operations = program.graph, program.called
     found: Calls = {}
     pairs = {call.function.name: call.function for op in operations if (call := pair_call(graph, op)) is not None}
     called = [graph.calls[op] for op in operations if pair_call(graph, op) is None]

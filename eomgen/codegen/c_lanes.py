@@ -11,7 +11,7 @@ from typing import Any
 
 from .c_text import Printed, used_helpers, with_pieces
 from .files import render
-from .program import REGULAR, USUAL, Block, Program
+from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
@@ -28,13 +28,13 @@ WIDTHS: dict[int, tuple[tuple[str, ...], str]] = {
 
 
 #: Blocks of which the right-hand side of loops in lanes is made.
-CLOSED = (*USUAL, *REGULAR)
+CLOSED = (*BY_SYSTEM, *BY_MOTIONS)
 
 
 def loops_in_lanes(program: Program) -> bool:
     """Whether there are loops whose right-hand side has lanes."""
     driven = {name for d in program.drivers if d.name == "rhs" for name in d.blocks}
-    return driven.issuperset(USUAL) and not program.given_rates
+    return driven.issuperset(BY_SYSTEM) and not program.given_rates
 
 
 def rhs_blocks(program: Program) -> list[str]:
@@ -79,7 +79,7 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
         "first": with_pieces(printed[b] for b in first),
         "others": with_pieces(printed[b] for b in blocks if b not in first),
         "closed": loops_in_lanes(program),
-        "regular": REGULAR[0] in program.block_names,
+        "regular": BY_MOTIONS[0] in program.block_names,
     }
     call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..layer import SOLVER_HEADERS, read_header
 from .loop_slopes import BY_BODIES
-from .pair_sums import held_areas, kept_of, sums_again
+from .pair_sums import contact_areas, kept_of, sums_again
 from .program import SHIFTS, Block, Program
 
 
@@ -155,8 +155,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
     shifted = {SHIFTS[d.name] for d in program.drivers if d.name in SHIFTS}
     seeds = max((program.sizes.n_u if what == "input" else program.sizes.n_p for what in shifted), default=0)
-    matrix = n if program.held is None or program.composes_terms else n - program.n_states
-    loads = len(program.held.loads) if program.held is not None else 0
+    matrix = n if program.contacts is None or program.composes_terms else n - program.n_states
+    loads = len(program.contacts.loads) if program.contacts is not None else 0
     lengths = [
         ("X", n_q + 2 * n + m + max(n_q + n, seeds, loads)),
         ("SCALES", n + m),
@@ -212,7 +212,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     if "dae_tangent" in names:
         lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]
     lengths += _areas_of_bodies(program)
-    lengths += held_areas(program)
+    lengths += contact_areas(program)
     if "inverse_tangent" in names:
         lengths.append(("TORQUES", 2 * (n_q + 2 * n) + n))
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area

@@ -17,14 +17,14 @@ from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render
 from .pair_sums import (
-    HELD_RECORD,
+    STATE_RECORD,
     SumAgain,
     UsedSum,
-    held_room,
-    is_held,
+    has_columns,
     placed_length,
     plain_numbers,
     record_of,
+    room_of_states,
     slots_of,
     sums_again,
     used_sums,
@@ -212,9 +212,9 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
         "again": again is not None,
-        "held": is_held(program, function),
-        "held_record": HELD_RECORD,
-        "held_room": held_room(function),
+        "held": has_columns(program, function),
+        "held_record": STATE_RECORD,
+        "room_of_states": room_of_states(function),
         **(_columns(again) if again is not None else {}),
         "kept": record_of(function),
         "slots": slots_of(function),
@@ -289,7 +289,7 @@ def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
     again = {one.function.name for one in sums_again(program)}
     return [
-        _declared(program.name, used, used.function.name in again, is_held(program, used.function))
+        _declared(program.name, used, used.function.name in again, has_columns(program, used.function))
         for used in used_sums(program)
     ]
 

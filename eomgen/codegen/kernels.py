@@ -23,7 +23,7 @@ from .jacobian_blocks import Entries, ResidualSlopes, unrolled_jacobian, unrolle
 from .loop_motions import MotionLoops, motion_loops
 from .loop_slopes import BY_BODIES, LoopSlopes
 from .loop_systems import BodyLoops, LoopBlocks, straight_loops
-from .program import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, Block, Limits, Port, flat
+from .program import ALONG, BY_MOTIONS, BY_SYSTEM, COMPOSED, RATES, SHIFTS, Block, Limits, Port, flat
 from .terms import SystemTerms
 
 
@@ -353,7 +353,7 @@ class BlockMaker:
         project = ("scales", "position", "rate")
         accelerate = formed if self.outputs_need_accelerations else ()
         mass = "mass_times" if self.terms.by_columns else "mass_matrix"
-        direct = (*USUAL, *(REGULAR if self._by_motions else ())) if self._loops is not None else ()
+        direct = (*BY_SYSTEM, *(BY_MOTIONS if self._by_motions else ())) if self._loops is not None else ()
         along = (*direct, *BY_BODIES) if self._loop_slopes is not None else ()
         return {
             "rhs": (*project, *formed, *direct),
@@ -388,7 +388,7 @@ class BlockMaker:
             case "position":  # C, C_q
                 return block(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
             case "closing" | "dynamics" | "regular_closing" | "regular_dynamics":
-                form = self._loops if name in USUAL else self._by_motions
+                form = self._loops if name in BY_SYSTEM else self._by_motions
                 assert form is not None
                 if name.endswith("closing"):  # a Newton step
                     return block(name, "q", form.closing(), guards=form.guards)

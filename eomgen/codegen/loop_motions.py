@@ -1,9 +1,10 @@
 """loops whose state is far from any change point -> the shortest straight-line form.
 
 All motions are v = B y with the preferred velocities y: B follows from the rows by orthogonal combinations
-(:mod:`.linear_algebra`), block by block, so that every leg of a platform is paid for alone.  With weights W = S^-2 of
-the coordinates the nearest motion is the one with B^T W (v - B y) = 0, of as many unknowns as there are freedoms; so
-the step onto the constraints, velocities and accelerations share B, and no matrix has the size of the rows.
+(:mod:`.linear_algebra`), block by block, so that every leg of a platform is paid for by itself.  With weights
+W = S^-2 of the coordinates the nearest motion is the one with B^T W (v - B y) = 0, of as many unknowns as there are
+freedoms; so the step onto the constraints, velocities and accelerations share B, and no matrix has the size of the
+rows.
 
 Where columns of B are long, or what they follow from is nearly dependent, the forms of :mod:`.loop_systems` take over.
 """
@@ -19,23 +20,23 @@ from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.substitute import substitute
 from .linear_algebra import (
-    Leg,
-    Motions,
     OrthogonalFactor,
     Row,
     SparseFactor,
     connected,
     factorize,
     fronts,
+    quadratic_form,
     times,
+    transpose,
     work,
 )
 from .loop_systems import SPREAD, LoopBlocks, embedded_accelerations, largest, total_magnitude
 
 ENDLESS = 1e300  #: the length of a step that is not known here
 ROW = 64  #: columns beside one from which on rows tell what is near, as columns of 160 four-bars no longer can
-SAVED = 0.7  #: part of the operations of the usual blocks that others take at most which are tried before them
-LONGER = 4  #: times as many multiplications as usual blocks these may take: 320 four-bars in a row take 0.6 of the time
+SAVED = 0.7  #: part of the operations of the ordinary blocks that others take at most which are tried before them
+LONGER = 4  #: times as many multiplications as those these may take: 320 four-bars in a row take 0.6 of the time
 
 
 class MotionLoops:
@@ -81,38 +82,27 @@ class MotionLoops:
         return x, left
 
     @cached_property
-    def _motions(self) -> Motions:
+    def _motions(self) -> list[Row]:
         """B (n rows of f)."""
         zero = self.terms.graph.zero
         columns = [self._particular([-row.get(k, zero) for row in self.loops.rows])[0] for k in self.terms.preferred]
         for k, column in zip(self.terms.preferred, columns, strict=True):
             column[k] = self.terms.graph.one
-        rows = [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
-        return Motions(rows, self.terms.n_dof, self._legs())
+        return [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
 
-    def _legs(self) -> list[Leg]:
-        """The parts that fewer rows hold than freedoms drive."""
-        graph, m, place = self.terms.graph, len(self._left), {k: j for j, k in enumerate(self.terms.preferred)}
-        found = []
-        for part in self._factor.parts:
-            held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
-            drive = [{place[k]: -x for k, x in self.loops.rows[i].items() if k in place} for i in held]
-            if len(held) >= len(set().union(*drive)):
-                continue
-            unit = [self._factor.solve([graph.one if j == i else graph.zero for j in range(m)])[0] for i in held]
-            inverse = [{j: x[k] for j, x in enumerate(unit) if not x[k].is_zero} for k in sorted(part)]
-            found.append(Leg(tuple(self.dependent[k] for k in sorted(part)), inverse, drive))
-        return found
+    @cached_property
+    def _columns(self) -> list[Row]:
+        return transpose(self._motions, self.terms.n_dof)
 
     @cached_property
     def _weighted(self) -> list[Row]:
-        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._motions.columns]
+        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._columns]
 
     @cached_property
     def _products(self) -> list[Row]:
         """B^T W B."""
         f = range(self.terms.n_dof)
-        lower = self._motions.gram([{k: x} for k, x in enumerate(self.weights)])
+        lower = quadratic_form(self._columns, [{k: x} for k, x in enumerate(self.weights)])
         return [{j: lower[key] for j in f if (key := (max(i, j), min(i, j))) in lower} for i in f]
 
     @cached_property
@@ -150,10 +140,10 @@ class MotionLoops:
         for part in self._factor.parts:
             least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * NEAR_SQUARE)
         found = []
-        for columns, usual, apart in self._factor.apart:
+        for columns, ordinary, apart in self._factor.apart:
             for k in columns:
-                usual, apart = usual * graph.apply("max", lengths[k], least[k]), apart * scales[k]
-            found.append(graph.apply("lt", usual * limit, apart))
+                ordinary, apart = ordinary * graph.apply("max", lengths[k], least[k]), apart * scales[k]
+            found.append(graph.apply("lt", ordinary * limit, apart))
         return found
 
     def _far(self) -> list[Expr]:
@@ -176,7 +166,7 @@ class MotionLoops:
         size = total_magnitude(e) * (loops.unit / float(loops.h))
         d, rest = self._particular(e)
         left = total_magnitude(rest) * loops.unit if rest else graph.zero
-        dz = [x - y for x, y in zip(d, times(self._motions.rows, self._along(d)), strict=True)]
+        dz = [x - y for x, y in zip(d, times(self._motions, self._along(d)), strict=True)]
         length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
         length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
         return [size, left, length, *(-x for x in dz)]
@@ -192,9 +182,9 @@ class MotionLoops:
         v = [terms.graph.symbol(name) for name in terms.v]
         given, _ = self._particular([-x for x in self._rate])
         y = [v[k] for k in terms.preferred]
-        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions.rows, y), strict=True)]
+        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
-        return [a + b for a, b in zip(given, times(self._motions.rows, y), strict=True)]
+        return [a + b for a, b in zip(given, times(self._motions, y), strict=True)]
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
         """As of LoopBlocks; where it is sound, no change point is near."""
@@ -206,14 +196,14 @@ class MotionLoops:
         a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
         conditions = [*self._follows(), *self._far(), self.loops.long_rows()]
         if self.loops.redundant:  # whose rates may contradict each other
-            conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
+            conditions += [self.loops.is_met(self.moved, self._rate), self.loops.is_met(a, gamma)]
         return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks
 
 
 def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
-    """The form of right-hand sides away from change points, where the usual one takes many more operations.
+    """The form of right-hand sides away from change points, where the ordinary one takes many more operations.
 
-    Mechanisms of few velocities have no use for it: their usual form is left for pivots near change points.
+    Mechanisms of few velocities have no use for it: their ordinary form is left for pivots near change points.
     """
     if loops is None or not loops.gentle:
         return None

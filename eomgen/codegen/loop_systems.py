@@ -21,7 +21,6 @@ from ..graph.substitute import substitute
 from ..kinematics.row_groups import ALL, UNIT
 from .factor import exceeding, outward
 from .linear_algebra import (
-    Motions,
     Row,
     SparseFactor,
     dot,
@@ -29,6 +28,7 @@ from .linear_algebra import (
     gram,
     in_parts,
     minimum_degree,
+    quadratic_form,
     rows_of,
     times,
     transpose,
@@ -186,10 +186,10 @@ class LoopBlocks(ABC):
         factor, passes = self.solver
         x = self._step(x, r, len(self.J), factor, passes[order - 1])
         if self.gentle:
-            conditions.append(self.held(x, r))
+            conditions.append(self.is_met(x, r))
         return x
 
-    def held(self, x: Sequence[Expr], r: Sequence[Expr]) -> Expr:
+    def is_met(self, x: Sequence[Expr], r: Sequence[Expr]) -> Expr:
         """Whether nothing is left of C_q x + r, r scaled as the rows are."""
         left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
         moving = self.terms.n_v - self.terms.n_states
@@ -314,13 +314,14 @@ SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast 
 
 
 def embedded_accelerations(
-    terms: SystemTerms, scales: Sequence[Expr], B: Motions, a: Sequence[Expr], bias: Sequence[Expr]
+    terms: SystemTerms, scales: Sequence[Expr], B: Sequence[Row], a: Sequence[Expr], bias: Sequence[Expr]
 ) -> tuple[list[Expr], list[Expr]]:
     """Accelerations a + B y with B^T (M (a + B y) + bias) = 0, and checks of the inertia B^T M B."""
     graph, f = terms.graph, range(terms.n_dof)
     M = rows_of(terms.mass_matrix)
     force = [x + y for x, y in zip(bias, times(M, a), strict=True)]
-    columns, embedded = B.columns, B.gram(M)
+    columns = transpose(B, terms.n_dof)
+    embedded = quadratic_form(columns, M)
     factor = factorize([{k: embedded.get((max(i, k), min(i, k)), graph.zero) for k in f} for i in f])
     y = factor.solve([-x for x in times(columns, force)])
     diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
@@ -329,11 +330,11 @@ def embedded_accelerations(
     sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
     checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
     if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
-        moving = {k: scales[k] / scales[terms.preferred[0]] for k, row in enumerate(B.rows) if row}
+        moving = {k: scales[k] / scales[terms.preferred[0]] for k, row in enumerate(B) if row}
         reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
         if reach is not None:
             checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
-    return [x + d for x, d in zip(a, times(B.rows, y), strict=True)], checks
+    return [x + d for x, d in zip(a, times(B, y), strict=True)], checks
 
 
 class EmbeddedLoops(LoopBlocks):
@@ -361,7 +362,7 @@ class EmbeddedLoops(LoopBlocks):
             B, _ = self._partition(None, conditions)
         else:
             B, a = self._partition([-x for x in gamma], conditions)
-        a, checks = embedded_accelerations(terms, self.s, Motions(B, terms.n_dof), a, here[: terms.n_v])
+        a, checks = embedded_accelerations(terms, self.s, B, a, here[: terms.n_v])
         return a, checks
 
     def _far(self) -> Expr:
@@ -533,11 +534,11 @@ class BodyLoops(LoopBlocks):
             else:
                 size, part, _ = apart(*(left[m].get(c, self.terms.graph.zero) for m in rows for c in columns))
                 squares = [dot(self.J[m], self.J[m]) for m in rows]
-                usual = largest(
+                ordinary = largest(
                     [x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None]
                 )
-                # columns that are short beside the usual entry have no angle but that of their rounding
-                angles.append((self.terms.graph.apply("max", size, usual * usual * NEAR_SQUARE), part))
+                # columns that are short beside the ordinary entry have no angle but that of their rounding
+                angles.append((self.terms.graph.apply("max", size, ordinary * ordinary * NEAR_SQUARE), part))
         return angles
 
 

@@ -28,10 +28,7 @@ class UsedSum(NamedTuple):
 
 def used_sums(program: Program) -> list[UsedSum]:
     """The sums, by name."""
-    graph = program.graph
-    roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
-    operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
-    calls = [call for operation in sorted(operations) if (call := pair_call(graph, operation)) is not None]
+    calls = [call for name in sorted(program.called) if (call := pair_call(program.graph, name)) is not None]
     functions = {call.function.name: call.function for call in calls}
     parts = {(call.function.name, call.part) for call in calls}
     return [
@@ -252,35 +249,35 @@ class PairLists:
 
 
 # -- columns of a Jacobian by states of contacts ------------------------------------------------------------------
-HELD_RECORD = 3 + 2 * WRENCH  #: number of a state, two bodies, and what each gets
+STATE_RECORD = 3 + 2 * WRENCH  #: number of a state, two bodies, and what each gets
 
 
-def is_held(program: Program, function: PairFunction) -> bool:
+def has_columns(program: Program, function: PairFunction) -> bool:
     """Whether a sum has states whose columns are made from its pairs."""
-    return program.held is not None and function.name in {one.function.name for one in program.held.sums}
+    return program.contacts is not None and function.name in {one.function.name for one in program.contacts.sums}
 
 
-def held_room(function: PairFunction) -> int:
+def room_of_states(function: PairFunction) -> int:
     """For how many states of near pairs there is room."""
     return function.room * max(kind.states for kind in function.kinds)
 
 
-def held_areas(program: Program) -> list[tuple[str, int]]:
+def contact_areas(program: Program) -> list[tuple[str, int]]:
     """Areas of ``tree_jacobian_held``."""
-    if program.held is None:
+    if program.contacts is None:
         return []
-    functions = [one.function for one in program.held.sums]
+    functions = [one.function for one in program.contacts.sums]
     return [
-        ("HELD_OPERANDS", len(program.held.operands)),
+        ("HELD_OPERANDS", len(program.contacts.operands)),
         ("HELD_GIVEN", max(function.count for function in functions)),
-        ("HELD_LIST", 1 + HELD_RECORD * max(map(held_room, functions))),
+        ("HELD_LIST", 1 + STATE_RECORD * max(map(room_of_states, functions))),
         ("HELD_WORK", max(map(work_of, functions))),
     ]
 
 
-def held_tables(program: Program) -> dict[str, Any] | None:
+def contact_tables(program: Program) -> dict[str, Any] | None:
     """What ``held.c.j2`` writes."""
-    held = program.held
+    held = program.contacts
     if held is None:
         return None
     sums, at, load = [], 0, 0
@@ -308,6 +305,6 @@ def held_tables(program: Program) -> dict[str, Any] | None:
         "states": states,
         "firsts": list(accumulate((len(held.rows[k]) for k in states), initial=0)),
         "rows": [row for k in states for row in held.rows[k]],
-        "record": HELD_RECORD,
+        "record": STATE_RECORD,
         "loads": len(held.loads),
     }

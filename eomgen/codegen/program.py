@@ -24,7 +24,7 @@ COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h,
 RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
 
 #: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
-USUAL, REGULAR = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")
+BY_SYSTEM, BY_MOTIONS = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")
 
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
@@ -208,7 +208,7 @@ class Program:
     limits: Limits = field(default_factory=Limits)
     system: LinearSystem | None = None
     projects: bool = True
-    held: ContactColumns | None = None
+    contacts: ContactColumns | None = None
 
     @property
     def has_loops(self) -> bool:
@@ -230,8 +230,15 @@ class Program:
     def is_searched(self, name: str) -> bool:
         """Whether what is alike in a block, or in ``precompute``, is found without marks of the graph too."""
         limits = self.limits
-        most = limits.repeated_dynamics if name in (*USUAL, *REGULAR) else limits.repeated
+        most = limits.repeated_dynamics if name in (*BY_SYSTEM, *BY_MOTIONS) else limits.repeated
         return self.counts[name].total > most
+
+    @cached_property
+    def called(self) -> frozenset[str]:
+        """Operations that call functions or sums over pairs."""
+        nodes, calls = self.graph.nodes, self.graph.calls
+        roots = [y.id for block in self.blocks for y in block.roots] if calls else []
+        return frozenset(nodes[i][0] for i in reachable(self.graph, roots)) & calls.keys()
 
     @cached_property
     def twins(self) -> dict[str, str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from ..kinematics.eliminate import Matrix, dot, eliminate, total
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.reaction_parts import force_and_moment
-from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
+from ..kinematics.resolved_loads import entries_of, with_entries
 from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches, Row6
 from ..numeric.row_chains import SparseRows
@@ -57,6 +57,7 @@ def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[
     }
 
 
+Laws = Mapping[str, Sequence[Expr]]  #: the laws that depend on reactions, by force element
 PROBES = 3  #: states at which components are looked at
 _REMEDY = (
     "let the forces act in the plane of the loop, or give a joint of the loop more freedom (cylindrical, spherical); "
@@ -69,7 +70,7 @@ def refuse_undetermined(
     every: Mapping[str, Row6],
     idle: Sequence[Expr],
     values: Mapping[Expr, Expr],
-    users: Users,
+    laws: Laws,
 ) -> None:
     """Refuse what depends on multipliers that no equation determines, unless they are 0 in the smallest reactions.
 
@@ -94,7 +95,7 @@ def refuse_undetermined(
             message = f"{part} is undetermined: rigid bodies do not determine how the joints of a loop share this load"
             problems.append(mechanism.problem(quantity.path, message, _REMEDY, "EG-UNDETERMINED"))
     for force in mechanism.forces:
-        if force.by_reaction and _depends(users.laws.get(force.name, ()), values, open_):
+        if force.by_reaction and _depends(laws.get(force.name, ()), values, open_):
             message = f"the load of joint {getattr(force, 'joint', '')!r} is undetermined: rigid bodies do not "
             message += "determine how the joints of a loop share it"
             problems.append(mechanism.problem(f"forces.{force.name}", message, _REMEDY, "EG-UNDETERMINED"))
@@ -171,34 +172,6 @@ def is_zero(expressions: Sequence[Expr]) -> bool:
     return not left or bool((np.abs(_probed(left)) < UNTOUCHED).all())
 
 
-class Users(NamedTuple):
-    """The laws that speak of reactions, by force element; and, through the mechanism, all other expressions that do."""
-
-    mechanism: Mechanism
-    laws: Mapping[str, Sequence[Expr]]
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """Their names."""
-        return tuple(self.laws)
-
-    @property
-    def paths(self) -> list[str]:
-        """Places in the description, forces first; constraints that close where nothing else speaks of reactions."""
-        asked = [q.path for q in self.mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
-        held = [f"constraints.{s.constraint.name}" for s in self.mechanism.switched if s.constraint is not None]
-        return [*(f"forces.{name}" for name in self.forces), *dict.fromkeys(asked)] or held
-
-    def verb(self, plural: str) -> str:
-        """The verb as it stands behind :meth:`together`."""
-        return plural if self.forces else f"{plural}s"
-
-    def together(self, message: str, remedy: str) -> Problem:
-        """A problem of all laws, or of the first expression that speaks of reactions."""
-        place = f"forces.{' and '.join(self.forces)}" if self.forces else self.paths[0]
-        return self.mechanism.problem(place, message, remedy, "EG-UNSUPPORTED")
-
-
 def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
     """A law whose choices make so many pieces that it is not judged whether it has one solution."""
     message = f"its law of a reaction has more than {MANY} pieces, made by abs, max, min, conditions and their products"
@@ -263,11 +236,17 @@ def without_inertia(kinematics: Kinematics, mobility: Mobility, mass_matrix: Seq
     return [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
 
 
-def refuse_without_inertia(moved: Sequence[str], users: Users) -> None:
-    """Refuse a motion that loops leave, behind which there is no inertia."""
-    if moved:
-        message = f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} meets no inertia"
-        raise ModelError([users.together(message, "give every body mass, or inertia about its joint")])
+def refuse_without_inertia(kinematics: Kinematics, moved: Sequence[str], laws: Laws) -> None:
+    """Refuse a motion that loops leave, behind which there is no inertia, at all laws or what else needs reactions."""
+    if not moved:
+        return
+    mechanism = kinematics.mechanism
+    places = [q.path for q in mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
+    places += [f"constraints.{s.constraint.name}" for s in mechanism.switched if s.constraint is not None]
+    place, verb = (f"forces.{' and '.join(laws)}", "depend") if laws else (places[0], "depends")
+    message = f"{verb} on reactions, and moving {', '.join(moved)} meets no inertia"
+    remedy = "give every body mass, or inertia about its joint"
+    raise ModelError([mechanism.problem(place, message, remedy, "EG-UNSUPPORTED")])
 
 
 def refuse_redundant(
@@ -275,7 +254,7 @@ def refuse_redundant(
     mobility: Mobility,
     multipliers: Sequence[Expr],
     values: Mapping[Expr, Expr],
-    users: Users,
+    laws: Laws,
 ) -> None:
     """Refuse what depends on reactions that constraints which follow from others leave open.
 
@@ -290,7 +269,7 @@ def refuse_redundant(
     if not mobility.redundant or not (shared := _shared(kinematics, mobility, multipliers, values)):
         return
     quantities = mechanism.reaction_quantities
-    paths = [f"forces.{name}" for name, laws in users.laws.items() if shared & symbols_of(laws)]
+    paths = [f"forces.{name}" for name, laws in laws.items() if shared & symbols_of(laws)]
     for name, quantity in quantities.items():
         seen = substitute([kinematics.graph.symbol(name)], motion.derived_symbols(mechanism, {name}))
         paths += [quantity.path] if shared & symbols_of(seen) else []
@@ -351,7 +330,6 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     seen = substitute(asked, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
     names = sorted(name for name in symbols_of([*laws, *seen]) if is_carried(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
-    users = Users(mechanism, speaking)
     rows, held = switched_rows(kinematics)
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
     linear = replace(linear, forces=(*linear.forces, *held))
@@ -361,11 +339,11 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         pass
     elif laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
         reactions, multipliers = _reactions(
-            linear, mobility, [*names, *(r.multiplier.node[1] for r in rows)], rows, users
+            linear, mobility, [*names, *(r.multiplier.node[1] for r in rows)], rows, speaking
         )
         measured = [*reactions, *(dot([*r.jacobian, r.rest], [*kinematics.a, graph.one]) for r in rows)]
         unknown = [*forces, *(row.multiplier for row in rows)]
-        a, columns = _motion(linear, mobility, unknown, users)
+        a, columns = _motion(linear, mobility, unknown, speaking)
         found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
         if rows:
             by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
@@ -375,7 +353,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
-        values = _reactions(linear, mobility, names, (), users)[0]
+        values = _reactions(linear, mobility, names, (), speaking)[0]
     motion = copy(motion)
     motion.carried = dict(zip(names, values, strict=False))
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
@@ -406,19 +384,17 @@ def _loads(terms: ForceTerms) -> list[MarkerLoad | CoordinateLoad]:
     return [*terms.marker_loads, *terms.coordinate_loads, *terms.marker_remainder, *terms.coordinate_remainder]
 
 
-def _with(loads: tuple[AnyLoad, ...], values: Iterator[Expr]) -> tuple[AnyLoad, ...]:
-    return tuple(with_entries(load, values) for load in loads)
-
-
 def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematics:
     """Other parts of the entries of the loads."""
     flat = [e for terms in kinematics.forces for load in _loads(terms) for e in entries_of(load)]
     values = iter(substitute(flat, mapping) if mapping else flat)
+    parts = ("marker_loads", "coordinate_loads", "marker_remainder", "coordinate_remainder")  # as in _loads
     found = []
     for terms in kinematics.forces:
-        markers, along = _with(terms.marker_loads, values), _with(terms.coordinate_loads, values)
-        rest, rest_along = _with(terms.marker_remainder, values), _with(terms.coordinate_remainder, values)
-        found.append(ForceTerms(terms.force, markers, along, terms.potential, rest, rest_along))
+        new: dict[str, Any] = {
+            part: tuple(with_entries(load, values) for load in getattr(terms, part)) for part in parts
+        }
+        found.append(replace(terms, **new))
     return replace(kinematics, forces=tuple(found))
 
 
@@ -442,7 +418,7 @@ def _linear_parts(
 
 
 def _motion(
-    kinematics: Kinematics, mobility: Mobility, forces: Sequence[Expr], users: Users
+    kinematics: Kinematics, mobility: Mobility, forces: Sequence[Expr], laws: Laws
 ) -> tuple[list[Expr], Matrix]:
     """[a; l] without the laws' forces, and what a unit of each of them changes: M a + h + C^T l = 0, C a = -gamma."""
     graph, constraints = kinematics.graph, kinematics.constraints
@@ -464,7 +440,7 @@ def _motion(
         bias = [h + s * dot(column, gamma) for h, column in zip(bias, columns, strict=True)]
         parent = tuple(range(-1, n - 1))
         still = without_inertia(kinematics, mobility, mass_matrix)
-    refuse_without_inertia(still, users)
+    refuse_without_inertia(kinematics, still, laws)
     right = [[-h for h in bias]]
     right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
     factor = factorize(mass_matrix, parent)
@@ -486,7 +462,7 @@ def _reactions(
     mobility: Mobility,
     names: Sequence[str],
     held: Sequence[SwitchedRow],
-    users: Users,
+    laws: Laws,
 ) -> tuple[list[Expr], list[Expr]]:
     """The components in terms of accelerations, multipliers and forces, and the multipliers of ``labels``.
 
@@ -507,17 +483,17 @@ def _reactions(
         if place is not None:
             reactions.append(every[place[0]][place[1]])
         else:
-            reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), users)])
+            reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), laws)])
     stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
-    refuse_redundant(kinematics, mobility, list(rows.values()), stands, users)
+    refuse_redundant(kinematics, mobility, list(rows.values()), stands, laws)
     if idle:
-        refuse_undetermined(kinematics, every, list(idle.values()), stands, users)
+        refuse_undetermined(kinematics, every, list(idle.values()), stands, laws)
     free = [*idle.values(), *(rows[label] for label in mobility.redundant)]
     reactions = substitute(reactions, dict.fromkeys(free, graph.zero)) if free else reactions
     return reactions, [rows[kinematics.constraints.labels[i]] for i in mobility.independent_rows]
 
 
-def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users) -> str:
+def _row(kinematics: Kinematics, name: str, labels: Sequence[str], laws: Laws) -> str:
     """The label of an equation, which may be named by its element where that has no other.
 
     Raises
@@ -533,4 +509,4 @@ def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users)
     quantities = kinematics.mechanism.reaction_quantities
     path = next(q.path for q in quantities.values() if not q.part and q.of == name)
     remedy = f"there are: {', '.join(own or labels) or 'none'}; joints have equations where they close a loop"
-    raise ModelError([users.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])
+    raise ModelError([kinematics.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])
