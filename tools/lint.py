@@ -41,7 +41,7 @@ LONGEST = 800  #: lines of a file of tests
 BEYOND = {
     "module": {"analysis", "identification", "verification"},
     "runtime.drawing": {"show"},
-    "runtime.formulas": {"describe", "graph"},
+    "runtime.inputs": {"describe"},
     "runtime.room": {"describe"},
     "runtime.trajectory": {"show"},
 }

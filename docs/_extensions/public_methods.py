@@ -95,7 +95,7 @@ class Limits(SphinxDirective):
 #: Classes that users make themselves; others come from calls, and how they are made is no matter of theirs.
 MADE_BY_USERS = (
     "eomgen.Model",
-    "eomgen.runtime.signals.Signal",
+    "eomgen.runtime.inputs.Signal",
     "eomgen.compilation.compiler.Options",
     "eomgen.importers.RobotOptions",
 )

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..errors import EomgenError, MissingDependencyError, UsageError, cannot
+from ..runtime.inputs import Forcing
 from ..runtime.late import eager
-from ..runtime.signals import Forcing
 from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
 from ..simulation.events import WAIT, Events
 from ..simulation.simulate import simulate

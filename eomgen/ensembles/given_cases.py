@@ -27,7 +27,7 @@ from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.signals import Forcing
+    from ..runtime.inputs import Forcing
 
 
 # -- grids -------------------------------------------------------------------------------------------------------------

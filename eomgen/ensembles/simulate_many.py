@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 from ..base.value_rules import read_count
 from ..errors import bad_data, ill_typed, no_choice, untrue
 from ..runtime.given_start import Span
+from ..runtime.inputs import Forcing, Signal, fill_rates, rate_pairs
 from ..runtime.near_names import check_names, without_dots
 from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.room import require_room, require_steps
-from ..runtime.signal_rates import fill_rates, rate_pairs
-from ..runtime.signals import Forcing, Signal
 from ..simulation.compiled import can_run
 from ..simulation.events import require_forward
 from ..simulation.progress import Progress, wanted

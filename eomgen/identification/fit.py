@@ -25,12 +25,12 @@ from ..errors import (
 )
 from ..runtime.allowed_parameters import bounds_of
 from ..runtime.derivative_calls import output_derivatives
-from ..runtime.input_kinds import Expressed, Tabulated
+from ..runtime.inputs import Forcing, Table
 from ..runtime.late_start import fixed_told, start_slopes, tell_fixed
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_number
-from ..runtime.signals import Forcing
+from ..runtime.tapes import Expression
 from ..simulation.simulate import simulate
 from .experiments import Experiment, read_experiments, read_sigma
 
@@ -113,12 +113,12 @@ def run_slopes(
 def _of_time_alone(forcing: Forcing) -> bool:
     """Whether no input is a Python function, has conditions, or depends on state or parameters."""
     for index, signal in forcing.varying.items():
-        if index not in forcing.formulas and not isinstance(signal, Tabulated):
+        if index not in forcing.formulas and not isinstance(signal, Table):
             return False
     return not any(_depends(formula) for formula in forcing.formulas.values())
 
 
-def _depends(formula: Expressed) -> bool:
+def _depends(formula: Expression) -> bool:
     return formula.branches or any(operation in ("x", "p") for operation, *_ in formula.tape[0])
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
+    from .inputs import Signal
     from .loaded import load_trajectory
     from .minimal import Minimal
     from .numpy_core import NumpyCore
     from .protocols import Core
-    from .signals import Signal
     from .trajectory import Trajectory
 
 _HOMES = {
@@ -22,7 +22,7 @@ _HOMES = {
     "Core": "protocols",
     "Minimal": "minimal",
     "NumpyCore": "numpy_core",
-    "Signal": "signals",
+    "Signal": "inputs",
     "Trajectory": "trajectory",
     "load_trajectory": "loaded",
 }

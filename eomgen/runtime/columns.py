@@ -11,9 +11,9 @@ import numpy as np
 from ..base.algebra import Array
 from ..errors import too_large
 from ..numeric.projection import largest
+from .inputs import Forcing
 from .layout import Layout
 from .run_parts import Residuals
-from .signals import Forcing
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

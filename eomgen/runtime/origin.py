@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .identity import digest
-from .input_kinds import Expressed
-from .signals import Signal
+from .inputs import Signal
+from .tapes import Expression
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
-    from .signals import Forcing
+    from .inputs import Forcing
 
 MANY = 1000  #: points of a table that are written out; of longer ones a digest tells
 
@@ -60,7 +60,7 @@ def spell_input(value: Any) -> Any:
             "points": len(value.times), "sha256": digest([value.times, value.values])
         }  # fmt: skip
         return {"interpolation": value.interpolation, "corners": value.corners, **points}
-    if isinstance(value, Expressed):
+    if isinstance(value, Expression):
         return value.text
     if isinstance(value, (int, float)):
         return float(value)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 
 if TYPE_CHECKING:
-    from .layout import Layout
+    pass
 
 
 #: Parameters or inputs of a call: an array of all, or values by name, where the others are as bound.
@@ -117,21 +117,6 @@ class TrajectoryLike(Protocol):
 
     @property
     def energies(self) -> Array: ...
-
-
-class Driven(Protocol):
-    """The inputs of a run, as the check of their rates sees them; see :class:`~.signals.Forcing`."""
-
-    layout: Layout
-    base: Array
-    values: dict[str, Any]
-    derived: dict[str, tuple[str, int, Any]]
-    unsettled: frozenset[str]
-    span: tuple[float, float] | None
-    parameters: Any
-
-    @property
-    def constants(self) -> dict[str, float]: ...
 
 
 class Core(Protocol):

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL
 from ..errors import EvaluationError, SimulationError
-from ..runtime.signals import Forcing
+from ..runtime.inputs import Forcing
 from .stalling import Crawling
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..errors import cannot, ill_shaped
+from ..runtime.inputs import Forcing
 from ..runtime.near_names import check_names
-from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution
 from .integrate import MESSAGES as WORDS

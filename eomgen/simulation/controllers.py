@@ -17,7 +17,7 @@ from .events import WAIT, Events
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.signals import Forcing
+    from ..runtime.inputs import Forcing
 
 
 class Controller:

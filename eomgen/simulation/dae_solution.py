@@ -18,10 +18,10 @@ from ..base.limits.runs import ATOL, RTOL
 from ..errors import SimulationError, at_odds, calls_within, cannot, no_choice
 from ..runtime.dae import DaeForm
 from ..runtime.given_start import Span, Start
+from ..runtime.inputs import Forcing
 from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_steps
-from ..runtime.signals import Forcing
 from .bound_run import Run
 from .events import GO_ON, UNWATCHED, Events, EventValues, Resets, instant, warn_of_unknown
 from .integrate import Solution, require_end

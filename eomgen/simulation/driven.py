@@ -13,7 +13,7 @@ from ..base.algebra import Array
 from ..errors import SimulationError, cannot, no_such
 from ..numeric.roots import find_root
 from ..runtime.given_start import Span, Start
-from ..runtime.signals import Forcing
+from ..runtime.inputs import Forcing
 from .events import UNWATCHED, Events, RunEvent
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath
 from .kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from

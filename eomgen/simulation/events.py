@@ -24,16 +24,16 @@ from ..base.limits.runs import AHEAD, CROWD, CROWDED, EARLIEST, INSTANT, MOST_ST
 from ..base.texts import shown
 from ..base.value_rules import as_count
 from ..errors import UsageError, ZenoError, calls_within, cannot, ill_typed, no_choice, no_number, off_range, untrue
-from ..runtime.input_texts import is_formula, read_formula
+from ..runtime.inputs import read_text
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state
 from ..runtime.refusals import require_switched
 from ..runtime.room import as_real
+from ..runtime.tapes import Expression, joined, player
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.formulas import Formula
-    from ..runtime.signals import Forcing
+    from ..runtime.inputs import Forcing
 
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
@@ -133,7 +133,7 @@ class Events:
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
         self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
         self.model: list[RunEvent] = []
-        self.formulas: list[tuple[RunEvent, Formula]] = []
+        self.formulas: list[tuple[RunEvent, Expression]] = []
         self.functions: list[RunEvent] = []
         if given is None and not self.declared:
             return
@@ -142,8 +142,8 @@ class Events:
         for name, one in _listed(given):
             if isinstance(one, str) and one in known and name is None:
                 chosen.add(one)
-            elif is_formula(one) or isinstance(one, Mapping):
-                self.formulas.append(_of_text(layout, one, name, self.formulas[0][1] if self.formulas else None))
+            elif isinstance(one, str | Mapping):
+                self.formulas.append(_of_text(layout, one, name))
             else:
                 self.functions.append(RunEvent(one, name or ""))
                 self.functions[-1].users = True
@@ -175,7 +175,7 @@ class Events:
         texts = [formula for _, formula in self.formulas]
         return {
             "model": len(self.model),
-            "tape": texts[0].tape_with(texts[1:]) if texts else None,
+            "tape": joined(text.tape for text in texts) if texts else None,
             "outside": self.functions,
             "direction": [event.direction for event in every],
             "most": [int(event.terminal) for event in every],
@@ -196,8 +196,7 @@ class Events:
         p = module.p
         texts = None
         if len(self.formulas) > 1:
-            first, *others = (formula for _, formula in self.formulas)
-            texts = Together(first.function_with(others, p))
+            texts = Together(player(joined(formula.tape for _, formula in self.formulas), p))
         for i, (event, formula) in enumerate(self.formulas):
             found.append(RunEvent(formula.function(p), event.name, event.terminal, event.direction))
             found[-1].source = None if texts is None else (texts, i)
@@ -253,7 +252,7 @@ def _listed(given: Any) -> list[tuple[str | None, Any]]:
     return [(None, given)]
 
 
-def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | None) -> tuple[RunEvent, Formula]:
+def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Expression]:
     """An event by its text, or by a mapping with the keys of a model file."""
     options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
@@ -264,7 +263,7 @@ def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | Non
     if direction not in (-1, 0, 1):
         raise no_choice(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = RunEvent(_only_in_c, name or text, options.get("terminal"), direction)
-    return event, read_formula(layout, text, f"event {name or text!r}", beside)
+    return event, read_text(layout, text, f"event {name or text!r}")
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:

@@ -33,17 +33,16 @@ from ..errors import (
     untrue,
 )
 from ..runtime.constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers, with_closed_rows
-from ..runtime.input_kinds import Expressed
+from ..runtime.inputs import derive, drift, moving_inputs, rate_pairs
 from ..runtime.layout import Layout
 from ..runtime.near_names import without_dots
 from ..runtime.room import read_flag, read_number, read_numbers
-from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
-from ..runtime.tapes import DeclaredSignal
+from ..runtime.tapes import Expression
 from .impact_equations import Sliding, collide, require_distances, strike
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.signals import Forcing
+    from ..runtime.inputs import Forcing
 
 
 # -- gaps --------------------------------------------------------------------------------------------------------------
@@ -169,10 +168,10 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
         raise cannot(words)
-    known = isinstance(value, Expressed) or (hasattr(value, "derivative") and value.derivative() is not None)
-    if known and not isinstance(value, DeclaredSignal):
+    known = value.rate if isinstance(value, Expression) else getattr(value, "derivative", lambda: None)()
+    if known is not None:
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
-        rate = rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate
+        rate = rate.function(forcing.parameters) if isinstance(rate, Expression) else rate
         return float(rate(t, x) if callable(rate) else rate)
     if any(forcing(t, x + move)[index] != forcing(t, x)[index] for move in ELSEWHERE * np.eye(len(x))):
         raise cannot(words)

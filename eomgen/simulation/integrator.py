@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 from ..errors import EvaluationError, SimulationError, UsageError, cannot, ill_shaped, no_number, off_range
 from ..runtime.argument_names import both_names
+from ..runtime.inputs import Forcing
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
 from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.room import read_plain, read_vector, require_steps
-from ..runtime.signals import Forcing
 from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
 from .events import Events

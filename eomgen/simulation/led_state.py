@@ -13,8 +13,8 @@ from ..base.limits.constraints import ALIKE
 from ..errors import AssemblyError
 
 if TYPE_CHECKING:
+    from ..runtime.inputs import Forcing
     from ..runtime.layout import Layout
-    from ..runtime.signals import Forcing
 
 #: Assemblies in turn, by secant steps, with inputs that depend on the state.
 ROUNDS = 50

@@ -12,8 +12,8 @@ import numpy as np
 from ..base.algebra import Array
 from ..errors import calls_within
 from ..runtime.columns import Columns, describe, project, units_of_layout
+from ..runtime.inputs import Forcing
 from ..runtime.layout import Layout
-from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
 from .events import is_told_by_the_caller
 from .integrate import Solution

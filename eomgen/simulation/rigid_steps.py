@@ -58,7 +58,7 @@ from ..runtime.late import LateCore, eager
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.signals import Forcing
+    from ..runtime.inputs import Forcing
 
 
 # -- rows of contacts --------------------------------------------------------------------------------------------------

@@ -15,9 +15,9 @@ from ..base.texts import shown
 from ..errors import ill_shaped, ill_typed, incomplete, no_choice, no_number, off_range
 from ..runtime.given_start import Span, Start, last_state
 from ..runtime.initial import Initial
+from ..runtime.inputs import Forcing
 from ..runtime.near_names import unknown
 from ..runtime.room import as_real, read_flag, read_number, read_numbers, read_times
-from ..runtime.signals import Forcing
 from .integrate import NAMES
 
 if TYPE_CHECKING:

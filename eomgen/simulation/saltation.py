@@ -32,7 +32,7 @@ from ..errors import NoDerivativeError, cannot
 from ..numeric.projection import minimum_norm
 from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
 from ..runtime.derivative_calls import output_derivatives
-from ..runtime.signals import Forcing
+from ..runtime.inputs import Forcing
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
 from .sensitivity_result import EventSlopes
 from .sensitivity_start import Differentiated, InputSlopes, assembly_rows, keep_consistent

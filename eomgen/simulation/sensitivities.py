@@ -19,11 +19,11 @@ from ..errors import NoDerivativeError, SimulationError
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.given_start import Span, Start
+from ..runtime.inputs import Forcing
 from ..runtime.late_start import start_slopes
 from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
 from ..runtime.room import read_number, require_steps
-from ..runtime.signals import Forcing
 from .bound_run import Run
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .integrate import Solution, choose_solver, integrate, require_end

@@ -26,10 +26,8 @@ from ..numeric.projection import minimum_norm
 from ..runtime.change_points import scaled_jacobians
 from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
-from ..runtime.input_kinds import Tabulated
+from ..runtime.inputs import Forcing, Table, rate_places
 from ..runtime.layout import Layout
-from ..runtime.signal_rates import rate_places
-from ..runtime.signals import Forcing
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -66,12 +64,12 @@ class InputSlopes:
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
         self.forcing = forcing
         self.rates = rate_places(layout)
-        self.tables: dict[int, Tabulated] = {}
+        self.tables: dict[int, Table] = {}
         self.functions: set[int] = set()
         for i, signal in forcing.varying.items():
             if i in self.formulas:
                 continue
-            if isinstance(signal, Tabulated):
+            if isinstance(signal, Table):
                 self.tables[i] = signal.derivative()
             else:
                 self.functions.add(i)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import UsageError
-from ..runtime.signals import Forcing
+from ..runtime.inputs import Forcing
 from .compiled import can_run
 from .events import Events
 from .run_arguments import check_tolerances, declare, longest_step, own_step

@@ -19,10 +19,10 @@ from ..errors import (
     cannot,
 )
 from ..runtime.given_start import Span, Start
+from ..runtime.inputs import Forcing
 from ..runtime.near_names import check_names
 from ..runtime.option_types import Number, SolverOptions
 from ..runtime.room import read_flag, require_room, require_steps
-from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, told_by_the_caller, warn_of_unknown
@@ -85,7 +85,7 @@ def simulate(
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
-        Tables are linear in between (a :class:`~..runtime.signals.Signal` may hold the last value, or be a cubic
+        Tables are linear in between (a :class:`~..runtime.inputs.Signal` may hold the last value, or be a cubic
         spline) and constant outside; steps end exactly at their corners.  An expression is a text as in model
         files, of t, coordinates, velocities and parameters.
         Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) are derived from it; for a

@@ -12,8 +12,8 @@ from ..base.algebra import Array, correlated
 from ..base.limits.analyses import CLOSED
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
+from ..runtime.inputs import moving_inputs
 from ..runtime.minimal import Minimal
-from ..runtime.signal_rates import moving_inputs
 from .cases import Case
 from .finding import FIRST_STEP, SHORTER, Comparison, Finding, extrapolate, failed, pairs, size_of
 

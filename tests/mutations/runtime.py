@@ -20,7 +20,7 @@ FAULTS = (
         "tests/mechanics/test_lagrangians.py::test_a_constraint_that_an_input_moves[lagrange]",
     ),
     Fault(
-        "table-rate", "TableRate.derivative",
+        "table-rate", "Table.derivative",
         "(1.0, 2.0, 3.0, 0.0)",
         "(1.0, 1.0, 1.0, 0.0)",
         "rates of cubic tables lack the factors 2 and 3",

@@ -33,7 +33,7 @@ from ...errors import ModelError, Problem, bad_file, no_choice
 from ...layer import read_layer
 from ...runtime.allowed_parameters import bounds_of
 from ...runtime.bound_model import BoundModel
-from ...runtime.signals import Forcing
+from ...runtime.inputs import Forcing
 from ...targets import FMI_VERSIONS
 from ..c import emit_c
 from ..files import number_texts, read_template, render
