@@ -14,8 +14,8 @@ import numpy as np
 
 from .alone import alone, timed
 from .base.texts import fold, shown
-from .describe.dotted_names import Undotted
 from .describe.sympy_face import names_of
+from .describe.visit import Undotted
 from .equations import GIVEN, METHODS, TreeEquations, take_given
 from .errors import AssemblyError, cannot, ill_typed, off_range
 from .graph.copies import copied

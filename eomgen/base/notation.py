@@ -388,3 +388,17 @@ def label(printed: str, unit: str) -> str:
     """A name as it is printed with its unit, or either alone; no dollar of the unit begins a formula."""
     unit = visible(unit, lines=False).replace("$", r"\$")
     return f"{printed} ({unit})" if printed and unit else printed or unit
+
+
+def chains(names: Iterable[str]) -> dict[str, list[str]]:
+    """The rates that are inputs too, by the name of each input that has some, in order: first, second, ..."""
+    known = list(names)
+    orders: dict[str, dict[int, str]] = {}
+    for name in known:
+        stem, order = split_rate(name)
+        orders.setdefault(stem, {})[order] = name
+    return {
+        by_order[k]: [by_order[j] for j in sorted(by_order) if j > k]
+        for by_order in orders.values()
+        for k in sorted(by_order)[:-1]
+    }

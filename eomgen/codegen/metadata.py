@@ -8,10 +8,10 @@ from math import isfinite
 from typing import Any
 
 from ..base.limits.constraints import HELD_STEP
+from ..base.notation import split_rate
 from ..base.operations import OPERATIONS
 from ..base.value_rules import RANGE
 from ..constraints import RollingDisc
-from ..describe.input_names import split_rate
 from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
 from ..describe.requirements import Requirement
 from ..equations.tree_equations import TreeEquations

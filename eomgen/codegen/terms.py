@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import cached_property, partial
 
 from ..base.kernel_table import Sizes
+from ..base.notation import rate_of
 from ..base.operations import operations_with
-from ..describe.input_names import rate_of
 from ..equations.articulated import ConstraintRow, TreeMotion
 from ..equations.tree_equations import TreeEquations
 from ..equations.tree_slopes import can_differentiate

@@ -2,28 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
-from ..elements.kinds import Scalar
+from ..elements import kinds
+from ..elements.kinds import LIMITS, Scalar
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
+from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint
 from ..records import dataclass
-from .checks import check_names, unknown_key
-from .description import DescribedEntry, items
+from .checks import check_keys, check_names, unknown_key
+from .description import DescribedEntry, Description, items
 from .fields import joint_fields
-from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
 from .printed_names import take_coordinates_latex
 from .sympy_face import name_of
 from .values import Reader
+
+Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
+
+
+def limits_nothing(key: str, value: Any) -> bool:
+    """Whether a limit is the infinity that no value passes, as URDF and MJCF files write it."""
+    return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
+
+
+def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
+    """Limits of each coordinate of a joint.
+
+    A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
+    """
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, kinds.Limits)
+        return tuple(() for _ in coordinates)
+    check_keys(path, given, LIMITS, reader.faults)
+    result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
+    for key in LIMITS:
+        if key not in given or given[key] is None:
+            continue
+        listed = items(given[key])
+        values = [given[key]] if listed is None else listed
+        if len(values) != len(coordinates):
+            message = f"{len(values)} values for {len(coordinates)} coordinates"
+            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
+            continue
+        for k, value in enumerate(values):
+            place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
+            number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
+            if number is not None and number < 0 and key in ("velocity", "effort"):
+                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
+            elif number is not None:
+                result[k].append((key, number))
+    for name, found in zip(coordinates, result, strict=True):
+        limits = dict(found)
+        if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
+            message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
+            reader.faults.add(path, message, "exchange them", "EG-RANGE")
+    return tuple(tuple(found) for found in result)
+
+
+def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
+    """Coulomb friction of a joint (N m or N), as data."""
+    value = reader.number(path, given)
+    if value is not None and value < 0:
+        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
+    return value or 0.0
+
+
+def read_armature(reader: Reader, path: str, given: Any) -> Expr:
+    """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
+    value = reader.expression(path, given)
+    reader.requirements.inside(path, value, NOT_NEGATIVE, "an inertia must be 0 or positive")
+    return value
+
+
+WELD = "weld"
+
+
+def with_locks(description: Description) -> Description:
+    """The description with a constraint for each joint that closes and opens; the same one where there is none."""
+    joints = [_lock_of(entry) for entry in description.sections["joints"]]
+    added = [constraint for _, constraint in joints if constraint is not None]
+    if not added:
+        return description
+    sections = description.sections | {
+        "joints": [joint for joint, _ in joints if joint is not None],
+        "constraints": [*description.sections["constraints"], *added],
+    }
+    return replace(description, sections=sections)
+
+
+def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEntry | None]:
+    """What of an entry remains a joint, and what is a constraint."""
+    kind: Any = entry.values.get("type")
+    own = {key: value for key, value in entry.values.items() if key in SWITCHING}
+    if not own or not isinstance(kind, str) or kind not in JOINTS:
+        return entry, None
+    rest = {key: value for key, value in entry.values.items() if key not in SWITCHING}
+    if kind == WELD:
+        held = {"axes": "xyz", "turning": "xyz", **{key: x for key, x in rest.items() if key != "type"}}
+        return None, replace(entry, values={"type": "hold", **held, **own})
+    if not JOINTS[kind].coordinates:
+        return entry, None
+    return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **own})
 
 
 @dataclass(frozen=True)

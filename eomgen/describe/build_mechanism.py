@@ -15,37 +15,32 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
-from .body_shapes import read_shapes
-from .build_cam_points import declare_contacts
-from .build_elements import build_elements
+from .body_parts import check_display, read_body_shapes
+from .build_cams import check_turns, declare_contacts
 from .build_equations import build_equations, check_energies, declare_equations
 from .build_events import build_events, check_resets
 from .build_functions import build_functions
-from .build_joints import build_joints, declare_coordinates
+from .build_joints import build_joints, declare_coordinates, with_locks
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .build_states import build_states, declare_states
 from .build_switches import begun_switches, build_switches, declare_switches, events_of_switches, states_of_switches
-from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
-from .dotted_names import undotted
-from .element_entry import Surroundings
-from .element_states import own_states
+from .element_entry import Surroundings, build_elements, own_states
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
-from .joint_data import check_display
-from .joint_locks import with_locks
 from .mass_properties import read_body
 from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
-from .read_shapes import read_shapes as read_contact_shapes
+from .read_shapes import read_shapes
 from .scope import Namespace
 from .sympy_face import in_order, name_of
 from .values import Reader
+from .visit import undotted
 
 
 def build(description: Description) -> Mechanism:
@@ -101,7 +96,7 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     reader.mass_data = bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
-    reader.shapes = partial(read_contact_shapes, reader)
+    reader.shapes = partial(read_shapes, reader)
     around = Surroundings(reader, specs, joints, bodies, contacts)
     forces = build_elements(around, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
@@ -182,7 +177,7 @@ def build(description: Description) -> Mechanism:
         body_shapes=tuple(
             shape
             for entry in sections["bodies"]
-            for shape in read_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+            for shape in read_body_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
         ),
         added_bodies=tuple(range(described, len(bodies))),
         default_gravity="gravity" not in values,

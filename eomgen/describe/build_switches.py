@@ -16,7 +16,7 @@ from .build_events import instant
 from .description import DescribedEntry, items
 from .mechanism import Event, FirstOrderState, Switched
 from .names import nearest
-from .read_outlines import positive
+from .read_shapes import positive
 from .values import Reader
 
 CLOSED, CLOSES, OPENS = "_closed", "_closes", "_opens"  #: what follows the constraint's name: its state and events

@@ -8,12 +8,12 @@ from typing import Any
 from ..base.notation import with_instance
 from ..errors import UsageError
 from ..joints import JOINTS
-from .build_cam_points import needs_point
-from .build_clocks import COUNTER, EVENT
+from .build_cams import needs_point
 from .build_joints import coordinate_names, sketch
+from .build_states import COUNTER, EVENT
 from .build_switches import CLOSED, is_switched
 from .description import GROUND_NAME, Description
-from .element_states import states_of
+from .element_entry import states_of
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import COM, QUANTITIES, TOTALS, function_words
 from .placed_on import placed_on

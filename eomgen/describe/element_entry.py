@@ -9,19 +9,43 @@ from ..base.value_rules import Allowed
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.kinds import Field, Fields, Law
+from ..forces import FORCES
 from ..frames import Marker
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
-from .build_cam_points import Contacts
+from .build_cams import Contacts
 from .build_joints import Declared
-from .checks import check_keys
+from .checks import check_keys, check_names
 from .description import DescribedEntry
-from .element_states import states_of
 from .marker_quantities import element_quantity
-from .mechanism import TURNING, Body, JointSpec
+from .mechanism import STATE_RATE, TURNING, Body, FirstOrderState, JointSpec
 from .names import nearest
 from .scope import ENERGIES, RATES
 from .values import Reader
+
+
+def states_of(entry: DescribedEntry) -> dict[str, str]:
+    """Names of the states that a force element has of its own, and their units."""
+    kind = entry.values.get("type")
+    if not isinstance(kind, str) or kind not in FORCES or not isinstance(entry.name, str):
+        return {}
+    return {f"{entry.name}_{suffix}": unit for suffix, unit in FORCES[kind].states(entry.values).items()}
+
+
+def own_states(
+    reader: Reader, entries: list[DescribedEntry]
+) -> tuple[tuple[FirstOrderState, ...], dict[str, tuple[str, str]]]:
+    """Take in the states of force elements, which begin at 0: the states, and what the symbols of their rates are."""
+    states: list[FirstOrderState] = []
+    rates: dict[str, tuple[str, str]] = {}
+    for entry in entries:
+        for k, (name, unit) in enumerate(states_of(entry).items()):
+            if reader.names.declare("state", name, entry.path):
+                rate = f"rate of {name}"
+                rates[rate] = (f"{STATE_RATE}{k}", str(entry.name))
+                states.append(FirstOrderState(name, reader.graph.symbol(rate), unit, f"state of {entry.name}"))
+    return tuple(states), rates
+
 
 _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motions
 _OF_PARAMETERS = ("rate", "rate of rate")  #: those of Euler parameters
@@ -228,3 +252,15 @@ class ElementEntry:
         contacts = self.around.contacts
         point = contacts.place(self.reader, self.entry, axis, len(self.around.bodies) + len(contacts.bodies))
         return None if point is None else (point, self.graph.symbol(contacts.coordinates[self.path]))
+
+
+def build_elements(around: Surroundings, what: str, entries: list[DescribedEntry], types: Types) -> tuple[Any, ...]:
+    """Elements of all entries without faults; the faults are noted."""
+    made = [_build(ElementEntry(around, e), what, types) for e in check_names(entries, what, around.reader.faults)]
+    return tuple(element for element in made if element is not None)
+
+
+def _build(e: ElementEntry, what: str, types: Types) -> Any:
+    found = e.type_of(what, types)
+    element = None if found is None or found.read is None else found.read(e)
+    return None if e.at_fault() else element

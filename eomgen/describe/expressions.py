@@ -14,7 +14,8 @@ import re
 from collections.abc import Callable
 
 from ..base.operations import OPERATIONS
-from ..errors import ExpressionError
+from ..base.texts import shown
+from ..errors import ExpressionError, no_number
 from ..graph.core import Expr, Graph
 from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
@@ -393,3 +394,26 @@ class _Walker:
         if result is None or (result.value is None and all(x.value is not None for x in operands)):
             raise self.fault(node, "the value is not a finite real number", "")
         return result
+
+
+def constant(text: str, what: str) -> float:
+    """The value of an expression of numbers; names have none.
+
+    Raises
+    ------
+    UsageError
+    """
+    allowed = "write numbers, pi and functions of them"
+
+    def resolve(name: str) -> Expr:
+        if name == text.strip():
+            raise no_number(f"{what} must be a number, not {shown(text)}; {allowed}")
+        raise ExpressionError(f"{name!r} is not a number", remedy=allowed)
+
+    try:
+        value = parse(text, Graph(), resolve).value
+    except ExpressionError as error:
+        raise no_number(f"{what} must be a number: {error}") from None
+    if value is None:
+        raise no_number(f"{what} must be a number, not {text!r}")
+    return float(value)

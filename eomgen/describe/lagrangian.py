@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..base.notation import split_rate
 from .description import Description, items
 from .expressions import names_in
-from .input_names import split_rate
 from .printed_names import give_latex
 from .scope import RATES
 from .sympy_face import derivative_names, free_names, function_names, is_sympy, named, names_of

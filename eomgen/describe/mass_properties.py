@@ -13,11 +13,11 @@ from ..graph import vectors as vec
 from ..graph.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..graph.vectors import Mat3, Vec3
 from ..solids import MassProperties, combine
+from .body_parts import read_parts
 from .description import DescribedEntry, items
 from .fields import BODY
 from .mechanism import Body
 from .names import nearest
-from .parts import read_parts
 from .physical import ASYMMETRIC, is_symmetric
 from .placement import rpy_rotation
 from .values import Reader

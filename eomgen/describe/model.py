@@ -818,7 +818,7 @@ def _component(given: Any) -> Component:
 
         description = describe_yaml_file(given)
     elif isinstance(given, Described):
-        from .plain_form import plain_description
+        from .write_yaml import plain_description
 
         description = plain_description(given.description)
     else:

@@ -3,25 +3,75 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any
 
-from ..base.value_rules import BELOW, OUTLINE, RISING, Flaw, sense_of_outline
+from ..base.value_rules import BELOW, OUTLINE, RISING, SPROCKET, Flaw, sense_of_outline
 from ..elements import kinds
 from ..forces.contact_fields import PLACES
+from ..forces.contact_outlines import half_gap, half_tooth
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS, ContactShapes
 from ..forces.contact_shapes import ContactShape
-from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
+from ..forces.contact_states import BED, MOST_PAIRS, POINTS, TEETH, cells_of_bed, points_of_plate, teeth_of_sprocket
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items
 from .names import nearest
-from .read_outlines import outline_sizes, positive, sprocket_sizes
 from .values import Reader
+
+SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
+
+
+def positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
+    """Require a number greater than 0, or 0 too."""
+    reader.requirements.positive(path, x, or_zero)
+
+
+def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
+    """Depth and points, clockwise, of an outline whose corners are known, counterclockwise."""
+    points = list(zip(corners[::2], corners[1::2], strict=True))[::-1]
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+        if all(x.value is not None for x in corners):
+            depth = reader.graph.apply("min", depth, half_gap(numbers))
+    elif all(x.value is not None for x in corners):
+        depth = reader.graph.constant(half_gap(numbers))
+    else:
+        reader.faults.missing(f"{path}.depth", "points with parameters do not tell it; give a length")
+        depth = reader.stand_in
+    return (depth, *(x for point in points for x in point))
+
+
+def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
+    teeth = teeth_of_sprocket(given)
+    if teeth is None:
+        reader.faults.add(
+            f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
+        )
+        return ()
+    keys = ("pitch", "seat", "tip_radius")
+    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
+    for key, x in zip(keys, sizes, strict=True):
+        positive(reader, f"{path}.{key}", x)
+    sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
+    if reader.faults.under(path) or reader.requirements.judge(path, SPROCKET, sizes, (teeth,)):
+        return ()
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+    else:
+        depth = half_tooth(teeth, *sizes)
+    return (depth, reader.graph.constant(float(teeth)), *sizes)
+
 
 EDGES = 0.05  #: radius of the edges of a cuboid unless given, as a part of its least length
 

@@ -12,9 +12,12 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..base.names import place_of_marker
+from ..base.names import undotted as undotted_name
 from ..elements.kinds import Field, Fields
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, fields_of
+from .marker_quantities import ElementQuantity, MarkerQuantity
+from .rewritten_texts import rewritten
 
 
 class Slot(NamedTuple):
@@ -130,3 +133,38 @@ def _values(values: Mapping[str, Any], fields: Fields, slot: Slot, visitor: Visi
         place = slot._replace(key=key, field=field)
         result[key] = value if value is None or field is None else field.map(value, place, visitor)
     return result
+
+
+class Undotted(Visitor):
+    """Names with a dot after an instance as the model has them.
+
+    Parameters
+    ----------
+    instances : mapping of str to str
+        Name of an instance -> its prefix.
+    """
+
+    def __init__(self, instances: Mapping[str, str]) -> None:
+        self.instances = instances
+
+    def coordinate(self, name: str) -> str:
+        """A name whose first part is an instance: its prefix and the rest, instances within instances too."""
+        return undotted_name(name, self.instances)
+
+    body = coordinate
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        if not isinstance(value, str) or "." not in value:
+            return value
+        return rewritten(value, self.coordinate, self._renamed, self._renamed)
+
+    def _renamed(self, quantity: MarkerQuantity | ElementQuantity) -> str:
+        return str(quantity.renamed(self.coordinate))
+
+    def marker(self, reference: Any, slot: Slot) -> Any:
+        return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference, slot)
+
+
+def undotted(description: Description) -> Description:
+    """The description with every ``leg1.hip`` written ``leg1_hip``; the same one where it has no instances."""
+    return visit(description, Undotted(description.instances)) if description.instances else description

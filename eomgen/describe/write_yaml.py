@@ -5,18 +5,107 @@ from __future__ import annotations
 import numbers
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..base.texts import comment_text, yaml_quoted
 from ..elements.kinds import Field, items
 from ..errors import cannot
-from .description import SECTIONS, Description
-from .dotted_names import undotted
+from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description
 from .fields import MODEL, SHORT, fields_of
-from .sympy_face import is_sympy, name_of
-from .write_markers import with_named_markers
+from .marker_quantities import marker_quantity
+from .sympy_face import free_names, is_sympy, name_of, symbol
+from .visit import undotted
+from .yaml_file import describe_yaml
 from .yaml_nodes import scalar
+
+
+def with_named_markers(description: Description) -> Description:
+    """The same description in which markers that expressions speak of have names.
+
+    Parameters
+    ----------
+    description : Description
+        Stays as it is.
+
+    Returns
+    -------
+    Description
+        With a named marker, ``marker_1`` and so on, for each unnamed one in use; ``x(rod.at(l, 0, 0))`` in an
+        expression is ``x(rod.marker_1)``.
+    """
+    if not description.motions:
+        return description
+    parts = [description.values, *(entry.values for part in description.sections.values() for entry in part)]
+    uses = {name: found for name in sorted(_names_in(parts)) if (found := marker_quantity(name))}
+    spoken = {label for quantity in uses.values() for label in quantity.markers}
+    labels = [label for label in description.motions if label in spoken]
+    if not labels:
+        return description
+    sections = {name: list(description.sections[name]) for name in SECTIONS}
+    named = {label: _give_name(sections["bodies"], description.motions[label]) for label in labels}
+    named_symbols = {
+        symbol(name): symbol(str(quantity.renamed(lambda label: named.get(label, label))))
+        for name, quantity in uses.items()
+        if not named.keys().isdisjoint(quantity.markers)
+    }
+    for name, entries in sections.items():
+        sections[name] = [
+            DescribedEntry(entry.name, _replaced(entry.values, named_symbols), entry.path, entry.trusted, entry.folder)
+            for entry in entries
+        ]
+    values = _replaced(description.values, named_symbols)
+    return Description(values=values, sections=sections, notes=description.notes, renamed=description.renamed)
+
+
+def _give_name(bodies: list[DescribedEntry], reference: Mapping[str, Any]) -> str:
+    """Give a body a marker at a reference; returns how to refer to it."""
+    body = reference["body"]
+    place = next((k for k, entry in enumerate(bodies) if entry.name == body), None)
+    if place is None:  # ground, of which nothing was said yet
+        bodies.append(DescribedEntry(GROUND_NAME, {}, f"bodies.{GROUND_NAME}"))
+        place = len(bodies) - 1
+    entry = bodies[place]
+    markers = entry.values.get("markers") or {}
+    listed = list(markers.items()) if isinstance(markers, Mapping) else list(markers)
+    taken = {name for name, _ in listed}
+    k = 1
+    while f"marker_{k}" in taken:
+        k += 1
+    placed = {key: value for key, value in reference.items() if key != "body"}
+    bodies[place] = DescribedEntry(
+        entry.name,
+        {**entry.values, "markers": [*listed, (f"marker_{k}", placed)]},
+        entry.path,
+        entry.trusted,
+        entry.folder,
+    )
+    return f"{body}.marker_{k}"
+
+
+def _names_in(value: Any) -> Iterator[str]:
+    """Names of the symbols in everything that a value holds."""
+    if is_sympy(value):
+        yield from free_names([value])
+    elif isinstance(value, Mapping):
+        for part in value.values():
+            yield from _names_in(part)
+    elif not isinstance(value, str) and (parts := items(value)) is not None:
+        for part in parts:
+            yield from _names_in(part)
+
+
+def _replaced(value: Any, symbols: Mapping[Any, Any]) -> Any:
+    """A value with other symbols in its expressions."""
+    if is_sympy(value):
+        return value.xreplace(symbols)
+    if isinstance(value, Mapping):
+        return {key: _replaced(part, symbols) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_replaced(part, symbols) for part in value)
+    parts = None if isinstance(value, str) else items(value)
+    return value if parts is None else [_replaced(part, symbols) for part in parts]
+
 
 Names = frozenset[Any]  # of declared functions
 _UNKNOWN = Field("")  #: a key that is no key of its entry
@@ -126,3 +215,20 @@ def _text(text: str) -> str:
     if plain and not text.startswith(("- ", "---", "...", "*")) and text not in ("-", "=", "<<", "*"):
         return text
     return yaml_quoted(text)
+
+
+def plain_description(given: Description) -> Description:
+    """A description as the text of its model file reads: numbers, texts, lists and mappings only.
+
+    Raises
+    ------
+    UsageError
+        It has values that no model file can hold, such as functions of Python.
+    """
+    result = describe_yaml(yaml_text(given))
+    functions = {entry.name: entry for entry in given.sections["functions"]}
+    for entry in result.sections["functions"]:
+        entry.trusted, entry.folder = functions[entry.name].trusted, functions[entry.name].folder
+    result.lines.clear()
+    result.instances, result.origins = dict(given.instances), dict(given.origins)
+    return result

@@ -11,9 +11,9 @@ from ..elements import kinds
 from ..errors import ModelError, Problem, UsageError
 from .components import Components
 from .description import SECTIONS, Description, Faults
-from .dotted_names import undotted
 from .fields import MODEL, PARTS, SHORT
 from .names import nearest
+from .visit import undotted
 from .yaml_nodes import SIZE, Document
 
 

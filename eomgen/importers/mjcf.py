@@ -19,7 +19,7 @@ import numpy as np
 
 from ..base.algebra import about, from_quaternion
 from ..base.limits.numbers import FILES, IMPEDANCE, LARGEST, MEMORY, SECONDS, WAIT
-from ..describe.joint_data import limits_nothing
+from ..describe.build_joints import limits_nothing
 from ..errors import MissingDependencyError, ModelError, Problem, at_odds
 from .mujoco_process import compile_model
 from .robot import (

@@ -13,7 +13,7 @@ from ..base.algebra import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..base.files import as_name
 from ..base.limits.numbers import LARGEST
 from ..base.value_rules import CHECKS, word_of_check
-from ..describe.constant_texts import constant
+from ..describe.expressions import constant
 from ..describe.names import nearest
 from ..errors import Problem, ill_typed, no_choice, no_such
 

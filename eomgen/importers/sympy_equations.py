@@ -10,8 +10,8 @@ import numpy as np
 from ..base import algebra
 from ..base.limits.constraints import GIVEN as SMALL
 from ..base.limits.numbers import ROUNDED
+from ..base.notation import rate_of
 from ..describe.description import Description
-from ..describe.input_names import rate_of
 from ..describe.names import nearest
 from ..describe.printed_names import give_latex
 from ..describe.scope import RATES

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.limits.numbers import LARGEST
 from ..base.value_rules import SWITCH
-from ..describe.joint_data import limits_nothing
+from ..describe.build_joints import limits_nothing
 from ..errors import ModelError
 from .robot import (
     CONVERTED,

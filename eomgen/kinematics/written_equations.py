@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..base.notation import rate_of
 from ..constraints import Equation
 from ..constraints.couplings import ALLOWED
-from ..describe.input_names import rate_of
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError, Problem
 from ..graph.differentiate import gradient

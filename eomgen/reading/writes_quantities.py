@@ -8,8 +8,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.names import hint
-from ..describe.dotted_names import Undotted
-from ..describe.input_names import split_rate
+from ..base.notation import split_rate
+from ..describe.visit import Undotted
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, at_odds, incomplete
 from ..graph.copies import copied

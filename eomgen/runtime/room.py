@@ -186,7 +186,7 @@ def read_text(what: str, given: str) -> float:
         Texts are read where eomgen is: a generated package has no parser.
     """
     try:
-        from ..describe.constant_texts import constant
+        from ..describe.expressions import constant
     except ImportError:
         raise no_number(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
     return constant(given, what)

@@ -1,16 +1,23 @@
-"""Stage describe, contact points of cams: entries of cams -> coordinates, and the massless bodies that turn by them."""
+"""Stage describe, cams: contact points on contours, and profiles that close after a turn."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+from ..base.value_rules import TURN
+from ..constraints import Constraint
+from ..constraints.profiles import Profile
+from ..errors import ModelError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
+from ..graph.substitute import symbols_of
 from ..joints import JOINTS
 from .description import DescribedEntry
 from .mechanism import Body, JointSpec
 from .printed_names import take_latex
+from .requirements import Requirements
 from .sympy_face import name_of
 from .values import Reader
 
@@ -57,3 +64,19 @@ def declare_contacts(reader: Reader, entries: list[DescribedEntry]) -> Contacts:
             contacts.coordinates[entry.path] = str(name)
             take_latex(reader, f"{entry.path}.latex", name, entry.values.get("latex", ""))
     return contacts
+
+
+def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -> None:
+    """Note periodic profiles that jump where a turn ends, as far as the values of parameters tell."""
+    for constraint in constraints:
+        for own in fields(constraint):
+            profile = getattr(constraint, own.name)
+            turn = profile.over_a_turn() if isinstance(profile, Profile) else None
+            if turn is None:
+                continue
+            laws, angle = turn
+            where = " at the declared values" if symbols_of(laws) - {angle} else ""
+            try:
+                requirements.judge(f"constraints.{constraint.name}.{own.name}", TURN, laws, (), [angle], where)
+            except ModelError:  # native code without a twin in Python
+                continue

@@ -1,14 +1,15 @@
-"""Stage describe, parts of a body: its solids, meshes and point masses -> mass properties in body axes."""
+"""Stage describe, parts of a body: solids, meshes, point masses -> mass properties; what pictures show of it."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from ..base.files import beside
 from ..base.value_rules import NOT_NEGATIVE
 from ..elements import kinds
-from ..elements.kinds import POINT, Vector
+from ..elements.kinds import DISPLAY, POINT, Vector
 from ..errors import UsageError
 from ..frames import Frame
 from ..graph import vectors as vec
@@ -19,6 +20,7 @@ from ..solids.mesh import measure_mesh
 from .checks import check_keys, unknown_key
 from .description import items, place_of
 from .fields import BODY, SOLID, SOLID_KEYS, solid_fields
+from .mechanism import BodyShape
 from .names import nearest
 from .placement import TURNS, turn_matrix
 from .values import Reader
@@ -156,3 +158,85 @@ def _locate(reader: Reader, file: str) -> str:
     """
     model = place_of("", reader.faults.lines)[0]
     return beside(model, file) if model else file
+
+
+#: Sizes of the shapes of ``display``, in the order of a BodyShape's.
+SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}
+
+
+def read_body_shapes(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> list[BodyShape]:
+    """Shapes of one body, where its description has no faults; ``display`` comes first, as solids are for the mass."""
+    displayed = [
+        shape
+        for k, given in enumerate(items(values.get("display", ())) or ())
+        if (shape := _displayed(reader, f"{path}.display[{k}]", body, given)) is not None
+    ]
+    if displayed:
+        return displayed
+    return [
+        shape
+        for k, given in enumerate(items(values.get("solids", ())) or ())
+        if not given.get("subtract") and (shape := _solid_shape(reader, f"{path}.solids[{k}]", body, given)) is not None
+    ]
+
+
+def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str, ...]) -> tuple[Expr, ...]:
+    found: list[Expr] = []
+    for key in keys:
+        if items(values[key]) is not None:
+            found += reader.vector(f"{path}.{key}", values[key])
+        else:
+            found.append(reader.expression(f"{path}.{key}", values[key]))
+    return tuple(found)
+
+
+def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
+    kind, frame, color = str(values.get("shape")), reader.frame(path, values), str(values.get("color", ""))
+    if kind == "mesh":
+        scale = _sizes(reader, path, values, ("scale",)) if "scale" in values else (reader.graph.one,) * 3
+        return BodyShape(body, kind, scale, frame, str(values.get("file", "")), color)
+    keys = SIZES.get(kind, ())
+    if not keys or any(key not in values for key in keys):
+        return None
+    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame, color=color)
+
+
+def _solid_shape(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
+    kind, frame = str(values.get("type")), reader.frame(path, values)
+    if "axis" in values:
+        columns = reader.axis(f"{path}.axis", values["axis"])
+        if columns != TURNS["z"]:
+            frame = Frame(vec.product(frame.rotation, turn_matrix(reader.graph, columns)), frame.position)
+    if kind == "mesh":
+        scale = reader.expression(f"{path}.scale", values["scale"]) if "scale" in values else reader.graph.one
+        return BodyShape(body, kind, (scale,) * 3, frame, str(values.get("file", "")))
+    keys = tuple(key for key in SOLIDS[kind].dimensions if key != "inner_radius")
+    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame)
+
+
+_COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+def check_display(reader: Reader, path: str, given: Any) -> None:
+    """Note faults of the shapes of a body; the files they name are not looked for."""
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, kinds.Display)
+        return
+    for k, shape in enumerate(listed):
+        place = f"{path}[{k}]"
+        if not isinstance(shape, Mapping):
+            reader.wrong(place, shape, kinds.Display)
+            continue
+        check_keys(place, shape, DISPLAY, reader.faults)
+        for key, value in shape.items():
+            if key not in DISPLAY:
+                continue
+            found = DISPLAY[key].read(reader, f"{place}.{key}", value)
+            if key == "scale" and any(x.is_zero for x in found):
+                remedy = "give three numbers other than 0; negative ones mirror"
+                message = "a scale of 0 leaves nothing of the mesh"
+                reader.faults.add(f"{place}.{key}", message, remedy, "EG-RANGE")
+            if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
+                remedy = 'give six hexadecimal digits: "#1f77b4"'
+                reader.faults.add(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")
