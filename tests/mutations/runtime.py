@@ -38,7 +38,7 @@ FAULTS = (
         "self.rows[k, 0]",
         "self.rows[np.minimum(k + 1, len(self.times)), 0]",
         "held tables give the next value instead of the last",
-        "tests/runs/test_inputs.py::test_cubic_tables_and_their_rates_are_those_of_scipy",
+        "tests/runs/test_inputs.py::test_held_tables_keep_the_last_value",
     ),
     Fault(
         "event-reset-projection", "Events.reset",
