@@ -44,7 +44,7 @@ def generate(
     directory : Path or str
     method, independent, baumgarte : optional
         As for ``Model.compile``.
-    target : {'cython', 'numpy', 'c', 'casadi', 'jax', 'cuda', 'fmu'}
+    target : {'cython', 'c', 'casadi', 'jax', 'cuda', 'fmu'}
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library: ``float`` is for processors whose unit knows single precision alone, and
         leaves five to six digits.
@@ -57,10 +57,16 @@ def generate(
     Raises
     ------
     EomgenError
-        The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
+        The target has no packages; the folder exists and is no generated package, or holds a file in the way that
+        eomgen did not write.
     """
     folder = as_path("directory", directory)
     row = find_target(target)
+    if not (row.package or row.whole):
+        raise cannot(
+            f"target {target!r} is for a session, by compile(target={target!r}); for a machine without a compiler "
+            "generate a wheel: --target cython --wheel, or eomgen.compilation.wheel.build_wheel(folder)"
+        )
     equations = derive(model, method, independent, baumgarte)
     if row.whole:
         if precision != "double":

@@ -20,7 +20,7 @@ STEPPERS = (
 )
 CONTACTS = ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
 CYTHON = (
-    *("model", "numbers", "batches", "kernel", "calls", "lanes", "steppers"),
+    *("model", "numbers", "batches", "python", "kernel", "calls", "lanes", "steppers"),
     *("journeys", "integrators", "ensembles"),
 )
 

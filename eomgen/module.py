@@ -148,7 +148,7 @@ class Module(BoundModel):
 
     Parameters
     ----------
-    core : extension module or NumpyCore
+    core : Core
     p, u : mapping of str to float, or arrays (n_p,), (n_u,), optional
         Parameters and inputs to bind; the declared values by default.
 

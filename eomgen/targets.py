@@ -103,8 +103,7 @@ def find_function(name: str) -> Callable[..., Any]:
 TARGETS: dict[str, Target] = {
     "cython": Target("extension module", "codegen.package.cython_package", load="codegen.targets.cython.load"),
     "numpy": Target(
-        "Python that imports NumPy alone, no compiler",
-        "codegen.package.numpy_package",
+        "functions of NumPy arrays for a session, no compiler",
         load="codegen.targets.numpy.load",
         arrays=True,
     ),

@@ -21,8 +21,7 @@ from ..base.limits.constraints import STATE as RANK
 from ..base.names import hint, joined
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
-from ..numeric.gram import gram_solver, least
-from ..numeric.projection import largest
+from ..numeric.projection import largest, least
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.room import read_number, read_numbers
@@ -185,7 +184,9 @@ def _positions(
             sizes = np.linalg.norm(J, axis=1)
             sizes = np.where(sizes > RANK * sizes.max(), sizes, np.inf)
             alike = J / sizes[:, None]  # in any metric, so that the Tikhonov term weighs all rows in the same way
-            q, before = moved(q, -alike.T @ gram_solver(alike, max(GENTLE, size))(C / sizes)), size
+            G = alike @ alike.T
+            G += max(GENTLE, size) * G.diagonal().max() * np.eye(len(G))  # rows may depend on each other when closed
+            q, before = moved(q, -alike.T @ algebra.solve(G, C / sizes)), size
         return None
 
     def change(q: Array) -> Array:
@@ -244,8 +245,7 @@ def _velocities(
         if largest(rate) == 0.0 or not largest(rate) < before or not J.any():
             break
         before = largest(rate)
-        fast = max(scales.speed(v), largest(rate))
-        v[free] += algebra.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
+        v[free] += algebra.solve(L.T, least(J, -rate / sizes))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
     if largest(rate) > ACCEPTED * max(1.0, scales.speed(v)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]

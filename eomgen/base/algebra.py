@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EvaluationError, NonFiniteError, SingularMassMatrixError, UnsolvedError
-from .limits.numbers import FAINT, NOTHING, QUARTER, SINGULAR, STILL
+from .limits.numbers import NOTHING, QUARTER, SINGULAR
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
@@ -148,21 +148,6 @@ def safely_positive(pivots: Array, sizes: Array) -> bool:
     return bool((pivots > np.maximum(SINGULAR * sizes, NOTHING * sizes.max(initial=0.0))).all())
 
 
-def moves_inertia(pivot: float, B: Array, sizes: Array) -> bool:
-    """Whether the inertia behind a single freedom is more than what rounding moves at the dead centre of a toggle.
-
-    Parameters
-    ----------
-    pivot : float
-        B^T M B, scaled.
-    B : (n, 1) array
-        What moves, scaled.
-    sizes : (n,) array
-        Diagonal of the scaled mass matrix of the tree.
-    """
-    return bool(pivot > STILL * sizes[B[:, 0] != 0.0].sum())
-
-
 def definite_factor(M: Array, what: str) -> Array:
     """Cholesky's L (n, n) of a mass matrix M, for an analysis that holds for positive definite ones only.
 
@@ -184,27 +169,6 @@ def definite_factor(M: Array, what: str) -> Array:
             f"{what}: a motion has {size} behind it (smallest eigenvalue {least:.2g}), but the mass matrix must be "
             "positive definite"
         ) from None
-
-
-def indefinite_factor(matrix: Array, sizes: Array) -> tuple[Array, Array]:
-    """L (n, n), 1 on its diagonal, and d (n,) with matrix = L diag(d) L^T, of a matrix that need not be definite.
-
-    Without pivoting, as in C: what a pivot loses shows in the terms it is the sum of.
-
-    Raises
-    ------
-    SingularMassMatrixError
-        A pivot is less than 1e-8 of the terms that it is the sum of.
-    """
-    n = len(matrix)
-    L, d = np.eye(n), np.zeros(n)
-    for j in range(n):
-        terms = L[j, :j] ** 2 * d[:j]
-        d[j] = matrix[j, j] - terms.sum()
-        if not abs(d[j]) > FAINT * (sizes[j] + np.abs(terms).sum()):
-            raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
-        L[j + 1 :, j] = (matrix[j + 1 :, j] - L[j + 1 :, :j] @ (L[j, :j] * d[:j])) / d[j]
-    return L, d
 
 
 def correlated(M: Array) -> Array:

@@ -686,7 +686,7 @@ def load_source(name: str, path: str, data: bytes, given: Mapping[str, Any] | No
     vars(module).update(given or {})
     loader.exec_module(module)
     if not given:  # given other things, it is another module
-        _loaded[name] = module
+        _loaded[name] = getattr(module, "model", module)
     return module
 
 

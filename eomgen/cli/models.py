@@ -233,12 +233,12 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
 @click.option(
     "--wheel",
     is_flag=True,
-    help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython, numpy).",
+    help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython).",
 )
 @click.option(
     "--analyses",
     is_flag=True,
-    help="Also equilibria, linearization, reactions and all other analyses, without eomgen (cython, numpy).",
+    help="Also equilibria, linearization, reactions and all other analyses, without eomgen (cython).",
 )
 def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, analyses: bool, as_json: bool) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`.

@@ -10,12 +10,12 @@ from math import floor, log2, prod
 
 from ..base.limits.crossings import REACH, SHORTEST
 from ..graph.count import Operations
-from ..numeric.passing import PAIRS
 from .factor import factoring_operations
 from .program import Block, Program
 
 #: Bytes of the registers that a function saves, its return address and alignment, on processors of up to 32 registers.
 _FRAME = 32 * 8
+PAIRS = 5  #: of states beside a change point, as in eomgen/native/singular.c
 _PLACE = 8  #: bytes of a variable, also where numbers or pointers have 4
 _NUMBER = re.compile(r"\b([A-Z]\w*) = ([\w +*]+)")
 _STRUCT = re.compile(r"typedef struct \{\n(.*?)\} (\w+);", re.DOTALL)

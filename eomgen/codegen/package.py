@@ -1,4 +1,4 @@
-"""Program -> a package that stands alone: C library, or Python package with a compiled or a NumPy core."""
+"""Program -> a package that stands alone: C library, or Python package with a compiled core."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from .c_lanes import DERIVATIVES
 from .files import SourceSet, describe_layouts, metadata_json, number_texts, render, trace_provenance
 from .program import Program
 from .python_calls import describe_calls
-from .targets.numpy import emit_numpy
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -60,7 +59,7 @@ def emit_package(
     Parameters
     ----------
     program : Program
-    target : {'cython', 'numpy', 'c'}
+    target : {'cython', 'c'}
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library.
     asked : mapping of str to object, optional
@@ -71,7 +70,7 @@ def emit_package(
     Returns
     -------
     SourceSet
-        ``c``: sources, header, Makefile, README.md.  ``cython`` and ``numpy``: a Python package whose root is the
+        ``c``: sources, header, Makefile, README.md.  ``cython``: a Python package whose root is the
         folder itself, with pyproject.toml; installs with pip, needs NumPy alone.
 
     Raises
@@ -108,11 +107,6 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
         "setup.py": render("python/setup.py.j2", context),
         **_python_files(context),
     }
-
-
-def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
-    """Functions of NumPy arrays, and what of eomgen they need."""
-    return {**emit_numpy(program, bundled=True), **_python_files(context)}
 
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
@@ -157,7 +151,6 @@ def _context(program: Program, analyses: bool) -> dict[str, Any]:
         "doc": doc,
         "description": summary_text(doc.splitlines()[0] if doc else f"Equations of motion of {program.name}"),
         "target": metadata["target"],
-        "compiled": metadata["target"] == "cython",
         "metadata": metadata,
         "provenance": metadata["provenance"],
         "layouts": describe_layouts(program),

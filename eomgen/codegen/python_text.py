@@ -40,6 +40,19 @@ class _NumpyPrinter:
             return OPERATIONS[node[0]].numpy.format(*map(self.operand, node[1:]))
         return f"np.not_equal({self.operand(i)}, 0.0)"
 
+    def check(self, i: int, piece: PrintedFunction | None) -> str:
+        """What is noted of a check: whether it is passed, or in text for NumPy whether it fails, which NaN does not."""
+        inlined = piece is not None and i in piece.inlined
+        if not self._traced:
+            node = self._nodes[i]
+            if inlined and node[0] == "lt":
+                return f"lost.append(np.greater_equal({', '.join(map(self.operand, node[1:]))}))"
+            return f"lost.append(np.less_equal({self.operand(i)}, 0.0))"
+        if inlined:
+            assert piece is not None
+            return f"good.append({self.condition(i, piece)})"
+        return f"good.append(np.less(0.0, {self.operand(i)}))"
+
     def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
         summed = pair_call(self._graph, node[0])
@@ -65,8 +78,7 @@ class _NumpyPrinter:
             if i not in piece.inlined:
                 result.append(f"{self._name(i)} = {self._value(i, piece)}")
             if i in piece.checks:
-                passed = self.condition(i, piece) if i in piece.inlined else f"np.less(0.0, {self.operand(i)})"
-                result.append(f"good.append({passed})")
+                result.append(self.check(i, piece))
             result += [f"out[{k}] = {self._name(i)}" for k in piece.results.get(i, ())]
             if i in piece.stores:
                 result.append(f"w[{piece.stores[i]}] = {self._name(i)}")
@@ -157,10 +169,10 @@ def print_block(program: Program, block: Block) -> str:
     if program.time in symbols_of((*block.outputs, *block.checks)):
         start.append("t = np.asarray(t, dtype=float)[()]")  # never a Python float, whose division by zero raises
     if block.checks:
-        start.append("good = []")
-    end = ["for condition in good:", "    out = np.where(condition, out, np.nan)"] if block.checks else []
+        start.append("lost = []")
+    end = ["return checked(out, lost)" if block.checks else "return out"]
     ports = " ".join(port.name for port in block.ports)
-    return _print_pieces(printer, block.name, f"[{ports}] -> ({block.n_out}, ...)", pieces, start, [*end, "return out"])
+    return _print_pieces(printer, block.name, f"[{ports}] -> ({block.n_out}, ...)", pieces, start, end)
 
 
 def print_precompute(program: Program) -> str:
@@ -188,12 +200,12 @@ def _print_pieces(
     by_entry: bool = False,
 ) -> str:
     main = [*start, *_direct(printer, pieces, by_entry)]
-    main += [f"good.append(np.less(0.0, {printer.operand(i)}))" for i in pieces.checks]
+    main += [printer.check(i, None) for i in pieces.checks]
     functions = []
     if len(pieces.pieces) == 1:
         main += printer.lines(pieces.pieces[0])
     elif pieces.pieces:
-        good = ", good" if any(line == "good = []" for line in start) else ""
+        good = next((f", {line[:4]}" for line in start if line in ("good = []", "lost = []")), "")
         main.append(f"w = [None] * {pieces.work}")
         for k, piece in enumerate(pieces.pieces):
             arguments = f"t, x, u, c, out, w{good}"

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, reduce, wraps
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import numpy as np
+
+from ..base.algebra import Array
 from ..base.files import find_module, keep_module, load_source, require_trusted
-from ..errors import ToolchainError, bad_cache
+from ..errors import (
+    STATUS,
+    TO_BE_FINITE,
+    EvaluationError,
+    SingularMassMatrixError,
+    ToolchainError,
+    bad_cache,
+    not_finite,
+)  # fmt: skip
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .native import find_native
 
@@ -82,10 +92,12 @@ def _find_lanes(file: Path) -> int:
 
 
 NUMPY = "_core.py"  #: the file of the ``numpy`` target
+#: Statuses of what its functions raise.
+CODES = {**{error: status for status, error in STATUS.items()}, EvaluationError: 1}
 
 
-def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] | None = None) -> ModuleType:
-    """Import the emitted NumPy functions of a model, kept in the cache like a library; no compiler is needed.
+def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] | None = None) -> Any:
+    """Open the emitted NumPy functions of a model, kept in the cache like a library; no compiler is needed.
 
     Parameters
     ----------
@@ -98,16 +110,15 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
 
     Returns
     -------
-    module
-        The core, with ``metadata``, ``names``, ``context``, ``timed``, ``state`` and ``motion``.
+    Model
+        Of ``eomgen._native``.
     """
     text = sources[NUMPY]
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    loaded: ModuleType | None = None if twins else find_module(module_name)
-    if loaded is not None:
-        return loaded
+    if not twins and (found := find_module(module_name)) is not None:
+        return found
     try:
         cache = Cache(cache_directory())
         if (entry := cache.find(key)) is None:
@@ -117,4 +128,86 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
         path = str(entry.product)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         path = f"<{module_name}>"
-    return load_source(module_name, path, text.encode(), twins)
+    return load_source(module_name, path, text.encode(), twins).model
+
+
+def open_functions(
+    name: str, file: str, metadata: str, table: Mapping[str, Any], blocks: Mapping[str, tuple[Any, int, int]],
+    precompute: Callable[[Array], Array],
+) -> Any:  # fmt: skip
+    """The core of functions of NumPy arrays.
+
+    Parameters
+    ----------
+    name, file : str
+        Of the module that has them.
+    metadata : str
+        The JSON of model.json.
+    table : mapping
+        name, sizes, kernels and equations, as ``eomgen._native.Functions`` takes them.
+    blocks : mapping of str to (callable, int, int)
+        ``f(t, x, u, c) -> out``, and the lengths of x and out.
+    precompute : callable
+        ``p -> c``
+    """
+
+    @wraps(precompute)
+    def constants(p: Array) -> Array:
+        try:
+            return quiet(precompute)(p)
+        except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
+            raise not_finite(f"the constants of the model cannot be computed; {TO_BE_FINITE}") from None
+
+    quiet = np.errstate(all="ignore")
+    native: Any = find_native()
+    silent = {of: (quiet(block), *lengths) for of, (block, *lengths) in blocks.items()}
+    functions = native.Functions(metadata=metadata, blocks=silent, precompute=constants, codes=CODES, **table)
+    return native.Model(functions.address, name, file, functions=functions)
+
+
+class Linear:
+    """A block that is linear in its last entries, the directions of derivatives.
+
+    Solvers want one direction after the other at the same place; one call for all of them takes little longer than one.
+
+    Parameters
+    ----------
+    block : callable
+        ``f(t, x, u, c) -> out``
+    along : int
+        How many entries those are.
+    """
+
+    def __init__(self, block: Callable[..., Array], along: int) -> None:
+        self.block, self.along = block, along
+        self.last: tuple[Any, Any] = None, None
+
+    def __call__(self, t: Any, x: Array, u: Array, c: Array) -> Array:
+        """Evaluate, for one direction or a batch."""
+        if x.ndim > 1:
+            return self.block(t, x, u, c)
+        place, direction = x[: -self.along], x[-self.along :]
+        key = t, place.tobytes(), u.tobytes(), c.tobytes()
+        known, slopes = self.last
+        if known != key:
+            every = np.vstack([np.repeat(place[:, None], self.along, axis=1), np.eye(self.along)])
+            slopes = np.asarray(self.block(t, every, u, c))
+            self.last = key, slopes
+        used = np.flatnonzero(direction)
+        return np.asarray(slopes[:, used] @ direction[used])
+
+
+def checked(out: Array, lost: Sequence[Any]) -> Array:
+    """What a block gives, but of a state that fails a check.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        Of one state; in a batch it has NaN.
+    """
+    failed = reduce(np.logical_or, lost)
+    if out.ndim > 1:
+        return np.where(failed, np.nan, out)
+    if failed:
+        raise SingularMassMatrixError("the mass matrix is singular")
+    return out

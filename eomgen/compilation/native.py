@@ -20,7 +20,7 @@ from typing import Any
 
 from ..base.files import digest, locked
 from ..errors import MissingDependencyError, ToolchainError
-from ..layer import read_native
+from ..layer import SOLVER, read_native
 
 NAME = "_native"
 PACKAGE = Path(__file__).parents[1]
@@ -81,6 +81,7 @@ def build_native(folder: Path) -> None:
     # for all processors of this kind: wider vectors are chosen when it runs
     plain = [*compile_flags(Options(), compiler, 0, portable=True), "-fvisibility=hidden"]
     wide = [*compile_flags(Options(optimize=2), compiler, 0, portable=True), "-fvisibility=hidden"]
+    short = [*wide, *(["-fno-tree-vectorize"] if compiler.kind == "gcc" else [])]  # rows of solvers, as in models
     wide += ["-ftree-vectorize"] if compiler.kind == "gcc" else []
     cython = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
     cython += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
@@ -91,7 +92,7 @@ def build_native(folder: Path) -> None:
         with contextlib.chdir(private):  # no folder's name in the C text
             _run_cython(Path(f"{NAME}.pyx"))
         files = {Path(path.name): wide for path in sorted(Path(private).glob("*.c"))}
-        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(f"{NAME}.c"): cython}
+        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(SOLVER): short, Path(f"{NAME}.c"): cython}
         link = link_flags(Options(), compiler, extension=True)
         made = compile_and_link(Path(private), NAME, files, link, compiler, suffix=product.name.removeprefix(NAME))
         folder.mkdir(parents=True, exist_ok=True)

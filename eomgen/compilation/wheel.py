@@ -56,7 +56,7 @@ def require_wheel(target: str) -> None:
     MissingDependencyError
         setuptools is not installed, or too old; Cython is not installed.
     """
-    able = [name for name, row in TARGETS.items() if row.module]
+    able = [name for name, row in TARGETS.items() if row.module and row.package]
     if target not in able:
         about = TARGETS[target].about if target in TARGETS else "package of another kind"
         raise cannot(
@@ -71,10 +71,9 @@ def require_wheel(target: str) -> None:
         raise MissingDependencyError(
             f"a wheel needs setuptools {SETUPTOOLS} or later, and {found}: pip install 'eomgen[wheel]'"
         )
-    if target == "cython":
-        _refuse_native()
-        if util.find_spec("Cython") is None:
-            raise MissingDependencyError("a wheel of target cython is built with Cython: pip install cython")
+    _refuse_native()
+    if util.find_spec("Cython") is None:
+        raise MissingDependencyError("a wheel of target cython is built with Cython: pip install cython")
 
 
 def build_wheel(folder: Path | str, directory: Path | str | None = None) -> BuiltWheel:
@@ -85,15 +84,15 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
     Parameters
     ----------
     folder : Path or str
-        Of the package, of target ``cython`` or ``numpy``.
+        Of the package, of target ``cython``.
     directory : Path or str, optional
         Where the wheel goes; beside the folder by default.  A file of its name is replaced.
 
     Returns
     -------
     BuiltWheel
-        Of ``cython`` one for all CPythons from 3.11 on (abi3), and for all Linux systems with the C library that
-        auditwheel finds sufficient, where that is installed; of ``numpy`` one for every computer.
+        For all CPythons from 3.11 on (abi3), and for all Linux systems with the C library that auditwheel finds
+        sufficient, where that is installed.
 
     Raises
     ------
@@ -108,14 +107,16 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
     directory = folder.parent if directory is None else as_path("directory", directory)
     files, target = _read(folder)
     require_wheel(target)
-    variables = {"SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH") or EPOCH}
-    if target == "cython":
-        find_python_headers()
-        compiler = find_compiler()
-        words = [os.environ.get("CFLAGS") or OPTIMIZED, *machine_flags(Options(), compiler)]
-        variables |= {"CC": shlex.join(compiler.command), "CFLAGS": " ".join(words)}
-        if sys.platform.startswith("linux") and "LDSHARED" not in os.environ:
-            variables["LDSHARED"] = f"{variables['CC']} -shared -Wl,-Bsymbolic"
+    find_python_headers()
+    compiler = find_compiler()
+    words = [os.environ.get("CFLAGS") or OPTIMIZED, *machine_flags(Options(), compiler)]
+    variables = {
+        "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH") or EPOCH,
+        "CC": shlex.join(compiler.command),
+        "CFLAGS": " ".join(words),
+    }
+    if sys.platform.startswith("linux") and "LDSHARED" not in os.environ:
+        variables["LDSHARED"] = f"{variables['CC']} -shared -Wl,-Bsymbolic"
     with TemporaryDirectory(prefix="eomgen-wheel-") as private:
         source, made = Path(private, "source"), Path(private, "made")
         made.mkdir()
@@ -125,9 +126,8 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
         size = sum((source / name).stat().st_size for name in files)
         command = [sys.executable, "-P", "-c", _BUILD, str(made), json.dumps(variables)]
         run(command, source, 5.0 * allowed(size), f"building the wheel of {folder}")
-        (built,), note = made.glob("*.whl"), ""
-        if target == "cython":
-            built, note = _audit(built, Path(private, "audited"), variables["SOURCE_DATE_EPOCH"])
+        (built,) = made.glob("*.whl")
+        built, note = _audit(built, Path(private, "audited"), variables["SOURCE_DATE_EPOCH"])
         write_whole(directory / built.name, built.read_bytes())
     return BuiltWheel(directory / built.name, note)
 

@@ -98,10 +98,10 @@ def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
         return None
     for _, name in names:
         _check_signature(reader, path, name, arity, source)
-    twin, text = _twin(reader, entry, arity, names)
+    twin = _twin(reader, entry, arity, names)
     if faults.under(path):
         return None
-    code = NativeCode(source[0], source[1], tuple(names), text)
+    code = NativeCode(source[0], source[1], tuple(names))
     return Function(entry.name, arity, twin, code, reader.description.place(path))
 
 
@@ -193,13 +193,11 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
     return None
 
 
-def _twin(
-    reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]
-) -> tuple[Twin | None, str]:
-    """The Python twin and, if it is a file, its text."""
+def _twin(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]) -> Twin | None:
+    """The Python twin."""
     given, path = entry.values.get("python"), f"{entry.path}.python"
     if given is None:
-        return None, ""
+        return None
     if isinstance(given, PythonTwin):
         functions = {(0,) * arity: given.value}
         for key, total in (("derivatives", 1), ("second_derivatives", 2)):
@@ -208,11 +206,11 @@ def _twin(
             functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
         if not all(callable(f) for f in functions.values()):
             reader.faults.add(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
-            return None, ""
-        return Twin(functions), ""
+            return None
+        return Twin(functions)
     source = _read(reader, path, given, entry.folder)
     if source is None:
-        return None, ""
+        return None
     try:
         spec = importlib.util.spec_from_file_location(f"_native_{entry.name}", Path(entry.folder) / given)
         assert spec is not None
@@ -221,10 +219,10 @@ def _twin(
         spec.loader.exec_module(module)
     except Exception as error:  # whatever the file of the user raises
         reader.faults.add(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}", code="EG-FILE")
-        return None, ""
+        return None
     missing = [name for _, name in names if not callable(getattr(module, name, None))]
     if missing:
         remedy = "its functions must have the names of the C functions"
         reader.faults.add(path, f"{source[0]} has no function {', '.join(missing)}", remedy, "EG-NAME-UNKNOWN")
-        return None, ""
-    return Twin({orders: getattr(module, name) for orders, name in names}), source[1]
+        return None
+    return Twin({orders: getattr(module, name) for orders, name in names})

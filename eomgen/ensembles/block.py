@@ -132,7 +132,7 @@ def run_block(
     x0, failed, words = assemble_states(module, cases, plan.span[0], partial(forcing_of, module, cases, plan))
     told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
     core: Any = eager(module.core)
-    run = _run_compiled if plan.method in getattr(core, "methods", ()) and hasattr(core, "ensemble") else _run_python
+    run = _run_compiled if plan.method in core.methods else _run_python
     good = np.flatnonzero(~failed)
     some = good.size < cases.count
     rows = _rows(cases, good if some else slice(None))
@@ -249,7 +249,7 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
 def _run_python(
     module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
 ) -> RunBlock:
-    """The same through ``simulate``, one run after the other: where there is no compiled stepper for the method."""
+    """The same through ``simulate``, one run after the other: by SciPy's methods."""
     count, n = x0.shape
     sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
     status, failure, steps, rejected, evaluations, noted = (np.zeros(count, dtype=np.int64) for _ in range(6))

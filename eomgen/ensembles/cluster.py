@@ -86,8 +86,7 @@ def describe(module: BoundModel) -> Handle:
     file = str(getattr(core, "__file__", "") or "")
     if not file or not Path(file).is_file():
         raise cannot(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
-    if hasattr(core, "take_lanes"):
-        core.take_lanes()  # here, once, so that workers find them beside the module
+    core.take_lanes()  # here, once, so that workers find them beside the module
     recipe = _recipe(Path(file))
     facts = json.loads(recipe) if recipe else {"options": {}, "needs": ()}
     needs = tuple(sorted(processor_features())) if facts["options"].get("native", False) else tuple(facts["needs"])

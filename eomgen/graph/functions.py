@@ -26,14 +26,11 @@ class NativeCode:
         The source.
     names : tuple of (orders, name)
         C functions of the value and of the derivatives that the source has.
-    twin_text : str
-        Python source with functions of the same names; empty if the twin was given as callables.
     """
 
     file: str
     text: str
     names: tuple[tuple[Orders, str], ...]
-    twin_text: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -208,6 +208,7 @@ cdef class RigidStepper:
             if status != EOMGEN_MORE_ROOM:
                 break
             self.make_room(max(self.s.needed, 2 * self.s.room))
+        tell_raised()
         if status == EOMGEN_NO_INPUT:
             error, self.raised = self.raised, None
             raise error

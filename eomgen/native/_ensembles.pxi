@@ -164,6 +164,7 @@ cdef class Ensemble:
         own.memory = <double *>cnp.PyArray_DATA(<cnp.ndarray>memory)
         with nogil:
             eomgen_ensemble_work(&self.all, &own)
+        tell_raised()
 
     def stop(self):
         """Begin no further trajectory and end those under way."""

@@ -62,6 +62,7 @@ cdef class Integrator(Journey):
                     status = eomgen_travel(self.method, run, j)
                 if status == 1 and not self.correct():
                     status = EOMGEN_RESET_FAILED
+            status = self.tell(status)
             if status != 1:
                 return copy(run.y, n), (status, run.t, self.failure, self.raised)
             memcpy(cnp.PyArray_DATA(result), run.y, n * sizeof(double))

@@ -55,7 +55,7 @@ cdef extern from "eomgen_loop.h" nogil:
         double *trail
         long node, done, stored, n_pieces, n_notes, n_trail, resets
         int begun
-    enum: EOMGEN_FULL, EOMGEN_RESET_FAILED
+    enum: EOMGEN_FULL, EOMGEN_RESET_FAILED, EOMGEN_STOPPED
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
 
@@ -249,7 +249,7 @@ cdef class Journey(Stepper):
             with nogil:
                 status = eomgen_travel(self.method, &self.run, &self.journey)
             if status != EOMGEN_FULL:
-                return status
+                return self.tell(status)
             room = min(2 * max(self.journey.room, 256), 1 << 16)
             self.take()
             self.allocate(room)
@@ -265,6 +265,15 @@ cdef class Journey(Stepper):
             self.allocate(self.journey.room)
         with nogil:
             status = eomgen_jump(self.method, &self.run, &self.journey)
+        return self.tell(status)
+
+    cdef int tell(self, int status):
+        """The status, or that of a run that was stopped where a function of the model raised."""
+        try:
+            tell_raised()
+        except BaseException as error:
+            self.raised = error
+            return EOMGEN_STOPPED
         return status
 
     def fired(self):

@@ -118,7 +118,7 @@ cdef class Kernel:
             heap = self.context.take_work()
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
         if p is not None:
-            fill_constants(self.table, <cnp.ndarray>p, w, self.error)
+            fill_constants(self.model, <cnp.ndarray>p, w, self.error)
             constants = w
             w += self.table.n_const
         if self.tolerant:
@@ -129,6 +129,7 @@ cdef class Kernel:
                 status = self.call(now, state, inputs, constants, data, w)
         else:
             status = self.call(now, state, inputs, constants, data, w)
+        tell_raised()
         if status != 0:
             for i in range(self.n_out):
                 data[i] = entry(data[i], status)
@@ -193,11 +194,15 @@ cdef class Kernel:
         batch.u = batch.y + self.n_out
         batch.side = batch.w + plain
         batch.side += (64 - <uintptr_t>batch.side % 64) % 64 // sizeof(double)
-        if self.long or columns > 1:
+        at_once = columns > 1 and self.model.functions is not None and self.name in self.model.functions.blocks
+        if at_once:
+            failed = self.call_columns(&batch, result, &status)
+        elif self.long or columns > 1:
             with nogil:
                 failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
         else:
             failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
+        tell_raised()
         if failed >= 0:
             now = load(&batch, failed)
             given = () if p is None and u is None else (p, copy(batch.u, self.table.n_u))
@@ -205,6 +210,22 @@ cdef class Kernel:
         if out is not None and out is not result:
             out[...] = result
         return result if out is None else out
+
+    cdef cnp.npy_intp call_columns(self, const Batch *batch, cnp.ndarray result, int *status) except -2:
+        """Evaluate all columns at once by the model's Python function; those that are not finite again, one by one."""
+        cdef cnp.npy_intp failed = -1, j
+        cdef int code
+        try:
+            call_at_once(self.model.functions.blocks[self.name][0], batch, result)
+        except tuple(self.model.functions.codes):
+            pass
+        for j in np.flatnonzero(~np.isfinite(result.reshape(batch.n_out, batch.columns)).all(axis=0)):
+            code = call_one(batch, j, <double *>cnp.PyArray_DATA(result))
+            if code != 0 and (failed < 0 or code < 0):
+                failed, status[0] = j, code
+            if code < 0 or (code != 0 and not batch.nan):
+                break
+        return failed
 
     cdef object by_name(self, str label, object given, object bound):
         """Values by name as an array, the others as bound, where who asked for the kernel knows names."""

@@ -49,6 +49,8 @@ cdef class Model:
         Name of the module, and the file that its code was loaded from.
     find_lanes : callable, optional
         ``find_lanes()`` -> address of its eomgen_lanes, compiled when they are first needed, or 0.
+    functions : Functions, optional
+        Whose table it is, where functions are Python's.
 
     Attributes
     ----------
@@ -81,14 +83,16 @@ cdef class Model:
     cdef int n_q, n_v
     cdef bint projects, has_series
     cdef frozenset in_lanes
+    cdef Functions functions
     cdef object find_lanes  # read and written with LANES_LOCK alone
     cdef int offers  # whether find_lanes is there
     cdef cnp.npy_intp batched  # columns evaluated without lanes
     cdef method_pointer[N_METHODS] suited
     cdef object __weakref__
 
-    def __cinit__(self, uintptr_t address, str name, str file, find_lanes=None):
+    def __cinit__(self, uintptr_t address, str name, str file, find_lanes=None, Functions functions=None):
         cdef int i = 0
+        self.functions = functions
         self.table = <const eomgen_model *>address
         if self.table.abi != EOMGEN_ABI:
             raise ImportError(f"the model's C table has layout {self.table.abi} and this module reads layout "
@@ -203,15 +207,16 @@ cdef class Model:
         """The constants (n_const,) that follow from the parameters (n_p,)."""
         cdef cnp.npy_intp n = self.table.n_const
         cdef cnp.ndarray constants = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
-        fill_constants(self.table, p, <double *>cnp.PyArray_DATA(constants), error)
+        fill_constants(self, p, <double *>cnp.PyArray_DATA(constants), error)
         return constants
 
 
-cdef int fill_constants(const eomgen_model *table, cnp.ndarray p, double *constants, object error) except -1:
+cdef int fill_constants(Model model, cnp.ndarray p, double *constants, object error) except -1:
     """The constants that follow from the parameters, into a place for them."""
-    memset(constants, 0, table.n_const * sizeof(double))
-    cdef int status = table.precompute(<double *>cnp.PyArray_DATA(p), constants)
+    memset(constants, 0, model.table.n_const * sizeof(double))
+    cdef int status = model.table.precompute(<double *>cnp.PyArray_DATA(p), constants)
     if status != 0:
+        tell_raised()
         raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
     return 0
 

@@ -23,7 +23,7 @@ from libc.string cimport memcmp, memcpy, memset
 import json
 import os
 from sys import intern
-from _thread import allocate_lock
+from _thread import allocate_lock, get_ident
 
 import numpy as np
 cnp.import_array()
@@ -164,8 +164,9 @@ cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
     return cnp.PyArray_EMPTY(2, dims, cnp.NPY_DOUBLE, 0)
 
 
-include "_model.pxi"
 include "_batches.pxi"
+include "_python.pxi"
+include "_model.pxi"
 include "_lanes.pxi"
 
 include "_kernel.pxi"

@@ -183,10 +183,13 @@ cdef class Stepper:
         run.signals = make_signals(signals, table.n_u, self.held)
         if plan is None:
             eomgen_start(self.method, run)
+            tell_raised()
 
     def step(self):
         """Take one step; False if it would have to be too small."""
-        return eomgen_step(self.method, &self.run) == 0
+        cdef int status = eomgen_step(self.method, &self.run)
+        tell_raised()
+        return status == 0
 
     def state(self):
         """A copy of the state (n_x,)."""
@@ -267,6 +270,7 @@ def march(Context context not None, t, h, x, u=None, out=None, error=ValueError)
     status = eomgen_march(rhs.call, n, begin, size, <double *>cnp.PyArray_DATA(start),
                           <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
                           <double *>cnp.PyArray_DATA(result), w, w + table.n_work)
+    tell_raised()
     return status, result
 
 

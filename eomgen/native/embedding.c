@@ -205,7 +205,7 @@ static double embedded_sizes(const eom_at *at, double *restrict sizes)
 }
 
 /* Whether a pivot is lost in the rounding of its own entry, or is what rounding leaves of a zero; of an indefinite
-   matrix (base/algebra.py, FAINT) it must keep half of its digits. NaN shows in the result. */
+   matrix it must keep half of its digits. NaN shows in the result. */
 static int pivot_lost(const eom_at *at, double d, double size, double largest)
 {
     (void)at;

@@ -1,4 +1,21 @@
-/* Projection onto the constraints. Scaled quantities: q / s_q, C / s_c, J = diag(1/s_c) C_q diag(s_q). */
+/* Projection onto the constraints. Scaled quantities: q / s_q, C / s_c, J = diag(1/s_c) C_q diag(s_q).
+
+   The correction is the minimum-norm Newton step -J^T (J J^T)^-1 e, which depends on no partition of the coordinates, so
+   that one that goes bad at a dead centre costs no digits. A term in J J^T, relative to its largest diagonal entry,
+   carries redundant rows and positions where the rank drops. In position steps it is as large as the mean residual: rows
+   that depend on each other on the manifold only gain a false rank off it, of the size of the distance, whose Newton
+   step would run along the motion.
+
+   Velocities and accelerations take passes with the factor of J J^T + term, the rest taken in the rows themselves, so
+   that its squared conditioning costs no digits: of a part along a singular value s, relative to the largest, each
+   leaves term / (s^2 + term). What is left after a few lies along the weak rows that it points out, and the term is
+   lowered below their s^2, unless the rest is nothing but rounding (P. C. Hansen, Rank-Deficient and Discrete Ill-Posed
+   Problems, 1998, 7.2: stop at the noise). The position is known to eps / s along weak rows, since C is known to eps. J
+   turns with it, so C_q v is known to V eps / s and gamma, with the square of v, to V^2 eps / s^2. A smaller rest tells
+   nothing: taking it for true would divide it by s once more. A mechanism that nearly changes its mode swings round with
+   gamma of the size V^2, and has its rest taken down to s = 1e-6; one that passes through the change point has gamma of
+   the size s V^2 and is left to go straight on within s = 1e-5, where only noise would turn it. V is that of the loop:
+   rocker and coupler of another one that turn a thousand times as fast are no noise here. */
 
 static void form_scaled(const eom_at *at, const double *restrict C_q)
 {
@@ -209,7 +226,7 @@ static double noise_along(const eom_at *at, int rows, const double *restrict z)
 
 /* The nearest x with J x + r = 0, in the first rows of J, by passes x -= J^T G^-1 (J x + r). Where weak rows keep
    something, the term in G is lowered below them, unless it is rounding: noise / s^order along a singular value s,
-   with noise = EXACT V^order of the velocities V that a row knows (eomgen/numeric/gram.py says why). Leaves G as it
+   with noise = EXACT V^order of the velocities V that a row knows. Leaves G as it
    was, with the term CONSTRAINTS_GENTLE. */
 static int correct_linear(const eom_at *at, int rows, double *restrict G, const double *restrict r,
                           double *restrict x, int order)

@@ -1,6 +1,6 @@
-"""Stage numeric: constraints and mass matrix of a state -> projected states, accelerations, assembled loops.
+"""Stage numeric: constraints as functions of numbers -> assembled loops, ranks, curves of positions.
 
-The algorithms of closed loops in NumPy.  They are the reference for the C templates, drive the ``numpy`` target, serve
-the mobility analysis when a model is derived and the assembly at run time.  All of them work on scaled quantities
-(:class:`~.scales.Scales`), so that metres or millimetres make no difference.
+They serve the mobility analysis when a model is derived, and the assembly at run time; what calls of a model iterate is
+in C (eomgen/native).  All of them work on scaled quantities (:class:`~.scales.Scales`), so that metres or millimetres
+make no difference.
 """

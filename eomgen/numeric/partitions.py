@@ -27,8 +27,6 @@ class Partition(NamedTuple):
     rows: Indices  #: (r,) rows that determine the dependent coordinates; the others are redundant here
     inverse: Array  #: (r, r) inverse of J[rows, dependent]
     B: Array  #: (n, n - r) velocity transformation: v = B v_i (+ b_t), J B = 0
-    pivot: float  #: smallest pivot as a part of its row's size, divided by the largest: 1 is good, 0 is singular
-    weakest: float = 1.0  #: the same where no column is preferred
 
     def particular(self, y: Array) -> Array:
         """The x (n,) or (n, k) with J x = y on the pivot rows and x = 0 for the independent coordinates."""
@@ -36,18 +34,8 @@ class Partition(NamedTuple):
         x[self.dependent] = self.inverse @ y[self.rows]
         return x
 
-    def multipliers(self, f: Array) -> Array:
-        """The l (rows with no pivot zero) with ``(J^T l)_d = f_d``; f (n,), returned l[rows] (r,)."""
-        return np.asarray(self.inverse.T @ f[self.dependent])
 
-
-def partition(
-    J: Array,
-    rank: int,
-    independent: Sequence[int] | Indices,
-    strict: bool = False,
-    sizes: Array | None = None,
-) -> Partition:
+def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict: bool = False) -> Partition:
     """Split the coordinates.
 
     Parameters
@@ -60,8 +48,6 @@ def partition(
         Preferred independent columns; the other columns are preferred as dependent.
     strict : bool
         Take exactly this set or fail.
-    sizes : (m,) array, optional
-        What the entries of each row are compared with (:meth:`~.scales.Scales.row_sizes`); all with the same if none.
 
     Returns
     -------
@@ -70,25 +56,22 @@ def partition(
     Raises
     ------
     PartitionError
-        Fewer than `rank` good pivots: below STATE of the largest part of a row's size, or CHOSEN if `strict`.
+        Fewer than `rank` good pivots: below STATE of the largest entry, or CHOSEN if `strict`.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)
     preferred[np.asarray(independent, dtype=np.intp)] = False
     columns = np.flatnonzero(preferred)
-    scaled = J if sizes is None else J / sizes[:, None]
-    work = scaled.take(columns, axis=1) if strict else np.array(scaled)
-    size = float(np.abs(scaled).max()) if J.size else 0.0
+    work = J.take(columns, axis=1) if strict else np.array(J)
+    size = float(np.abs(J).max()) if J.size else 0.0
     rows = np.empty(rank, dtype=np.intp)
     dependent = np.empty(rank, dtype=np.intp)
-    smallest = weakest = size
     for step in range(rank):
         magnitude = np.abs(work)  # zero in the rows and columns of the pivots before
         row, column, best = _best(magnitude if strict else magnitude.take(columns, axis=1))
         if not strict:
             column = int(columns[column]) if best > 0.0 else column
             row_any, column_any, best_any = _best(magnitude)
-            weakest = min(weakest, best_any)
             if not best >= PREFERENCE * best_any or best == 0.0:
                 row, column, best = row_any, column_any, best_any
         if not best > (STRICT if strict else RANK) * size:
@@ -98,7 +81,6 @@ def partition(
                 if strict
                 else f"the constraints have rank {step} here and {rank} elsewhere"
             )
-        smallest = min(smallest, best)
         rows[step], dependent[step] = row, columns[column] if strict else column
         work -= work[:, column, None] * (work[row] / work[row, column])
         work[row] = 0.0
@@ -109,8 +91,7 @@ def partition(
     B = np.zeros((n, n - rank))
     B[kept, np.arange(n - rank)] = 1.0
     B[dependent] = -inverse @ J[rows[:, None], kept]
-    relative = (smallest / size, weakest / size) if size else (1.0, 1.0)
-    return Partition(dependent, kept, rows, inverse, B, *relative)
+    return Partition(dependent, kept, rows, inverse, B)
 
 
 def _best(magnitude: Array) -> tuple[int, int, float]:

@@ -9,17 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.algebra import Array, Indices
-from ..base.limits.crossings import SMALL
 from ..base.limits.numbers import ROUNDED
-from .given_rates import GivenRates
 from .space import Space
 
-__all__ = ["GivenRates", "Position", "Rate", "Scales", "Space"]
+__all__ = ["Position", "Scales", "Space"]
 
 #: q (n_q,) -> C (h,) of the holonomic rows, C_q (m, n) of all rows, the holonomic ones first
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
-#: q (n,) -> C_t (m,)
-Rate: TypeAlias = Callable[[Array], Array]
 
 
 class Scales(NamedTuple):
@@ -54,19 +50,6 @@ class Scales(NamedTuple):
     def jacobian(self, C_q: Array) -> Array:
         """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first; or (..., m, n)."""
         return C_q * self.q / self.c[: C_q.shape[-2], None]
-
-    def row_sizes(self, J: Array) -> Array:
-        """What entries of the rows of the scaled J (m, n) are compared with, all rows or the first, (m,)."""
-        largest = np.abs(J).max(axis=1, initial=0.0)
-        sizes = np.full(len(J), largest.max(initial=0.0) or 1.0)
-        if self.groups is None:
-            return sizes
-        groups = self.groups[: len(J)]
-        of_gaps = np.full(groups.max(initial=0) + 1, SMALL)
-        np.maximum.at(of_gaps, groups[groups > 0], largest[groups > 0])
-        sizes[groups > 0] = of_gaps[groups[groups > 0]]
-        sizes[groups < 0] = 1.0
-        return sizes
 
     def residual(self, C: Array) -> Array:
         """The scaled residual e = C / s_c, (m,), of all rows or the first."""

@@ -1,4 +1,4 @@
-"""Stage runtime: a compiled or NumPy core -> BoundModel; BoundModel -> Trajectory.
+"""Stage runtime: the core of a model -> BoundModel; BoundModel -> Trajectory.
 
 Importing it costs NumPy and little more; SciPy, pandas, matplotlib and rich load inside the calls that need them.
 """
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from .inputs import Signal
     from .loaded import load_trajectory
     from .minimal import Minimal
-    from .numpy_core import NumpyCore
     from .protocols import Core
     from .trajectory import Trajectory
 
@@ -21,13 +20,12 @@ _HOMES = {
     "BoundModel": "bound_model",
     "Core": "protocols",
     "Minimal": "minimal",
-    "NumpyCore": "numpy_core",
     "Signal": "inputs",
     "Trajectory": "trajectory",
     "load_trajectory": "loaded",
 }
 
-__all__ = ["BoundModel", "Core", "Minimal", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]
+__all__ = ["BoundModel", "Core", "Minimal", "Signal", "Trajectory", "load_trajectory"]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,6 @@ from ..base.algebra import Array, correlated
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import SINGULAR
 from ..errors import UnavailableError, ill_shaped
-from ..numeric.projection import correct_position
 from .refusals import refuse_states
 from .room import read_numbers
 
@@ -82,7 +81,7 @@ class Canonical:
         q, p = z[:n], z[n:]
         rate, N = np.zeros(layout.n_c), np.eye(layout.n_v)
         if layout.n_c:
-            q = correct_position(lambda x: self._position(x, t), q, layout.scales)[0]
+            q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[:n]
             J = layout.scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
             rest = np.concatenate([q, np.zeros(layout.n_v)])
             rate = layout.scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
@@ -101,10 +100,6 @@ class Canonical:
             raise module.kernels.fail.exception("canonical", 2, t, np.concatenate([q, np.zeros(layout.n_v)]))
         y = algebra.solve(embedded, right)
         return np.concatenate([q, s * (least + N @ y)])
-
-    def _position(self, q: Array, t: float) -> tuple[Array, Array]:
-        module = self._module
-        return module.constraints(q, t=t, rows="all"), module.kernels.constraint_jacobian(q, t=t, rows="all")
 
     def rhs(self, t: float, z: ArrayLike) -> Array:
         """z' = [q'; p'] (n_z,): q' = dH/dp and p' = -dH/dq + Q, with the forces of constraints.

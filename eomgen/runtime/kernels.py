@@ -1,4 +1,4 @@
-"""Stage runtime: a core (compiled or NumPy), parameters and inputs -> the calls of one model.
+"""Stage runtime: a core, parameters and inputs -> the calls of one model.
 
 A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
 makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.

@@ -88,7 +88,7 @@ def _find_core(name: str, file: str) -> Any:
             _require_features(read_entry(path.parent)[0], file)
         require_trusted(path)
         if path.suffix == ".py":
-            return load_source(name, file, read_trusted(path))
+            return load_source(name, file, read_trusted(path)).model
     except (OSError, ValueError) as error:
         what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
         raise ToolchainError(

@@ -120,10 +120,12 @@ class TrajectoryLike(Protocol):
 
 
 class Core(Protocol):
-    """What both targets give Python: the Cython extension module ``_core``, or a :class:`~.numpy_core.NumpyCore`."""
+    """What both targets give Python: a Model of ``eomgen._native``, or of a package's own."""
 
     metadata: str
     names: tuple[str, ...]
+    methods: tuple[str, ...]
+    journey: Any
 
     def context(self, p: Any = None, u: Any = None, error: Callable[[str], Exception] = ValueError) -> Any: ...
     def timed(

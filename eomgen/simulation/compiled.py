@@ -46,7 +46,8 @@ def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
     UsageError
         Method Taylor where it cannot be: nobody else has it.
     """
-    there = isinstance(method, str) and method in getattr(module.core, "methods", ())
+    core: Any = module.core
+    there = isinstance(method, str) and method in core.methods
     if isinstance(method, str) and method == "Taylor":
         if not there:
             raise cannot(no_series(module))

@@ -88,8 +88,6 @@ class Integrator:
             make, nowhere = eager(module.core).integrator, np.zeros(module.n_x)
             self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
             self._compiled.make_stall_check = self._stall_check
-        elif step is not None:
-            raise cannot("method RK4 needs compiled code: use target='cython'")
         else:
             choose_solver(method)
 

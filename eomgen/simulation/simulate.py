@@ -190,7 +190,7 @@ def simulate(
         forcing = Forcing(module.layout, inputs)
         compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
         if method == "RK4" and not compiled:
-            raise cannot("method RK4 needs compiled code: use target='cython', and no input that is a function")
+            raise cannot("method RK4 takes no input that is a function; give an expression or a table")
         if compiled:
             solver, title = None, str(method)
             check_names("option of simulate", settings, (), OPTIONS)

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 def find_solver(module: BoundModel, name: str) -> Any:
-    """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
+    """The stepper of a module by name."""
     refuse_rigid(module.layout, f"method {name}")
-    core = eager(module.core)
-    if name in getattr(core, "methods", ()):
+    core: Any = eager(module.core)
+    if name in core.methods:
         return solver_class(core, name)
     if name == "Taylor":
         raise UnavailableError(no_series(module))
@@ -172,12 +172,12 @@ def step(
         raise cannot(
             f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"
         )
-    core, u = eager(module.core), module.kernels.fail.vector("u", u, module.u)
-    if hasattr(core, "march"):
-        status, result = core.march(module.kernels.context, t, h, x, u, out, ill_shaped)
-        if status == 0:
-            return np.asarray(result)
-    # in Python, or once more in Python to tell which of the four evaluations failed
+    core: Any = eager(module.core)
+    u = module.kernels.fail.vector("u", u, module.u)
+    status, result = core.march(module.kernels.context, t, h, x, u, out, ill_shaped)
+    if status == 0:
+        return np.asarray(result)
+    # once more in Python to tell which of the four evaluations failed
     t, h, start = read_plain("t", t), read_plain("h", h), read_vector("x", x, module.n_x)
     if out is not None:
         fitting(out, start.shape)

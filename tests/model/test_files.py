@@ -80,7 +80,7 @@ def test_what_else_is_read_is_a_plain_file(other: tuple[str, str]) -> None:
     assert f"odd.csv is not a plain file but {other[1]}" in found.err or "'odd.csv' is a directory" in found.err
     refuses("EG-FILE-DAMAGED file", eg.load_trajectory, "odd.npz")
     os.renames("store/manifest.json", "pendulum/model.json")
-    found = command.run("generate", "model.yaml", "--out", ".", "--target", "numpy")
+    found = command.run("generate", "model.yaml", "--out", ".")
     assert (found.code, "is not a generated package" in found.err) == (2, True)
 
 
@@ -179,7 +179,7 @@ def test_links_are_refused_before_the_work_and_generate_goes_through_none(tmp_pa
     out = tmp_path / "out"
     out.mkdir()
     (out / "pendulum").symlink_to(victim)
-    words = ["generate", str(EXAMPLE), "--out", str(out), "--target", "numpy"]
+    words = ["generate", str(EXAMPLE), "--out", str(out)]
     assert "pendulum is a symbolic link to" in command.run(*words).err
     (out / "pendulum").unlink()
     assert command.run(*words).code == 0

@@ -195,9 +195,9 @@ FAULTS = (
         "tests/code/test_printed_operations.py::test_operations_mean_what_python_means[where(a < b, a, 2*b)-numpy]",
     ),
     Fault(
-        "numpy-time", "Drivers.rate",
-        'self.blocks["rate"](t, q, u, c)',
-        'self.blocks["rate"](0.0, q, u, c)',
+        "numpy-time", "C",
+        "self.function(t, copy(numbers_at(x), self.n_in)",
+        "self.function(0.0, copy(numbers_at(x), self.n_in)",
         "C_t of driven constraints is that of t = 0 in NumPy",
         "tests/mechanics/test_drivers.py::test_a_distance_by_the_law_of_cosines",
     ),

@@ -42,8 +42,8 @@ FAULTS = (
     ),
     Fault(
         "wheel-native", "require_wheel",
-        'target == "cython"',
-        'target == "numpy"',
+        "_refuse_native()",
+        "None",
         "a wheel for others is compiled for the processor of this computer",
         "tests/code/test_packages.py::test_flags_for_this_processor_alone_are_refused",
     ),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run
+from packages import built
 
 import eomgen as eg
 
@@ -76,8 +77,9 @@ def servo() -> eg.Model:
 def test_a_package_finds_what_the_module_finds(build: Any, calls: dict[str, str], tmp_path: Path) -> None:
     model = build()
     model.save(tmp_path / "model.yaml")
-    done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--analyses", "--out", tmp_path / "out")
+    done = run("generate", tmp_path / "model.yaml", "--analyses", "--out", tmp_path / "out")
     assert done.code == 0, done.err
+    built(tmp_path / "out" / model.name)
     words = [sys.executable, "-c", SCRIPT, model.name]
     child = subprocess.run(words, input=json.dumps(calls), cwd=tmp_path / "out", capture_output=True, text=True)
     assert child.returncode == 0, child.stderr
@@ -117,8 +119,9 @@ print(json.dumps([[np.asarray(one).tolist() for one in numbers], m.verify(states
 def test_a_package_without_analyses_has_them_where_eomgen_is(tmp_path: Path) -> None:
     for model in (crank(), servo()):
         model.save(tmp_path / "model.yaml")
-        done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--out", tmp_path)
+        done = run("generate", tmp_path / "model.yaml", "--out", tmp_path)
         assert done.code == 0, done.err
+        built(tmp_path / model.name)
     words = [sys.executable, "-c", OF_PACKAGE]
     child = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert child.returncode == 0, child.stderr

@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Model
+from packages import built
 from refusals import refused
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.interpolate import CubicSpline
@@ -468,7 +469,7 @@ def _folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 def package(mechanism: str) -> Any:
     """An exported package, imported from its folder."""
     name = f"crossed_{mechanism}"
-    root = generate(MECHANISMS[mechanism](), FOLDERS[-1], target="numpy")
+    root = built(generate(MECHANISMS[mechanism](), FOLDERS[-1]))
     spec = spec_from_file_location(name, root / "__init__.py", submodule_search_locations=[str(root)])
     assert spec is not None
     assert spec.loader is not None

@@ -225,7 +225,8 @@ def test_without_scipy_the_message_says_what_to_install() -> None:
         "import sys; sys.modules['scipy'] = None; sys.modules['scipy.integrate'] = None\n"
         "import eomgen as eg\n"
         "m = eg.load_example('slider_crank').compile(target='numpy'); m.x0(); m.kinematics([1.0])\n"
-        "try:\n    m.simulate(1.0)\n"
+        "m.simulate(0.1)\n"
+        "try:\n    m.simulate(1.0, method='LSODA')\n"
         "except eg.MissingDependencyError as error:\n    assert 'pip install scipy' in str(error)\n"
         "else:\n    raise SystemExit('no error')\n"
     )

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from children import HANGS
 from command import run
+from packages import built
 from refusals import refuses
 from sweeps import COVERING, METHODS, part_of
 
@@ -143,7 +144,7 @@ def test_the_command(tmp_path: Path) -> None:
 # -- packages ----------------------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return generate(models.build("four_bar"), tmp_path_factory.mktemp("package"), target="numpy")
+    return built(generate(models.build("four_bar"), tmp_path_factory.mktemp("package")))
 
 
 def selftest(package: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -159,17 +160,17 @@ def test_a_package_tests_itself_and_finds_what_is_broken(package: Path) -> None:
     assert fine.returncode == 0, fine.stdout + fine.stderr
     assert "mass_matrix: recorded figures" in fine.stdout
     assert selftest(package, "--json").returncode == 2  # it takes no arguments
-    code = package / "_core.py"
+    code = package / "four_bar.c"
     figures = package / "tests" / "recorded.json"
     for file, begin, told in (
-        (code, "def bias", "BREACH  bias: recorded figures"),
-        (code, "def residual_jacobian(", "BREACH  jacobian: recorded figures"),
+        (code, "flag bias_block(", "BREACH  bias: recorded figures"),
+        (code, "flag residual_jacobian_block(", "BREACH  jacobian: recorded figures"),
         (figures, "", "recorded.json"),
     ):
         text = file.read_text()
         place = text.index(" + ", text.index(begin)) if begin else 0
         file.write_text(text[:place] + " - " + text[place + 3 :] if begin else '{"name": "other"}')
-        broken = selftest(package)
+        broken = selftest(built(package))
         file.write_text(text)
         assert broken.returncode == 5, broken.stdout + broken.stderr
         assert told in broken.stdout
@@ -184,7 +185,7 @@ def recorded(package: Path) -> list[dict[str, Any]]:
 def test_recorded_figures_are_those_of_the_pendulum(tmp_path: Path) -> None:
     """By its formulas, at the declared parameters and at others."""
     moved = 0
-    for case in recorded(generate(models.build("pendulum"), tmp_path, target="numpy")):
+    for case in recorded(generate(models.build("pendulum"), tmp_path)):
         if case["call"] not in ("rhs", "energy", "mass_matrix"):
             continue
         m, l, g = case["given"]["p"]
@@ -203,7 +204,7 @@ def test_recorded_figures_are_those_of_the_pendulum(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["slider_crank", "bricard"])
 def test_c_is_within_the_recorded_bounds(name: str, tmp_path: Path) -> None:
     model = models.build(name)
-    cases, module = recorded(generate(model, tmp_path, target="numpy")), model.compile()
+    cases, module = recorded(generate(model, tmp_path)), model.compile()
     assert len(cases) >= 15
     for case in cases:
         found = getattr(module, case["call"])(*case["arguments"], **case["given"])

@@ -1,4 +1,4 @@
-"""Limits: interpolation across a change point (:mod:`eomgen.numeric.passing`)."""
+"""Limits: interpolation across a change point (eomgen/native/singular.c)."""
 
 from __future__ import annotations
 

@@ -8,42 +8,33 @@ from typing import Any
 
 from ...alone import alone, timed
 from ...compilation.load import load_numpy
-from ...errors import cannot, incomplete
+from ...errors import cannot
 from ...graph.functions import Function
 from ...numeric.user_functions import Curve, Surface, Twin
+from ..c import closed_at
 from ..c_functions import used_calls
-from ..files import SourceSet, metadata_json, render
+from ..c_layout import describe_equations, work_areas
+from ..files import SourceSet, render
 from ..pair_sums import used_sums
 from ..program import Program
 from ..python_text import print_block, print_pair_sum, print_precompute
 
+#: Ports of directions along which blocks are derivatives.
+DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
 
-def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[str]]:
-    """Imports and definitions of ``call_<function>`` for the NumPy module.
 
-    Parameters
-    ----------
-    program : Program
-    bundled : bool
-        Whether the twins of native functions are files of the package (:func:`twin_files`); else the loader puts them
-        into the module (:func:`twins`).
+def define_functions(program: Program) -> tuple[list[str], list[str]]:
+    """Imports and definitions of ``call_<function>`` for the NumPy module; the loader puts :func:`twins` into it.
 
     Raises
     ------
     UsageError
-        A native function has no Python twin, or none that can be written to a file.
+        A native function has no Python twin.
     """
     calls = used_calls(program)
-    kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if bundled or f.native is None}
+    kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
     imports = [f"from .numeric.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
-    definitions = []
-    for f, _ in calls.values():
-        if f.native is None:
-            definitions.append(_table_text(f))
-        elif bundled:
-            imports.append(f"from . import native_{f.name}")
-            functions = ", ".join(f"{orders}: native_{f.name}.{name}" for orders, name in f.native.names)
-            definitions.append(f"call_{f.name} = Twin({{{functions}}})")
+    definitions = [_table_text(f) for f, _ in calls.values() if f.native is None]
     sums = used_sums(program)
     if sums:
         imports.append("from .numeric.pair_sums import PairSum")
@@ -79,69 +70,53 @@ def twins(program: Program) -> dict[str, Twin]:
     return found
 
 
-def twin_files(program: Program) -> dict[str, str]:
-    """Files of the twins, for a package of the ``numpy`` target.
-
-    Raises
-    ------
-    UsageError
-        A twin was given as a callable, which cannot be written to a file.
-    """
-    files = {}
-    for f, _ in used_calls(program).values():
-        if f.native is None:
-            continue
-        f.require_evaluator()
-        if not f.native.twin_text:
-            raise incomplete(
-                f"function {f.name!r}: a package of target numpy needs this function in Python too, in a file; give "
-                f"python= the path of a file that defines {', '.join(name for _, name in f.native.names)}"
-            )
-        files[f"native_{f.name}.py"] = f.native.twin_text
-    return files
-
-
-def emit_numpy(program: Program, bundled: bool = False) -> SourceSet:
-    """The NumPy sources of a program.
-
-    Parameters
-    ----------
-    program : Program
-    bundled : bool, optional
-        Whether the Python twins of native functions come as files; else the loader puts them into the module.
-
-    Returns
-    -------
-    SourceSet
-        ``_core.py``, which imports NumPy, ``.runtime.numpy_core`` and ``.numeric.user_functions`` only; ``model.json``;
-        if bundled, ``native_f.py`` for a native function ``f``.
+def emit_numpy(program: Program) -> SourceSet:
+    """``_core.py``: the functions of a program, its table for the solvers, and the model made of both.
 
     Raises
     ------
     UsageError
         A native function has no Python twin.
     """
-    imports, definitions = define_functions(program, bundled)
-    files = twin_files(program) if bundled else {}
+    imports, definitions = define_functions(program)
     text = json.dumps(program.metadata, allow_nan=False)
-    twins = program.twins
     context = {
-        "n_q": program.sizes.n_q,
-        "n_v": program.sizes.n_v,
-        "composes_terms": program.composes_terms,
-        "twins": twins,
+        "twins": program.twins,
         "name": program.name,
         "metadata_lines": [repr(text[k : k + 100]) for k in range(0, len(text), 100)],
         "imports": imports,
         "definitions": definitions,
         "functions": [
-            *(print_block(program, b) for b in program.blocks if b.name not in twins),
+            *(print_block(program, b) for b in program.blocks if b.name not in program.twins),
             print_precompute(program),
         ],
-        "blocks": [block.name for block in program.blocks],
+        "blocks": [(b, sum(len(port.symbols) for port in b.ports if port.name in DIRECTIONS)) for b in program.blocks],
+        "n_v": program.sizes.n_v,
+        "table": _table(program),
     }
-    core = render("numpy/_core.py.j2", context)
-    return SourceSet({"_core.py": core, **files, "model.json": metadata_json(program)})
+    return SourceSet({"_core.py": render("numpy/_core.py.j2", context)})
+
+
+def _table(program: Program) -> dict[str, Any]:
+    """What ``eomgen._native.Functions`` takes besides metadata and functions."""
+    areas, n_work = work_areas(program, 0)
+    sizes = {
+        "n_p": len(program.parameters), "n_u": len(program.inputs),
+        "n_const": len(program.parameters) + len(program.hoisted), "n_work": n_work,
+        "closed_at": closed_at(program, areas),
+    }  # fmt: skip
+    found = describe_equations(program, areas) if program.drivers else None
+    system = program.system if "system" in program.block_names else None
+    equations = found and {
+        "numbers": [int(number) for numbers, _ in found["numbers"] for number in numbers.split(",")],
+        "tables": list(found["tables"].values()),
+        "quaternions": [tuple(slot) for slot in program.quaternion_slots],
+        "places": [system.places, system.relaxed] if system else [[], []],
+        "areas": found["areas"],
+        "functions": [name.removesuffix("_block") if name != "NULL" else None for name in found["functions"]],
+    }
+    kernels = [(k.name, k.n_in, k.n_out) for k in program.kernels]
+    return {"name": repr(program.name), "sizes": sizes, "kernels": kernels, "equations": equations}
 
 
 def load(
