@@ -6,7 +6,7 @@ cdef extern from "eomgen_contacts.h" nogil:
 
 
 def solve_contacts(W, c, friction, start, double tolerance, int most):
-    """Impulses (m, d) of rigid contacts, iterations and residual; see numeric/contact_impulses.py.
+    """Impulses (m, d) of rigid contacts, iterations and residual; see eomgen_contacts.h.
 
     Parameters
     ----------

@@ -34,6 +34,7 @@ from ..errors import (
 )
 from ..runtime.constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers, with_closed_rows
 from ..runtime.inputs import derive, drift, moving_inputs, rate_pairs
+from ..runtime.late import eager
 from ..runtime.layout import Layout
 from ..runtime.near_names import without_dots
 from ..runtime.room import read_flag, read_number, read_numbers
@@ -660,7 +661,8 @@ def _apply(
         free[count:] = rates[count:]  # a body may slide as a driver or a belt moves it
         if sliding.names:
             require_distances(states.module, float(states.t[0]), states.q[:, 0], rows[:count], names, sliding)
-            impulses, z = strike(H, free, e, rest, sliding.coefficients, sliding.owner, names)
+            core: Any = eager(states.module.core)
+            impulses, z = strike(core.solve_contacts, H, free, e, rest, sliding.coefficients, sliding.owner, names)
         else:
             impulses, z = collide(H, free, e, rest, names)
         change = B @ algebra.solve(factor.T, z)

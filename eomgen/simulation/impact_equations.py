@@ -38,8 +38,8 @@ on each other, and of directions that span less, a gap that is too small is not 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +50,6 @@ from ..base.limits.constraints import MEASURED
 from ..base.limits.impacts import COUPLED, ENDLESS, FREE, GAINS, GIVES, LEFT, PUSHES, REACHED, STILL, STRUCK
 from ..base.limits.numbers import EPS
 from ..errors import cannot, untrue
-from ..numeric.contact_impulses import solve_contacts
-from ..numeric.contact_problem import ContactProblem
 from ..numeric.ranks import rank
 
 if TYPE_CHECKING:
@@ -212,20 +210,32 @@ ORDERS = np.array([2, 1, 0, -1, -2])  #: of its waves exp(i n a)
 POLISHED = 3  #: Newton's iterations for the angle of a root, 1e-8 where two roots are near
 
 
-def impulses_in_space(problem: ContactProblem, tolerance: float) -> Array | None:
-    """Impulses (1, 3) of a contact that slides, or holds, up to a residual (m/s); None where it can do neither.
+def impulses_in_space(W: Array, c: Array, mu: float, tolerance: float) -> Array | None:
+    """Impulses (3,) of a contact that slides, or holds, up to a residual (m/s); None where it can do neither.
 
-    Of several those that take most energy from the velocities c.
+    Of several those that take most energy from the velocities c (3,), which they change by W (3, 3).
     """
-    W, c, mu = problem.W, problem.c[0], float(problem.mu[0])
     found = [-algebra.lstsq(W, c)]
     for a in _angles(W, c, mu).tolist():
         w = np.array([1.0, -mu * np.cos(a), -mu * np.sin(a)])
         gives = float(W[0] @ w)
         if gives * -c[0] > 0.0:
             found.append(-c[0] / gives * w)
-    fit = [P for P in found if problem.size(problem.misses(P[None])[0]) <= tolerance]
-    return min(fit, key=lambda P: float(P @ (c + 0.5 * W @ P)))[None] if fit else None
+    fit = [P for P in found if _residual(W, c, mu, P) <= tolerance]
+    return min(fit, key=lambda P: float(P @ (c + 0.5 * W @ P))) if fit else None
+
+
+def _residual(W: Array, c: Array, mu: float, P: Array) -> float:
+    """How far impulses P (3,) of a contact are from Signorini's and Coulomb's laws (m/s), by their natural maps.
+
+    P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods,
+    Comput. Methods Appl. Mech. Eng. 92 (1991), 353-375.
+    """
+    y, normal, across = c + W @ P, W[0, 0] or 1.0, W[1, 1] + W[2, 2] or 1.0
+    pressed = max(float(P[0] - y[0] / normal), 0.0)
+    pulled = P[1:] - y[1:] / across
+    part = min(1.0, mu * pressed / max(float(np.sqrt(pulled @ pulled)), np.finfo(float).tiny))
+    return float(np.abs([normal * (P[0] - pressed), *(across * (P[1:] - part * pulled))]).max())
 
 
 def _angles(W: Array, c: Array, mu: float) -> Array:
@@ -253,6 +263,8 @@ def _angles(W: Array, c: Array, mu: float) -> Array:
 
 
 TRIALS = 400  #: iterations for the impulses of one instant
+#: (W, c, friction, start, tolerance, iterations) -> impulses, iterations, residual
+Solve: TypeAlias = Callable[[Array, Array, Array, Array, float, int], tuple[Array, int, float]]
 HALVED = 40  #: halvings of the range of the factor of restitutions
 
 
@@ -267,14 +279,17 @@ class Sliding(NamedTuple):
 
 
 def strike(
-    H: Array, rates: Array, e: Array, rest: Array, mu: Array, owner: NDArray[np.int64], names: Sequence[str]
-) -> tuple[Array, Array]:
+    solve: Solve, H: Array, rates: Array, e: Array, rest: Array, mu: Array, owner: NDArray[np.int64],
+    names: Sequence[str],
+) -> tuple[Array, Array]:  # fmt: skip
     """Impulses (k + s,) and the change of velocities (m,), where some of k gaps have friction.
 
     Gaps that share no body with one of friction greater than 0 obey :func:`collide`, all at once.
 
     Parameters
     ----------
+    solve : callable
+        ``solve_contacts`` of ``eomgen._native``.
     H : (m, k + s) array
         As for :func:`collide`, gaps first, then sliding velocities.
     rates, e, rest, mu, owner, names
@@ -300,18 +315,21 @@ def strike(
         places = [*rough, *(k + of).tolist()]
         every = [used[i] for i in places]
         given = rates[every], e[rough], rest[every], mu[rough], np.searchsorted(rough, owner[of])
-        found[every] = strike_rough(W[np.ix_(places, places)], *given, [names[i] for i in rough])
+        found[every] = strike_rough(solve, W[np.ix_(places, places)], *given, [names[i] for i in rough])
         change = change + H[:, every] @ found[every]
     return found, change
 
 
 def strike_rough(
-    W: Array, rates: Array, e: Array, rest: Array, mu: Array, owner: NDArray[np.int64], names: Sequence[str]
-) -> Array:
+    solve: Solve, W: Array, rates: Array, e: Array, rest: Array, mu: Array, owner: NDArray[np.int64],
+    names: Sequence[str],
+) -> Array:  # fmt: skip
     """Impulses (k + s,) of k gaps, all of them closed, and of friction along s sliding velocities.
 
     Parameters
     ----------
+    solve : callable
+        ``solve_contacts`` of ``eomgen._native``.
     W : (k + s, k + s) array
         How impulses change rates: gaps first, then sliding velocities.
     rates, rest : (k + s,) arrays
@@ -340,7 +358,7 @@ def strike_rough(
             i = group[0]
             found[every] = _in_the_plane(W[np.ix_(every, every)], rates[every], rest[i], mu[i], e[i], names[i])
         else:
-            found[every] = _together(W, rates, places, mu[group], e[group], [names[i] for i in group])
+            found[every] = _together(solve, W, rates, places, mu[group], e[group], [names[i] for i in group])
     return found
 
 
@@ -396,7 +414,9 @@ def _in_the_plane(W: Array, rates: Array, rest: float, mu: float, e: float, name
     return np.array([P, Q])
 
 
-def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Array, names: list[str]) -> Array:
+def _together(
+    solve: Solve, W: Array, rates: Array, places: list[list[int]], mu: Array, e: Array, names: list[str]
+) -> Array:
     """Impulses of gaps by Newton's and Coulomb's laws for the velocities after, in the order of the places."""
     m, d = len(places), max(map(len, places))
     where = np.full((m, d), -1)
@@ -416,14 +436,12 @@ def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Arr
         """Impulses for restitutions times a factor, and how far they are from what is allowed."""
         c = before.copy()
         c[:, 0] += part * back
-        problem = ContactProblem(full, c, mu)
-        found = solve_contacts(problem, start, REACHED * fast, TRIALS)
-        impulses = found.impulses
-        if found.residual > GIVES * fast:
-            other = impulses_in_space(problem, GIVES * fast) if problem.c.shape == (1, 3) else None
+        impulses, _, residual = solve(full, c, mu, start, REACHED * fast, TRIALS)
+        if residual > GIVES * fast:
+            other = impulses_in_space(full, c[0], float(mu[0]), GIVES * fast) if c.shape == (1, 3) else None
             if other is None:
                 return impulses, np.inf
-            impulses = other
+            impulses = other[None]
         P = impulses.ravel()
         work = P * (2.0 * flat + full @ P)
         return impulses, float(work.sum()) - GAINS * float(np.abs(work).sum())

@@ -6,8 +6,8 @@ Systems, 2008, section 10.1).  With the position q_m = q + h/2 N v half a step o
 
     M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C(q+) v+ + C_t = 0,      q+ = q_m + h/2 N v+,
 
-with M, J and C of the middle where nothing else is said, and the laws of :mod:`~eomgen.numeric.contact_impulses`
-between impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
+with M, J and C of the middle where nothing else is said, and the laws of rigid contact (eomgen_contacts.h) between
+impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
 touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
 39 (1996), 2673-2691). Where shapes land, an impact without rebound, they go on with a part of the whole impact,
@@ -51,8 +51,6 @@ from ..base.limits.contacts import (
     YIELDING,
 )
 from ..errors import SimulationError, UsageError, cannot, off_range
-from ..numeric.contact_impulses import ContactImpulses, solve_contacts
-from ..numeric.contact_problem import ContactProblem
 from ..numeric.pair_sums import RECORD
 from ..runtime.late import LateCore, eager
 
@@ -279,6 +277,14 @@ class HeldInertia:
 # -- the step ----------------------------------------------------------------------------------------------------------
 
 
+class ContactImpulses(NamedTuple):
+    """What was found."""
+
+    impulses: Array  #: (m, d)
+    iterations: int  #: Newton's, and sweeps
+    residual: float  #: (m/s) the largest entry of the natural maps, as velocities
+
+
 class RigidSteps:
     """The steps of one run; attributes tell how well contacts were solved.
 
@@ -312,7 +318,8 @@ class RigidSteps:
         self._begins = True
         names = module.kernels.core.names
         self._meeting = module.kernels.motion("meeting_time") if "meeting_time" in names else None
-        self._solve = getattr(eager(module.core), "solve_contacts", None)
+        core: Any = eager(module.core)
+        self._solve = core.solve_contacts
         self._last: dict[Spot, Array] = {}
         self._in_c = rigid_stepper(module, forcing, self.contacts, tolerance, iterations)
 
@@ -527,8 +534,6 @@ class RigidSteps:
         return ContactImpulses(impulses, max(whole.iterations, without.iterations), residual)
 
     def _impulses(self, W: Array, c: Array, friction: Array, start: Array, tolerance: float) -> ContactImpulses:
-        if self._solve is None:
-            return solve_contacts(ContactProblem(W, c, friction), start, tolerance, self.allowed)
         return ContactImpulses(*self._solve(W, c, friction, start, tolerance, self.allowed))
 
     def _note(self, found: ContactImpulses, scale: float, rough: float) -> None:
@@ -570,12 +575,11 @@ OF_CONSTRAINTS = ("constraint_jacobian", "velocity_constraints", "constraints")
 def rigid_stepper(
     module: BoundModel, forcing: Forcing, contacts: RigidContacts, tolerance: float, iterations: int
 ) -> Any | None:
-    """The compiled steps of one run; None where the module has none."""
-    make = getattr(eager(module.core), "rigid_stepper", None)
+    """The compiled steps of one run; None where the module lacks kernels."""
     layout = module.layout
     wanted = [*NEEDED, *(OF_CONSTRAINTS if layout.n_c else ())]
     known = module.kernels.core.names
-    if make is None or not set(wanted) <= {*known} | ({"constraints"} if not layout.n_h else set()):
+    if not set(wanted) <= {*known} | ({"constraints"} if not layout.n_h else set()):
         return None
     wanted += ["meeting_time"]
     bound = module.kernels.context
@@ -608,4 +612,5 @@ def rigid_stepper(
     outside = forcing if forcing.foreign else None
     within = forcing.within or (-np.inf, np.inf)
     signals = [] if outside is not None else forcing.encode()
-    return make(bound, sources, n_work, facts, tables, tolerance, iterations, signals, outside, within)
+    stepped: Any = eager(module.core)
+    return stepped.rigid_stepper(bound, sources, n_work, facts, tables, tolerance, iterations, signals, outside, within)

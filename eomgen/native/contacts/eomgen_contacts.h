@@ -1,5 +1,25 @@
-/* Impulses of rigid contacts (eomgen/numeric/contact_impulses.py says the laws and the methods), and a step of a mechanism with
-   them (eomgen/simulation/rigid_steps.py says the scheme). */
+/* Impulses of rigid contacts, and a step of a mechanism with them (eomgen/simulation/rigid_steps.py says the scheme).
+
+   Of each contact the impulse P = (P_n, P_t) and the velocity y = c + W P, less what the normal one is to be, obey
+
+       0 <= P_n  _|_  y_n >= 0,      P_t in the disc of radius mu P_n, opposite to y_t on its edge where y_t is not 0
+
+   (Signorini and Coulomb). Both are zeros of the natural maps of P. Alart, A. Curnier, A mixed formulation for frictional
+   contact problems prone to Newton like solution methods, Comput. Methods Appl. Mech. Eng. 92 (1991), 353-375,
+
+       P_n - max(0, P_n - r y_n),      P_t - (P_t - s y_t) brought into the disc of radius mu max(0, P_n - r y_n),
+
+   which a Newton method with the derivatives of the branch at hand solves (newton.c). Contacts may be more than there are
+   freedoms: each round solves for contacts that are a little softer about the impulses of the round before (the proximal
+   point method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the
+   solution as it is. Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
+   method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257), and one contact in the plane by its four cases. Before all
+   that, many contacts are solved by the edges of their cones (pivots.c: G. de Saxce, Z.-Q. Feng, The bipotential method,
+   Math. Comput. Modelling 28 (1998), 225-245; D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly
+   convex quadratic programs, Math. Program. 27 (1983), 1-33; F. Cadoux, Ph.D. thesis, Grenoble, 2009), or in space by
+   sweeps. What is left goes to laws that are rounded over a velocity and become sharp (rounded.c: B. Chen, P. T. Harker, A
+   non-interior-point continuation method for linear complementarity problems, SIAM J. Matrix Anal. Appl. 14 (1993),
+   1168-1190). */
 #ifndef EOMGEN_CONTACTS_H
 #define EOMGEN_CONTACTS_H
 

@@ -17,7 +17,7 @@ static void try_cases(contacts *s, double *P, double *least)
     }
 }
 
-/* The whole of solve_contacts in numeric/contact_impulses.py. */
+/* Impulses P from a guess, by sweeps, Newton's method for softer contacts and, in the end, rounded laws. */
 static int iterate(contacts *s, double *P, double tolerance, int most, double *residual)
 {
     static const double softer[] = RIGID_SOFTER, shrinks[] = RIGID_SHRINKS;
