@@ -168,8 +168,8 @@ def test_a_package_tests_itself_and_finds_what_is_broken(package: Path) -> None:
         (figures, "", "recorded.json"),
     ):
         text = file.read_text()
-        place = text.index(" + ", text.index(begin)) if begin else 0
-        file.write_text(text[:place] + " - " + text[place + 3 :] if begin else '{"name": "other"}')
+        place = text.index("c[0]*", text.index(begin)) if begin else 0
+        file.write_text(f"{text[:place]}2.0*{text[place:]}" if begin else '{"name": "other"}')
         broken = selftest(built(package))
         file.write_text(text)
         assert broken.returncode == 5, broken.stdout + broken.stderr
