@@ -162,10 +162,11 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
 def _place(description: Description, path: str) -> tuple[str, DescribedEntry | None, list[Any]]:
     """Section, entry and the keys and indices that follow, of the path of an expression."""
     section = path.partition(".")[0]
-    for entry in description.sections.get(section, ()):
-        own = entry.path
-        if path.startswith(own) and path[len(own) : len(own) + 1] in (".", "["):
-            return section, entry, _steps(path[len(own) :])
+    for home in (section, *(["constraints"] if section == "joints" else [])):  # a weld that closes is a constraint
+        for entry in description.sections.get(home, ()):
+            own = entry.path
+            if path.startswith(own) and path[len(own) : len(own) + 1] in (".", "["):
+                return home, entry, _steps(path[len(own) :])
     return section, None, _steps(path)
 
 

@@ -337,3 +337,17 @@ def test_slips_in_python() -> None:
     refuses("EG-CONFLICT l", lambda: m.add(arm(), "a_", m.ground, parameters={"l": 0.3}, l=0.4))
     refuses("EG-TYPE parameters", lambda: m.add(arm(), "a_", m.ground, parameters=[0.3]))
     refuses("EG-UNIT l", lambda: m.add(arm(), "a_", m.ground, l={"value": 1, "unit": "s"}))
+
+
+def test_a_weld_that_closes_is_judged_beside_units(tmp_path: Path) -> None:
+    text = """
+        name: latch
+        parameters: {k: {value: 2, unit: 1/s}, l: {value: 0.4, unit: m}}
+        bodies: {a: {mass: 1}, b: {mass: 1}}
+        joints:
+          r: {type: prismatic, between: [ground, a]}
+          s: {type: prismatic, between: [ground, b]}
+          w: {type: weld, between: [a, b], closes: s - r - l, stabilisation: RATE}
+    """
+    assert load(tmp_path, text.replace("RATE", "k")).check()
+    refuses("EG-DIMENSION joints.w.stabilisation", lambda: load(tmp_path, text.replace("RATE", "l")).check())

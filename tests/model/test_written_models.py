@@ -288,3 +288,31 @@ def test_the_tracked_excavator_is_what_its_script_writes() -> None:
     np.testing.assert_allclose(pins[-1], pins[0], atol=1e-8)
     np.testing.assert_allclose(np.hypot(*np.diff(pins, axis=0).T), Track().pitch, atol=1e-12)
     assert eg.load_example("tracked_excavator").to_yaml() == build().to_yaml()
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_an_axis_is_left_out_where_it_is_the_default_of_its_type(axis: str, tmp_path: Path) -> None:
+    m = eg.Model("skate")
+    blade = m.body("blade", mass=1.0, inertia=(1, 1, 1))
+    lift = m.body("lift", mass=1.0)
+    m.free("f", m.ground, blade)
+    m.translational("t", m.ground, lift)
+    m.knife_edge("edge", blade, axis=axis)
+    m.driver("up", marker=lift, axis=axis, value="0.1*t")
+    m.save(tmp_path / "skate.yaml")
+    again = eg.load(tmp_path / "skate.yaml")
+    assert digest(again) == digest(m)
+    entries = {entry.name: entry.values for entry in again.description.sections["constraints"]}
+    assert ("axis" in entries["edge"]) == (axis != "y")
+    assert ("axis" in entries["up"]) == (axis != "x")
+
+
+def test_a_shape_in_a_picture_is_turned_by_axes_or_a_matrix(tmp_path: Path) -> None:
+    turns = ({"axes": {"x": "y", "z": "z"}}, {"matrix": [[0, -1, 0], [1, 0, 0], [0, 0, 1]]})
+    for turn in turns:
+        m = eg.Model("shown")
+        m.body("block", mass=1.0, display=[{"shape": "box", "size": [1, 2, 3], **turn}])
+        m.prismatic("s", m.ground, "block")
+        assert m.check()
+        m.save(tmp_path / "shown.yaml")
+        assert eg.load(tmp_path / "shown.yaml").check()
