@@ -40,29 +40,15 @@ class Sizes(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """One public function.
-
-    Attributes
-    ----------
-    name : str
-    inputs : tuple of str
-        Ports that make up ``x``, in order: q v a, q_i v_i a_i (independent coordinates), q_guess.
-    shape : callable
-        Sizes -> shape of the result for one state.
-    result : str
-        What the result is, one line for headers and documentation.
-    late : bool or str
-        Left out of a module made in this process until one of those with the same value is called; never of an export.
-    absent : bool
-        Whether models where a size of the result is 0 are without it, as they are without late ones.
-    """
+    """One public function."""
 
     name: str
-    inputs: tuple[str, ...]
-    shape: Callable[[Sizes], tuple[int, ...]]
-    result: str
+    inputs: tuple[str, ...]  #: ports that make up ``x``: q v a, q_i v_i a_i (independent coordinates), q_guess
+    shape: Callable[[Sizes], tuple[int, ...]]  #: of the result for one state
+    result: str  #: what the result is, one line for headers and documentation
+    #: left out of a module made in this process until one of those with the same value is called; never of an export
     late: bool | str = False
-    absent: bool = False
+    absent: bool = False  #: whether models where a size of the result is 0 are without it, as without late ones
 
     @property
     def optional(self) -> bool:

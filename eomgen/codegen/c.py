@@ -17,7 +17,6 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels
 from .c_layout import describe_equations, is_straight, work_areas
 from .c_pairs import pair_declarations, pair_files
-from .c_parts import distribute
 from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
@@ -31,6 +30,8 @@ from .single_precision import in_single_precision, refuse_double
 #: Headers of the numbers that functions compute with, and those that lanes need besides.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h")
 PROCESSOR = "eomgen_processor.h"
+#: Pieces of long functions that take more text than this (bytes) go into files of about this length each.
+LENGTH = 150_000
 #: Characters of a C literal, which compilers need not take longer than 4095, and of one of its lines.  gcc reads the
 #: metadata of 1,600 bodies as literals in 0.06 s, as numbers in 1.0 s.
 LITERAL, LINE = 4000, 112
@@ -81,7 +82,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     program = replace(program, metadata={**program.metadata, **about})
     apart = _of_analyses(program) if separate else frozenset()
     printed = _print(program, apart, lanes and precision is None)
-    parts = distribute(program, list(printed.values())) if separate else []
+    parts = _distribute(list(printed.values())) if separate else []
     calls = used_calls(program)
     for_lanes = _printed_for_lanes(program, printed) if in_lanes else {}
     work = max((p.work for name, p in (*printed.items(), *for_lanes.items()) if name != "precompute"), default=0)
@@ -306,3 +307,19 @@ def _lines(escaped: str) -> Iterator[str]:
         end = inside if inside > 0 else end
         yield escaped[start:end]
         start = end
+
+
+def _distribute(printed: list[Printed]) -> list[list[tuple[str, str]]]:
+    """The pieces, name and text, by file; none if the model is small enough for one file."""
+    pieces = [piece for p in printed for piece in p.pieces]
+    total = sum(len(text) for _, text in pieces)
+    if total <= LENGTH:
+        return []
+    files = -(-total // LENGTH)
+    share = total / files
+    parts: list[list[tuple[str, str]]] = [[] for _ in range(files)]
+    done = 0
+    for name, text in pieces:
+        parts[min(int(done / share), files - 1)].append((name, text))
+        done += len(text)
+    return [part for part in parts if part]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
@@ -22,23 +22,8 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-class SourceSet(Mapping[str, str]):
-    """Frozen mapping of relative file name (with ``/``) to text."""
-
-    def __init__(self, files: Mapping[str, str]) -> None:
-        self._files = dict(files)
-
-    def __getitem__(self, name: str) -> str:
-        return self._files[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._files)
-
-    def __len__(self) -> int:
-        return len(self._files)
-
-    def __repr__(self) -> str:
-        return f"SourceSet({', '.join(f'{name} ({len(text)})' for name, text in self._files.items())})"
+#: Texts by relative file name (with ``/``).
+SourceSet = dict[str, str]
 
 
 @cache
@@ -199,18 +184,8 @@ USED = ("numpy", "sympy")
 def trace_provenance(program: Program, target: str, asked: Mapping[str, Any]) -> dict[str, Any]:
     """Where a package comes from.
 
-    Parameters
-    ----------
-    program : Program
-    target : str
-    asked : mapping of str to object
-        Options of the generation by name, those that change the equations or the numbers.
-
-    Returns
-    -------
-    dict
-        ``model``, ``model_digest`` (SHA-256 of the mechanism, the same for all methods and targets), ``options``
-        (``method`` as it was chosen, and whatever was asked for), ``versions``.
+    ``model``, ``model_digest`` (SHA-256 of the mechanism, the same for all methods and targets), ``options`` of the
+    generation that change the equations or the numbers (``method`` as it was chosen), ``versions``.
     """
     facts = program.metadata
     found = {name: metadata.version(name) for name in USED}

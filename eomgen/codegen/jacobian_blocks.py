@@ -96,12 +96,6 @@ class ResidualSlopes:
                 result += [self.entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
         return result
 
-    def by_formula_at(self, accelerations: Sequence[Expr]) -> Entries:
-        """Derivatives of M a + h from its formula, at these accelerations."""
-        found = self.by_formula()
-        mapping = dict(zip(self.terms.symbols(self.terms.a), accelerations, strict=True))
-        return dict(zip(found, substitute(list(found.values()), mapping), strict=True))
-
 
 def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[Expr], list[Expr]] | None:
     """The Jacobian of a tree, row-major, and checks of its mass matrix; None if it would be too long.
@@ -117,7 +111,7 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
         found.append((slopes.joined(slopes.forces, solved.accelerations), solved))
     if (terms.accelerations is None or not found) and slopes.is_short(terms.inverse_dynamics):
         solved = _solve(terms, terms.mass_matrix, terms.bias)
-        found.append((slopes.by_formula_at(solved.accelerations), solved))
+        found.append((_at(terms, slopes.by_formula(), solved.accelerations), solved))
     if not found:
         return None
     rates = jacobian(list(terms.q_dot), symbols)
@@ -135,10 +129,14 @@ def unrolled_shift(
     symbols = terms.symbols(names)
     solved = _solve(terms, terms.mass_matrix, terms.bias)
     found = jacobian(list(terms.inverse_dynamics), symbols)
-    a = terms.symbols(terms.a)
-    values = substitute(list(found.values()), dict(zip(a, solved.accelerations, strict=True)))
-    rows = _rows(terms, {}, dict(zip(found, values, strict=True)), solved, len(names))
+    rows = _rows(terms, {}, _at(terms, found, solved.accelerations), solved, len(names))
     return (rows, solved.checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
+
+
+def _at(terms: SystemTerms, entries: Entries, accelerations: Sequence[Expr]) -> Entries:
+    """Derivatives at these accelerations."""
+    mapping = dict(zip(terms.symbols(terms.a), accelerations, strict=True))
+    return dict(zip(entries, substitute(list(entries.values()), mapping), strict=True))
 
 
 class Solved(NamedTuple):

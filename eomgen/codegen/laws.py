@@ -12,7 +12,7 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
-from ..kinematics.eliminate import Matrix, eliminate, total
+from ..kinematics.eliminate import Matrix, combined, eliminate, total
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64
@@ -257,12 +257,9 @@ def _eliminated(
     rest, *by = solve_by_largest_pivots(
         A, [[column[i] for i in places] for column in (still, *zip(*gain, strict=True))]
     )
-    base = [
-        total([N, *(row[j] * f for j, f in zip(linear, rest, strict=True))]) for N, row in zip(still, gain, strict=True)
-    ]
-    rows = [
-        [total([row[m], *(row[j] * f for j, f in zip(linear, by[m], strict=True))]) for m in curved] for row in gain
-    ]
+    parts = [[row[j] for j in linear] for row in gain]
+    base = [combined(N, part, rest) for N, part in zip(still, parts, strict=True)]
+    rows = [[combined(row[m], part, by[m]) for m in curved] for row, part in zip(gain, parts, strict=True)]
     return base, rows, certain
 
 
@@ -300,7 +297,7 @@ def _if(certain: Expr, x: Expr) -> Expr:
 
 
 def _at(still: Sequence[Expr], gain: Matrix, force: Sequence[Expr]) -> list[Expr]:
-    return [total([N, *(k * f for k, f in zip(row, force, strict=True))]) for N, row in zip(still, gain, strict=True)]
+    return [combined(N, row, force) for N, row in zip(still, gain, strict=True)]
 
 
 def _slope(D: Mapping[tuple[int, int], Expr], gain: Matrix, i: int, j: int) -> Expr:

@@ -11,7 +11,7 @@ read it as coefficients and are linear in the direction.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 from ..base.limits.constraints import TIKHONOV
@@ -21,6 +21,7 @@ from ..graph.differentiate import jacobian, jvp
 from ..graph.pair_calls import list_operands
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
+from ..kinematics.eliminate import dot, total
 from .linear_algebra import times
 from .loop_systems import BodyLoops
 from .program import Block, Port
@@ -52,13 +53,13 @@ class LoopSlopes:
             e, de = self.q[i : i + 4], self.dq[i : i + 4]
             factor = 4.0 / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
             for c in range(3):
-                z[j + c] = _sum(N[i + m, j + c] * factor * de[m] for m in range(4) if (i + m, j + c) in N)
+                z[j + c] = total([N[i + m, j + c] * factor * de[m] for m in range(4) if (i + m, j + c) in N])
         if loops.h:
             z = loops.nearest(z, [terms.graph.zero] * loops.h, loops.h, *loops.holonomic)
         moved = substitute(rates, dict(zip(self.v, z, strict=True)))
         for i, _ in terms.quaternion_slots:
             e, de = self.q[i : i + 4], self.dq[i : i + 4]
-            along = _sum(x * y for x, y in zip(e, de, strict=True)) / _sum(x * x for x in e)
+            along = dot(e, de) / dot(e, e)
             moved[i : i + 4] = [x + y * along for x, y in zip(moved[i : i + 4], e, strict=True)]
         return moved
 
@@ -155,10 +156,3 @@ class LoopSlopes:
         changes = substitute(self._columns[which], mapping)
         given = (Port("coefficients", self.names), ports[2 + which])
         return Block(name, given, tuple(changes), (len(changes),), public=False)
-
-
-def _sum(values: Iterable[Expr]) -> Expr:
-    first, *rest = values
-    for x in rest:
-        first = first + x
-    return first

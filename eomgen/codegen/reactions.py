@@ -29,7 +29,7 @@ from ..graph.traverse import operands, reachable
 from ..kinematics import Kinematics
 from ..kinematics.carried_reactions import carried_reactions
 from ..kinematics.constraint_functions import ConstraintFunctions
-from ..kinematics.eliminate import Matrix, dot, eliminate, total
+from ..kinematics.eliminate import Matrix, combined, dot, eliminate, total
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.reaction_parts import force_and_moment
@@ -406,14 +406,11 @@ def _linear_parts(
     graph = solved[0].graph
     slopes = jacobian(list(measured), [*solved, *forces])
     base = substitute(list(measured), dict.fromkeys([*solved, *forces], graph.zero))
-    still, gain = [], []
+    still, gain, n = [], [], len(solved)
     for i, N in enumerate(base):
-        row = [slopes.get((i, j), graph.zero) for j in range(len(solved) + len(forces))]
-        still.append(total([N, *(d * x for d, x in zip(row, a, strict=False))]))
-        own = row[len(solved) :]
-        gain.append(
-            [total([f, *(d * x for d, x in zip(row, c, strict=False))]) for f, c in zip(own, columns, strict=True)]
-        )
+        row = [slopes.get((i, j), graph.zero) for j in range(n + len(forces))]
+        still.append(combined(N, row[:n], a))
+        gain.append([combined(f, row[:n], c) for f, c in zip(row[n:], columns, strict=True)])
     return LinearValues(still, gain)
 
 

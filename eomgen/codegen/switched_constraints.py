@@ -16,7 +16,7 @@ from ..forces.branches import where
 from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
-from ..kinematics.eliminate import Matrix, total
+from ..kinematics.eliminate import Matrix, combined, dot, total
 from ..kinematics.switched import SwitchedRow
 
 
@@ -41,8 +41,8 @@ def solve_rows(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> 
     right = [[-(s * w) for s, w in zip(on, found.still[n:], strict=True)]]
     right += [[-(s * row[j]) for s, row in zip(on, found.gain[n:], strict=True)] for j in range(count)]
     first, *columns = solve_switched(A, right)
-    still = [_with(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
-    gain = [[_with(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
+    still = [combined(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
+    gain = [[combined(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
     return LinearValues(still, gain)
 
 
@@ -81,10 +81,6 @@ def solve_switched(given: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[
             rest = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))])
             x[k] = where(own[k], rest / pivots[k], 0.0)
     return columns
-
-
-def _with(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
-    return total([base, *(k * x for k, x in zip(factors, values, strict=True))])
 
 
 # -- velocities after events --------------------------------------------------------------------------------------
@@ -146,13 +142,10 @@ class AfterEvents:
     ) -> list[Expr]:
         """Velocities that fulfil equations, from v by multiples of columns; their rates are those at ``known``."""
         rates = [_rate(one, known, v) for one in acting]
-        inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
-                 for one in acting]  # fmt: skip
+        inner = [[dot(one.jacobian, column) for column in columns] for one in acting]
         A = switched_matrix(inner, [one.on for one in acting])
         (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
-        return [
-            total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]) for j, before in enumerate(v)
-        ]
+        return [combined(before, [c[j] for c in columns], impulses) for j, before in enumerate(v)]
 
     def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""

@@ -30,6 +30,11 @@ def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total([x * y for x, y in zip(a, b, strict=True)])
 
 
+def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
+    """A value with multiples of others."""
+    return total([base, *(k * x for k, x in zip(factors, values, strict=True))])
+
+
 def total(terms: Sequence[Expr]) -> Expr:
     """The sum of terms, of which there is one at least."""
     found = terms[0]

@@ -45,12 +45,7 @@ CARRIED = ("errors.py", "targets.py", "base", "numeric", "runtime", "simulation"
 
 
 def emit_device_text(program: Program) -> str:
-    """The text of ``<name>.cu``.
-
-    Parameters
-    ----------
-    program : Program
-        With the kernels :data:`~eomgen.targets.DEVICE_KERNELS`.
+    """The text of ``<name>.cu``, with the kernels :data:`~eomgen.targets.DEVICE_KERNELS`.
 
     Raises
     ------
