@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..base.algebra import about, from_quaternion
-from ..base.limits.numbers import FILES, IMPEDANCE, LARGEST, MEMORY, SECONDS, WAIT
+from ..base.limits.numbers import ELEMENTS, IMPEDANCE, LARGEST, MEMORY, SECONDS, SIZE, WAIT
 from ..describe.build_joints import limits_nothing
 from ..errors import MissingDependencyError, ModelError, Problem, at_odds
 from .mujoco_process import compile_model
@@ -209,16 +209,20 @@ def read_mjcf(root: XmlElement, options: RobotOptions) -> Robot:
         raise MissingDependencyError(f"{_MISSING} ({answer['missing']})")
     if "names" not in answer:
         raise ModelError([_refusal(answer, root, folder)])
-    robot = _MjcfReader(answer, SimpleNamespace(**arrays), root).read()
+    values = {key: value if value.ndim else value.item() for key, value in arrays.items()}
+    robot = _MjcfReader(answer, SimpleNamespace(**values), root).read()
     robot.notes += MJCF.notes(root)
     robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in answer["warnings"]]
     return robot
 
 
 def _join_files(root: XmlElement, folder: str) -> None:
-    """Put what a model includes and attaches into its tree, for lines and notes; MuJoCo refuses what is wrong of it."""
-    home = os.path.dirname(os.path.realpath(root.file))
-    waiting, known = [root], {os.path.realpath(root.file)}
+    """Put what a model includes and attaches into its tree, for lines and notes; MuJoCo refuses what is wrong of it.
+
+    All files together are bounded as one is, but for the last.
+    """
+    home, known, left = os.path.dirname(os.path.realpath(root.file)), {os.path.realpath(root.file)}, ELEMENTS
+    waiting = [root]
     while waiting:
         element = waiting.pop()
         children = []
@@ -226,10 +230,11 @@ def _join_files(root: XmlElement, folder: str) -> None:
             inner = None
             for base in (home, os.path.dirname(child.file)) if child.tag.lower() in ("include", "model") else ():
                 path = os.path.realpath(os.path.join(base, child.attributes.get("file", "").replace("\\", "/")))
-                inside = path.startswith(os.path.join(folder, "")) and path not in known and len(known) < FILES
-                if inner is None and inside and os.path.isfile(path):
+                inside = path.startswith(os.path.join(folder, "")) and path not in known
+                if inner is None and left > 0 and inside and os.path.isfile(path):
                     known.add(path)
                     inner = read_xml(path)
+                    left -= max(sum(1 for _ in inner.walk()), os.path.getsize(path) * ELEMENTS // SIZE)
             if inner is not None and child.tag == "model":
                 child.children, inner = [inner], None
             children += [child] if inner is None else inner.children

@@ -96,7 +96,6 @@ SIZE = 20_000_000  #: bytes of one XML file
 ELEMENTS = 100_000  #: of one file
 DEPTH = 200  #: nesting
 LONGEST = 200_000  #: characters of one attribute
-FILES = 200  #: XML files of a model that are looked at for lines
 
 # -- numbers ---------------------------------------------------------------------------------------------------------
 #: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
