@@ -15,7 +15,7 @@ import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.program import Limits
-from eomgen.compilation.build import compile_model
+from eomgen.compilation.build import compile_sources
 from eomgen.compilation.compiler import Options
 from eomgen.compilation.load import load_core
 from eomgen.module import Module
@@ -95,7 +95,7 @@ def measure(make: Callable[[int], eg.Model], n: int, branches: int) -> dict[str,
     found["text"], sources = sum(map(len, emit_c(program).values())), emit_c(straight)
     found["straight text"] = sum(map(len, sources.values()))
     if n <= STRAIGHT:
-        modules["straight"] = Module(load_core(compile_model(sources, equations.name, Options())))
+        modules["straight"] = Module(load_core(compile_sources("model", sources, equations.name, Options())))
     x = np.random.default_rng(1).uniform(-1.0, 1.0, 2 * n)
     calls = {name: caller(module, x) for name, module in modules.items()}
     ours = modules["loops"].rhs(0.0, x)[n:]

@@ -13,7 +13,7 @@ import numpy as np
 
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation.build import compile_c_library
+from eomgen.compilation.build import compile_sources
 from eomgen.compilation.compiler import Options, compile_flags, find_compiler
 
 from .latency import cold_cache
@@ -167,7 +167,7 @@ def compile_time(program: Any, repeats: int, lanes: int | None = 0) -> dict[str,
     for _ in range(repeats):
         with cold_cache() as environment, _variables(environment):
             before, start = getrusage(RUSAGE_CHILDREN), perf_counter()
-            compile_c_library(sources, program.name, Options(lanes=lanes))
+            compile_sources("library", sources, program.name, Options(lanes=lanes))
             wall.append(perf_counter() - start)
             after = getrusage(RUSAGE_CHILDREN)
             cpu.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)

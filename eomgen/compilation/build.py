@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Timer
 
 from ..base.files import read_entry
-from ..errors import ToolchainError, UsageError, bad_cache, incomplete, no_choice
+from ..errors import ToolchainError, UsageError, bad_cache, no_choice
 from ..layer import HEADERS, LAYER, SOLVER
 from .cache import Cache, CacheEntry, cache_directory, compute_key, digest_writers
 from .compiler import (
@@ -43,49 +43,33 @@ SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 QUIET = 1.0  #: seconds that lanes may be compiled without a line on stderr
 
 
-def compile_model(sources: Mapping[str, str], name: str, options: Options | None = None) -> CacheEntry:
-    """Compile a model for this session into a library that shows its table alone, or find it in the cache.
+def compile_sources(
+    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None = None
+) -> CacheEntry:
+    """Compile a model, or find it in the cache.
 
     Parameters
     ----------
+    kind : {'model', 'library'}
+        ``model``: for this session, a library that shows its table alone; without the option ``lanes``, lanes and
+        series are left to :func:`compile_lanes`. ``library``: for C programs or ctypes; every function that is not
+        static can be called, and C files that all models share are compiled once.
     sources : mapping of str to str
         Texts by file name: C files and headers, ``eomgen.h`` among them.
     name : str
         Name of the model.
-    options : Options, optional
-        How to compile. Without ``lanes``, lanes and series are left to :func:`compile_lanes`.
+    options : Options
+    progress : callable, optional
+        Takes a line for each step.
 
     Raises
     ------
     ToolchainError
         If there is no compiler, the compiler fails, or the cache cannot be used.
     """
-    if "eomgen.h" not in sources:
-        raise incomplete(f"the sources of {name!r} lack eomgen.h; there are {', '.join(sources)}")
-    return _find_or_compile("model", sources, name, options or Options(), None)
-
-
-def compile_c_library(
-    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
-) -> CacheEntry:
-    """Compile a model into a shared library for C programs or ctypes: every function that is not static can be called.
-
-    Parameters and errors are those of :func:`compile_model`; `progress` takes a line for each step. C files that all
-    models share are compiled once.
-    """
-    return _find_or_compile("library", sources, name, options or Options(), progress)
-
-
-def _find_or_compile(
-    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None
-) -> CacheEntry:
-    for file in sources:
+    for file in (name, *sources):
         if not re.fullmatch(r"\w[\w.-]*", file):
-            raise UsageError(f"the source name {file!r} is not a plain file name", code="EG-NAME-FORM")
-    if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
-        raise UsageError(f"the model name {name!r} is not a C identifier", code="EG-NAME-FORM")
-    if not any(file.endswith(".c") for file in sources):
-        raise incomplete(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
+            raise UsageError(f"{file!r} is not a plain name of a file or model", code="EG-NAME-FORM")
     if options.lanes in (4, 8) and not is_x86():
         raise no_choice(f"lanes must be None, 0 or 2 on {platform.machine()}, not {options.lanes}")
     width = lane_width() if options.lanes is None else options.lanes

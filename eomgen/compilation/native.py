@@ -6,13 +6,12 @@ needed, and built anew in its place where they differ.
 
 from __future__ import annotations
 
-import contextlib
 import importlib.machinery
 import os
 import sys
-from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
@@ -74,8 +73,10 @@ def build_native(folder: Path) -> None:
     import tempfile
 
     from .build import compile_and_link
-    from .compiler import Options, compile_flags, find_compiler, is_x86, link_flags, machine_flags
+    from .compiler import Options, allowed, compile_flags, find_compiler, is_x86, link_flags, machine_flags, run
 
+    if find_spec("Cython") is None:
+        raise MissingDependencyError("eomgen._native is built with Cython: pip install cython")
     headers, compiler, product = find_python_headers(), find_compiler(), product_in(folder)
     numpy: Any = import_module("numpy")
     # for all processors of this kind: wider vectors are chosen when it runs
@@ -83,16 +84,17 @@ def build_native(folder: Path) -> None:
     wide = [*compile_flags(Options(optimize=2), compiler, 0, portable=True), "-fvisibility=hidden"]
     short = [*wide, *(["-fno-tree-vectorize"] if compiler.kind == "gcc" else [])]  # rows of solvers, as in models
     wide += ["-ftree-vectorize"] if compiler.kind == "gcc" else []
-    cython = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
-    cython += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
-    cython += [f"-I{headers}", f"-I{numpy.get_include()}"]
+    bound = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
+    bound += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
+    bound += [f"-I{headers}", f"-I{numpy.get_include()}"]
     with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
         for name, text in read_native().items():
             Path(private, name).write_text(text, encoding="utf-8")
-        with contextlib.chdir(private):  # no folder's name in the C text
-            _run_cython(Path(f"{NAME}.pyx"))
+        # in the folder, so that its name is not in the C text
+        cython = [sys.executable, "-P", "-m", "cython", "-3", f"{NAME}.pyx"]
+        run(cython, Path(private), allowed(0), f"translating {NAME}.pyx")
         files = {Path(path.name): wide for path in sorted(Path(private).glob("*.c"))}
-        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(SOLVER): short, Path(f"{NAME}.c"): cython}
+        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(SOLVER): short, Path(f"{NAME}.c"): bound}
         link = link_flags(Options(), compiler, extension=True)
         made = compile_and_link(Path(private), NAME, files, link, compiler, suffix=product.name.removeprefix(NAME))
         folder.mkdir(parents=True, exist_ok=True)
@@ -100,22 +102,6 @@ def build_native(folder: Path) -> None:
         aside.write_bytes(Path(private, made).read_bytes())
         aside.chmod(0o755)
         os.replace(aside, product)
-
-
-def _run_cython(source: Path) -> None:
-    """Translate the module's text to C in this process; cythonize would want setuptools."""
-    import io
-
-    try:
-        from Cython.Compiler import Main
-    except ImportError:
-        raise MissingDependencyError("eomgen._native is built with Cython: pip install cython") from None
-    compile_file: Callable[..., Any] = Main.compile
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said):
-        result = compile_file(str(source), output_file=str(source.with_suffix(".c")), language_level=3)
-    if result.num_errors:
-        raise ToolchainError(f"Cython cannot translate {source}:\n{said.getvalue()}", "cython", said.getvalue())
 
 
 def find_python_headers() -> Path:

@@ -134,7 +134,7 @@ def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...]
         ) from error
     facts = json.loads(recipe)
     options = build.Options(**facts["options"])
-    return load.load_core(build.compile_model(facts["sources"], facts["name"], options))
+    return load.load_core(build.compile_sources("model", facts["sources"], facts["name"], options))
 
 
 def _core(core: Any, p: None, u: None) -> Any:

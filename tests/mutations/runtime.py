@@ -224,7 +224,7 @@ FAULTS = (
         "tests/runs/test_ensembles.py::test_a_grid_has_every_combination",
     ),
     Fault(
-        "cache-key-flags", "_find_or_compile",
+        "cache-key-flags", "compile_sources",
         "compute_key(parts)",
         'compute_key(parts | {"flags": ""})',
         "a model compiled with other flags is taken from the cache",

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ...alone import alone, timed
-from ...compilation.build import compile_model, note_of
+from ...compilation.build import compile_sources, note_of
 from ...compilation.cache import Cache, cache_directory
 from ...compilation.compiler import Options
 from ...compilation.load import load_core
@@ -38,7 +38,7 @@ def load(
     with timed(seconds, "compile"):
         if entry is None:
             try:
-                entry = compile_model(sources, program.name, chosen)
+                entry = compile_sources("model", sources, program.name, chosen)
             except ToolchainError as error:
                 raise _blame_source(error, functions.values()) or error from None
             cache.note(note, entry.key)

@@ -26,7 +26,7 @@ from ...base.files import as_path, refuse_link, write_whole
 from ...base.limits import runs
 from ...base.limits.in_c import definitions
 from ...base.texts import html_text, one_line
-from ...compilation.build import compile_c_library
+from ...compilation.build import compile_sources
 from ...compilation.compiler import Options
 from ...describe.units import read_unit
 from ...errors import ModelError, Problem, bad_file, no_choice
@@ -505,7 +505,7 @@ def fmu_bytes(
     if folder is not None:
         code = {Path(name).name: text for name, text in texts.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
-        library = compile_c_library(code, program.name, options, progress).product
+        library = compile_sources("library", code, program.name, options, progress).product
         files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
