@@ -245,6 +245,9 @@ static int correct_linear(const eom_at *at, int rows, double *restrict G, const 
                 e[i] += term;
                 total += fabs(term);
             }
+            if (!isfinite(total)) { /* or it would pass for rounding */
+                return EOMGEN_NON_FINITE;
+            }
             left = left || fabs(e[i]) > ROUNDING_SUMMED * total;
             longest = fmax(longest, fabs(e[i]));
             square += e[i] * e[i];

@@ -32,7 +32,7 @@ def slides(*equations: Any, **parameters: float) -> eg.Model:
 
 def test_rows_that_agree_to_ten_digits_are_met_halfway_and_no_others() -> None:
     """Lengths written with ten digits need not agree better; a larger gap is never passed over."""
-    mod = slides("x", "x - gap", gap=0.0).compile(target="numpy", kernels=["rhs", "project"])
+    mod = slides("x", "x - gap", gap=0.0).compile(target="numpy", kernels=["rhs", "project", "constraints"])
     start = np.array([0.3, 0.7, 0.0, 0.0, 0.0, 0.0])
     for gap in (1e-11, 1e-10):
         assert mod.bind(p={"gap": gap}).project(start)[0] == pytest.approx(gap / 2, abs=1e-15)
