@@ -23,7 +23,7 @@ from .c_text import Printed, print_block, print_precompute, used_helpers, with_p
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .loop_systems import LARGE
 from .pair_sums import contact_tables
-from .program import Block, Program
+from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import NoSeriesError
 from .single_precision import in_single_precision, refuse_double
 
@@ -216,6 +216,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
     numbers["closed_at"] = closed_at(program, areas)
     roots = [y for b in program.blocks for y in b.roots]
     straight = is_straight(program)
+    stepping = (BY_SYSTEM[0], BY_MOTIONS[0]) if straight else ()  # parts of close_directly
     return {
         "name": program.name,
         "prefix": program.name.upper(),
@@ -231,8 +232,9 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "helpers": used_helpers(program, roots),
         "declarations": [*declarations(program, used_calls(program)), *pair_declarations(program)],
         "arguments": _describe_arguments(program),
-        "equations": describe_equations(program, areas, _linked(program, apart)) if program.drivers else None,
+        "equations": describe_equations(program, areas, _linked(program, apart), stepping) if program.drivers else None,
         "straight": straight,
+        "regular": BY_MOTIONS[0] in program.block_names,
         "starts": {name: start for name, start, _ in areas},
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,

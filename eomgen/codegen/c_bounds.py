@@ -18,7 +18,7 @@ _FRAME = 32 * 8
 PAIRS = 5  #: of states beside a change point, as in eomgen/native/singular.c
 _PLACE = 8  #: bytes of a variable, also where numbers or pointers have 4
 _NUMBER = re.compile(r"\b([A-Z]\w*) = ([\w +*]+)")
-_STRUCT = re.compile(r"typedef struct \{\n(.*?)\} (\w+);", re.DOTALL)
+_STRUCT = re.compile(r"typedef struct (?:\w+ )?\{\n(.*?)\} (\w+);", re.DOTALL)
 _FUNCTION = re.compile(r"^[a-zA-Z][\w *]*?\b(\w+)\(([^;{}]*?)\)\s*\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
 _ARRAY = re.compile(r"\w+((?:\[[^\]]+\])+)")
 _CALL = re.compile(r"\b(\w+)\(")
@@ -26,9 +26,9 @@ _KERNEL = re.compile(r"^EOMGEN_(?:FUNCTION|SOLVED)\((\w+), (\w+), \d+\)$", re.MU
 _CALLED = (
     r"int \1(EOMGEN_ARGUMENTS)\n{\n    eom_at at;\n    int status = \2(at), checked = check_rows() + check_finite();\n}"
 )
-_EXPRESSION = re.compile(r"^ *(?:const real \w+|out\[.*\]) = (.*);$", re.MULTILINE)
+_EXPRESSION = re.compile(r"^ *(?:const real \w+|out\[.*\]) = (.*);(?: /\*.*)?$", re.MULTILINE)
 _OPERATOR = re.compile(r"[*/]| [+-] |(?<!\w)-(?=[\w(])")
-_EVALUATION = re.compile(r"\bEVALUATE\((\w+)")  #: of a straight-line function of the model, by the solvers
+_EVALUATION = re.compile(r"\b(?:EVALUATE|STEP)\((\w+)")  #: of a straight-line function of the model, by the solvers
 
 
 def operations_of(program: Program, name: str) -> str:

@@ -79,7 +79,6 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
         "first": with_pieces(printed[b] for b in first),
         "others": with_pieces(printed[b] for b in blocks if b not in first),
         "closed": loops_in_lanes(program),
-        "regular": BY_MOTIONS[0] in program.block_names,
     }
     call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}

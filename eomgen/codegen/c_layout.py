@@ -24,11 +24,14 @@ def crosses_singular(program: Program) -> bool:
 
 
 def describe_equations(
-    program: Program, areas: list[tuple[str, int, int]], linked: Collection[str] = ()
+    program: Program,
+    areas: list[tuple[str, int, int]],
+    linked: Collection[str] = (),
+    private: Collection[str] = (),
 ) -> dict[str, Any]:
     """The entries of ``eom_model`` in its order: numbers, tables, starts of areas, functions; each with a comment.
 
-    ``linked`` are the functions that lie in another file.
+    ``linked`` are the functions that lie in another file, ``private`` those that the model's own code calls alone.
     """
     header = read_header(SOLVER_HEADERS[0])
     starts = {name: start for name, start, _ in areas}
@@ -69,7 +72,7 @@ def describe_equations(
             f"{program.name}_{name}_block"
             if name in linked
             else f"{name}_block"
-            if name in used and name in program.block_names
+            if name in used.difference(private) and name in program.block_names
             else "NULL"
             for name in re.findall(r"eomgen_function (\w+);", header)
         ],

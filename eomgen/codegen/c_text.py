@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
+from ..base.texts import comment_text
 from ..graph.core import Expr
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
@@ -54,6 +55,7 @@ class BlockPrinter:
         self._uses: Counter[int] = Counter()  #: by statements of this piece; two by one that takes names alone
         self._waiting: dict[int, tuple[str, int]] = {}  #: expressions without a name, in order, and how they bind
         self.named: frozenset[int] = frozenset()  #: statements that have a name in any case
+        self.labels: Mapping[object, str] = {}  #: what results are, by place
 
     def _name(self, i: int) -> str:
         if i not in self._variables:
@@ -174,18 +176,23 @@ class BlockPrinter:
             if self._uses[i] == 1 and self.lists.call(i) is None:
                 self._waiting[i] = (text, BINDING.get(self._nodes[i][0], CALL))
                 return
-            places = "".join(f"out[{k}] = " for k in piece.results.get(i, ()))
+            places = piece.results.get(i, ())
             if places and self._uses[i] == 2:  # by the result alone
-                result.append(f"{places}{text};")
+                result.append(self.result(places, text))
                 return
             result.append(f"const real {self._name(i)} = {text};")
             if places:
-                result.append(f"{places}{self._name(i)};")
+                result.append(self.result(places, self._name(i)))
         if i in piece.checks:
             self._name_waiting(result)
             result.append(f"EOMGEN_REJECT({self.failed(i, piece)})")
         if i in piece.stores:
             result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
+
+    def result(self, places: Sequence[object], value: str) -> str:
+        """The statement that sets a result, with what it is."""
+        labels = ", ".join(self.labels[k] for k in places if k in self.labels)
+        return "".join(f"out[{k}] = " for k in places) + f"{value};" + (f" /* {labels} */" if labels else "")
 
     def _load(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read values of earlier pieces just before their first use."""
@@ -240,7 +247,26 @@ def print_block(
         graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find, block.guards
     )
     texts = references(program, block.inputs)
-    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block), printing)
+    again, labels = places_again(program, block), _label_results(program, block.name)
+    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, again, printing, labels)
+
+
+def _label_results(program: Program, block: str) -> dict[object, str]:
+    """What results of a block are, by their places: names of velocities, constraints, outputs and bodies."""
+    facts, v, rows = program.metadata, program.velocities, program.metadata.get("constraint_labels", ())
+    rates = [f"rate of {name}" for name in (*program.coordinates, *v)]
+    known: dict[str, Sequence[str]] = {
+        **dict.fromkeys(("bias", "inverse_dynamics"), v),
+        **dict.fromkeys(("constraints", "velocity_constraints"), rows),
+        **dict.fromkeys(("dynamics", "regular_dynamics"), (*v, *rates[len(program.coordinates) :])),
+        **dict.fromkeys(("outputs", "motion_outputs", "accelerated_outputs"), facts.get("y_names", ())),
+        "position": rows[: program.sizes.n_h],
+        "energy": ("kinetic", "potential"),
+        "rhs": rates,
+    }
+    if block == "poses":
+        return {16 * k: comment_text(name) for k, name in enumerate(facts.get("body_names", ()))}
+    return {k: comment_text(name) for k, name in enumerate(known.get(block, ()))}
 
 
 def print_pieces(
@@ -251,12 +277,14 @@ def print_pieces(
     runs: Sequence[CopiedRun] = (),
     again: Mapping[str, str] = NOWHERE,
     printing: type[BlockPrinter] = BlockPrinter,
+    labels: Mapping[object, str] = MappingProxyType({}),
 ) -> Printed:
     """Print cut statements as one function, or as several and one that calls them.
 
-    ``runs`` are copied at the end; ``again`` is that of :class:`~.pair_sums.PairLists`.
+    ``runs`` are copied at the end; ``again`` is that of :class:`~.pair_sums.PairLists`; ``labels`` name results.
     """
     printer = printing(program, texts, pieces)
+    printer.labels = labels
     printer.lists.again = again
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     functions: list[tuple[str, str]] = []
@@ -280,7 +308,7 @@ def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
     if len(zeros) >= FILLED:
         lines.append(f"memset(out + {zeros[0]}, 0, {zeros[-1] - zeros[0] + 1} * sizeof *out);")
         direct = tuple((k, i) for k, i in direct if i != zero)
-    return lines + [f"out[{k}] = {printer.real(i)};" for k, i in direct]
+    return lines + [printer.result([k], printer.real(i)) for k, i in direct]
 
 
 def print_precompute(program: Program) -> Printed:

@@ -160,9 +160,12 @@ static inline both both_turned(both a) { return both_of(a.first, -a.second); }
 typedef double pack __attribute__((vector_size(8 * EOMGEN_PACK)));
 typedef uint64_t bits __attribute__((vector_size(8 * EOMGEN_PACK)));
 
+/* A part of its caller however long that is: compilers tire of it in long functions. */
+#define EOMGEN_INSIDE __attribute__((always_inline)) static inline
+
 #ifdef EOMGEN_CONTRACTED
 /* Where a*b + c is rounded once: three parts of all bits, the first subtraction is exact. NaN needs no help of libm. */
-static inline bits sincos_pack(pack a, pack *restrict sine, pack *restrict cosine)
+EOMGEN_INSIDE bits sincos_pack(pack a, pack *restrict sine, pack *restrict cosine)
 {
     const pack turns = a * 0.6366197723675814 + 0x1.8p52, n = turns - 0x1.8p52;
     const bits quarter = (bits)turns;
@@ -179,7 +182,7 @@ static inline bits sincos_pack(pack a, pack *restrict sine, pack *restrict cosin
     return (bits)(size > EOMGEN_NEAR);
 }
 #else
-static inline bits sincos_pack(pack x, pack *restrict sine, pack *restrict cosine)
+EOMGEN_INSIDE bits sincos_pack(pack x, pack *restrict sine, pack *restrict cosine)
 {
     const bits sign = (bits)x & 0x8000000000000000u;
     const pack a = (pack)((bits)x ^ sign);
@@ -262,7 +265,7 @@ static inline bits sincos_one(real a, real *restrict sines, real *restrict cosin
 #elif !defined(EOMGEN_PLAIN)
 #define sincos_one sincos_pack
 #else
-static inline bits sincos_wide(pack a, int n, double *restrict sines, double *restrict cosines)
+EOMGEN_INSIDE bits sincos_wide(pack a, int n, double *restrict sines, double *restrict cosines)
 {
     pack s, c;
     const bits far = sincos_pack(a, &s, &c);

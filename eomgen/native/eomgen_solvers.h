@@ -96,6 +96,8 @@ typedef struct {
         int *load);
 } eom_contacts;
 
+struct eom_at;
+
 typedef struct {
     int n_v, n_q, n_c, n_h;         /* velocities, coordinates, rows of constraints, the holonomic ones, which are first */
     int rank, n_dof;                /* of the rows; degrees of freedom */
@@ -119,6 +121,8 @@ typedef struct {
     const short (*relax)[2];        /* and those that are relaxed */
     const eom_contacts *contacts;
     int areas[AREAS];
+    /* close_directly (eomgen_straight.h) with fixed sizes and `closing`, `regular_closing` as parts of it, or NULL. */
+    int (*close)(const struct eom_at *at, double *q, double *w, int *regular);
     /* Straight-line functions; NULL where the model has none. */
     eomgen_function scales;
     eomgen_function position;       /* q -> C, C_q */
@@ -158,7 +162,7 @@ typedef struct {
 } eom_model;
 
 /* Where a function is evaluated: time, inputs, constants made by precompute; w: n_work doubles of work. */
-typedef struct {
+typedef struct eom_at {
     const eom_model *m;
     double t;
     const double *u, *c;

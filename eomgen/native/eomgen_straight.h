@@ -7,8 +7,19 @@
 #include "eomgen_solvers.h"
 
 #ifdef EOMGEN_PLAIN
-#ifndef MODEL
+#ifdef MODEL
+#define NAMED_STEPS /* so that they become parts of their caller */
+#define STEP(function, q, out) function##_block(at->t, q, at->u, at->c, out, at->w)
+#ifdef REGULAR
+#define SHORTER 1
+#else
+#define SHORTER 0
+#define regular_closing_block closing_block
+#endif
+#else
 #define MODEL (at->m)
+#define STEP EVALUATE
+#define SHORTER (MODEL->regular_closing != NULL)
 #endif
 #define N (MODEL->n_v)
 #define NQ (MODEL->n_q)
@@ -151,9 +162,9 @@ static inline double damping(const double *restrict step, int length)
 
 /* The part of a long step that close_position takes, so that far states come to the same place; 0 where only rounding
    is left of the constraints, whose weak rows need a term that is not known here. */
-static double step_fraction(const eom_at *at, const double *restrict q)
+static double step_fraction(const eom_at *at, const double *restrict q, const double *restrict closing)
 {
-    const double *const closing = AT(CLOSING), *const s = AT(SCALES);
+    const double *const s = AT(SCALES);
     double *const dz = AT(STEP);
     if (!(closing[0] > CONSTRAINTS_GENTLE) || !isfinite(closing[2])) {
         return 0.0;
@@ -167,25 +178,23 @@ static double step_fraction(const eom_at *at, const double *restrict q)
 
 /* A Newton step onto the constraints to the area of `closing`. Returns whether the shorter form holds: near the
    constraints, away from singular positions. */
-static int step_directly(const eom_at *at, const double *restrict q)
+static int step_directly(const eom_at *at, const double *restrict q, double *restrict closing)
 {
-    double *const closing = AT(CLOSING);
-    const int shorter = MODEL->regular_closing != NULL;
-    if (shorter) {
-        if (EVALUATE(regular_closing, q, closing) == 0) {
+    if (SHORTER) {
+        if (STEP(regular_closing, q, closing) == 0) {
             if (closing[2] <= CONSTRAINTS_NEARBY) {
                 return 1;
             }
-            (void)EVALUATE(closing, q, closing);
+            (void)STEP(closing, q, closing);
             return 0;
         }
-    } else if (EVALUATE(closing, q, closing) == 0) {
+    } else if (STEP(closing, q, closing) == 0) {
         return 0;
     }
     for (int k = 0; k < 3 + N; k++) {
         closing[k] = 0.0; /* only rounding is left of the constraints */
     }
-    return shorter;
+    return SHORTER;
 }
 
 /* Velocities and accelerations at the closed position y to the area of `dynamics`. regular: whether the shorter form
@@ -201,16 +210,21 @@ static int accelerate_directly(const eom_at *at, const double *restrict y, int r
 }
 
 /* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. *regular: whether the shorter form held
-   last. */
-static int close_directly(const eom_at *at, double *restrict q, int *restrict regular)
+   last. w: that of `at`, an argument so that both forms share their sines: compilers see that it holds no q. */
+static int close_directly(const eom_at *at, double *restrict q, double *restrict w, int *restrict regular)
 {
-    double *const closing = AT(CLOSING);
+    double *const closing = w + MODEL->areas[AREA_CLOSING];
+#ifndef NAMED_STEPS
+    if (MODEL->close != NULL) {
+        return MODEL->close(at, q, w, regular);
+    }
+#endif
     *regular = 0;
     for (int step = 0, all = 0; step < 6 && all < 25; all++) {
-        *regular = step_directly(at, q);
+        *regular = step_directly(at, q, closing);
         const double left = closing[1], length = closing[2];
         if (!(length <= 0.25)) { /* or not a number */
-            const double part = step_fraction(at, q);
+            const double part = step_fraction(at, q, closing);
             if (part == 0.0) {
                 break;
             }
@@ -241,7 +255,7 @@ static int rhs_directly(const eom_at *at, const double *restrict x, double *rest
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
-    if (close_directly(at, y, &regular) != 0 || accelerate_directly(at, y, regular) != 0 || dynamics[2 * N] == 0.0) {
+    if (close_directly(at, y, at->w, &regular) != 0 || accelerate_directly(at, y, regular) != 0 || dynamics[2 * N] == 0.0) {
         return 0;
     }
     form_rates(at, y, dynamics, out);

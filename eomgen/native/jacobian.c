@@ -321,7 +321,7 @@ static int jacobian_here(const eom_at *at, const double *restrict x, double *res
         return jacobian_by_partition(at, x, out, weakest);
     }
     copy(NX, x, y);
-    if (close_directly(at, y, &regular) != 0 || EVALUATE(loop_slopes, y, AT(SLOPES)) != 0 || slopes[N] == 0.0) {
+    if (close_directly(at, y, at->w, &regular) != 0 || EVALUATE(loop_slopes, y, AT(SLOPES)) != 0 || slopes[N] == 0.0) {
         return jacobian_by_partition(at, x, out, weakest);
     }
     for (double *near = AT(MET); near < AT(SHAPES); near++) { /* pairs of shapes near at another state */

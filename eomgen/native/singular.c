@@ -55,7 +55,7 @@ static int rhs_here(const eom_at *at, const double *restrict x, double *restrict
 static int bring(const eom_at *at, double *restrict q)
 {
     int regular;
-    if (MODEL->dynamics != NULL && MODEL->system == NULL && close_directly(at, q, &regular) == 0) {
+    if (MODEL->dynamics != NULL && MODEL->system == NULL && close_directly(at, q, at->w, &regular) == 0) {
         return 0;
     }
     return close_position(at, q);
