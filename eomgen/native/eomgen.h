@@ -106,8 +106,10 @@ const eomgen_model *eomgen_model_table(void);
 #endif
 
 /* ROWS: a function whose inner loops go along rows of numbers, several at a time where the processor can; no sum is taken
-   in another order, and nothing is contracted, so that the bits stay the same. Without lanes it is compiled for one processor. */
-#if EOMGEN_LANES && defined(__gnu_linux__) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(EOMGEN_PORTABLE)
+   in another order, and nothing is contracted, so that the bits stay the same. Without lanes it is compiled for one processor, but in a
+   session, whose lanes lie in a library of their own. */
+#if (EOMGEN_LANES || defined(EOMGEN_OPENED)) && defined(__gnu_linux__) && defined(__x86_64__) && defined(__GNUC__) \
+    && !defined(__clang__) && !defined(EOMGEN_PORTABLE)
 #define EOMGEN_ROWS __attribute__((optimize("O3"), target_clones("avx2", "default")))
 #else
 #define EOMGEN_ROWS
