@@ -12,8 +12,8 @@ from eomgen import pipeline
 from eomgen.codegen.program import BY_SYSTEM
 from eomgen.equations import METHODS
 from eomgen.equations.reduction import reduce_to_independent
-from eomgen.graph.count import count
-from eomgen.graph.substitute import substitute
+from eomgen.graph.core import substitute
+from eomgen.graph.schedule import count
 from eomgen.kinematics import analyse
 
 from .large_loops import closed_chain, four_bars

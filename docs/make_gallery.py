@@ -17,7 +17,7 @@ from PIL import Image
 
 import eomgen as eg
 from eomgen.base.files import example_files, find_example
-from eomgen.runtime.refined import states_at
+from eomgen.runtime.plotting import states_at
 from eomgen.show.frames import Frames, moving_scene, sample
 from eomgen.show.writers import gif_bytes, indices_in, palette_of
 

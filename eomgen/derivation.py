@@ -18,15 +18,14 @@ from .describe.sympy_face import names_of
 from .describe.visit import Undotted
 from .equations import GIVEN, METHODS, TreeEquations, take_given
 from .errors import AssemblyError, cannot, ill_typed, off_range
-from .graph.copies import copied
-from .graph.core import Expr
-from .graph.count import Operations, count
+from .graph.core import Expr, copied
+from .graph.schedule import Operations, count
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.report import MechanismReport, report
 from .reading import Displayed
 from .records import dataclass
-from .runtime.near_names import unknown
+from .runtime.argument_checks import unknown
 
 if TYPE_CHECKING:
     from .codegen.choice import Choice

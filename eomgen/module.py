@@ -13,9 +13,9 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from .errors import UnavailableError, ill_typed
+from .runtime.argument_checks import find_lacking
 from .runtime.argument_names import both_names, plain_names
 from .runtime.bound_model import BoundModel
-from .runtime.near_names import find_lacking
 
 if TYPE_CHECKING:
     from .analysis.consistent import consistent as _consistent
@@ -39,9 +39,10 @@ if TYPE_CHECKING:
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
     from .runtime.drawing import explore as _explore
+    from .runtime.drawing import report as _report
     from .runtime.minimal import Minimal
     from .runtime.protocols import JacobianCall
-    from .runtime.summary import report as _report
+    from .simulation.compiled import step as _step
     from .simulation.dae_solution import Dae
     from .simulation.impact import impact as _impact
     from .simulation.impact_run import simulate_impacts as _simulate_impacts
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
     from .simulation.kinematic import kinematic_analysis as _kinematic_analysis
     from .simulation.sensitivities import sensitivities as _sensitivities
     from .simulation.simulate import simulate as _simulate
-    from .simulation.steppers import step as _step
     from .verification.verify import verify as _verify
 
 
@@ -58,7 +58,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "simulate": "simulation.simulate",
     "simulate_many": "ensembles.simulate_many",
     "integrator": "simulation.integrator",
-    "step": "simulation.steppers",
+    "step": "simulation.compiled",
     "verify": "verification.verify",
     "linearize": "analysis.linear",
     "modes": "analysis.modes",
@@ -80,7 +80,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "kinematic_analysis": "simulation.kinematic",
     "motion_range": "analysis.coordinate_range",
     "inverse_dynamics_derivatives": "runtime.derivative_calls",
-    "report": "runtime.summary",
+    "report": "runtime.drawing",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
     "explore": "runtime.drawing",
@@ -268,7 +268,7 @@ class Module(BoundModel):
 
         def __getattr__(self, name: str) -> Any:
             if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-                from .simulation.steppers import find_solver
+                from .simulation.compiled import find_solver
 
                 return find_solver(self, name)
             if name in CALLS:  # an analysis of a user's own
@@ -282,12 +282,12 @@ class Module(BoundModel):
         return sorted({*super().__dir__(), *CALLS, *FORMS})
 
     def __repr__(self) -> str:
-        from .runtime.summary import line
+        from .runtime.drawing import line
 
         return line(self)
 
     def _repr_html_(self) -> str:
-        from .runtime.notebook import module_html
+        from .runtime.drawing import module_html
 
         return module_html(self)
 

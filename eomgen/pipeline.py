@@ -26,7 +26,7 @@ from . import __version__
 from .alone import alone, timed
 from .derivation import Derivation, Derived, derive_mechanism
 from .errors import EomgenError, cannot
-from .runtime.near_names import read_names
+from .runtime.argument_checks import read_names
 from .targets import TARGETS, find_function, find_target
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
 SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
-    "numeric/closure.py": {1e-8},
+    "numeric/assembly.py": {1e-8},
     "codegen/loop_systems.py": {1e-100},
     "importers/robot.py": {1e-11},
     "rotations/quaternions.py": {1e-4},
@@ -42,7 +42,7 @@ BEYOND = {
     "module": {"analysis", "identification", "verification"},
     "runtime.drawing": {"show"},
     "runtime.inputs": {"describe"},
-    "runtime.room": {"describe"},
+    "runtime.argument_checks": {"describe"},
     "runtime.trajectory": {"show"},
 }
 

@@ -1,4 +1,4 @@
-"""Analysis: any state -> the nearest one on the constraints, near in a metric of one's own, with values held.
+"""Any state -> the nearest one on the constraints, near in a metric of one's own, with values held.
 
 Least change of positions, d^T W d with C = 0, by steps along the constraints and back onto them; then of velocities, in
 one linear step (Blajer, Elimination of constraint violation and accuracy aspects in numerical simulation of multibody
@@ -22,9 +22,8 @@ from ..base.names import hint, joined
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
 from ..numeric.projection import largest, least
+from ..runtime.argument_checks import read_names, read_number, read_numbers
 from ..runtime.layout import Layout
-from ..runtime.near_names import read_names
-from ..runtime.room import read_number, read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

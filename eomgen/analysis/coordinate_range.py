@@ -1,4 +1,4 @@
-"""Analysis: a Module and a coordinate -> the range in which it can move the mechanism from a position."""
+"""A Module and a coordinate -> the range in which it can move the mechanism from a position."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 
 from ..base.texts import shown
 from ..errors import ill_typed, off_range
-from ..runtime.given_start import Start
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_states, require_velocities
-from ..runtime.room import read_number, read_numbers
+from ..runtime.trajectory import Start
 from ..simulation.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 from ..simulation.kinematic import complete, describe_gap, start_from
 

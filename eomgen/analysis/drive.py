@@ -1,4 +1,4 @@
-"""Analysis: a motion -> the forces of drives that make it, with loops closed: constrained inverse dynamics.
+"""A motion -> the forces of drives that make it, with loops closed: constrained inverse dynamics.
 
 With C_q a + gamma = 0 and B spanning the velocities that the constraints allow, B^T (M a + h) = B^T S tau, where a unit
 of tau_i does work on coordinate i alone (Shabana, Computational Dynamics, sec. 5.7; Y. Nakamura, M. Ghodoussi, Dynamics
@@ -23,12 +23,11 @@ from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
 from ..base.texts import as_text
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
-from ..numeric.partitions import partition
+from ..numeric.ranks import partition
+from ..runtime.argument_checks import read_names, read_numbers
 from ..runtime.constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from ..runtime.layout import Layout
-from ..runtime.near_names import read_names
 from ..runtime.refusals import refuse_reaction_laws, refuse_states
-from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,24 +1,301 @@
-"""Analysis: the result of a linearization, its eigenvalues and its second-order form."""
+"""The result of a linearization, its eigenvalues, their rounding and stability, its second-order form."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
-from ..base.algebra import Array
+from ..base.algebra import Array, Indices
 from ..base.limits.analyses import COUPLED, STILL
+from ..base.limits.numbers import EPS, TINY
 from ..base.texts import as_html, as_text, number
 from ..errors import cannot
-from ..runtime.near_names import require, unknown
-from .eigenvalue_rounding import BALANCED
-from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
+from ..runtime.argument_checks import require, unknown
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from .tangent import TangentSpace
+    from .balance import TangentSpace
+
+# -- rounding of eigenvalues -------------------------------------------------------------------------------------------
+
+# The matrix is balanced first (B. N. Parlett, C. Reinsch, Balancing a matrix for calculation of eigenvalues and
+# eigenvectors, Numer. Math. 13 (1969), 293-304), so that stiff parts do not drown slow ones; an eigenvalue is then
+# uncertain as far as its component of the pseudospectrum of rounding reaches (L. N. Trefethen, M. Embree, Spectra and
+# Pseudospectra, 2005, section 2).
+
+
+ROUNDING = 10.0 * EPS  #: relative error of the entries of a matrix that is exact but for rounding
+BALANCED = 100.0 * EPS  #: what rounding leaves of a balance, relative to what a unit displacement does to it
+ROUNDS = 30  #: of balancing, at most
+GAP = 10.0  #: between eigenvalues that are judged together and those apart
+NODES = 32  #: of the contour around them
+WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
+SWEEPS = 12  #: of Jacobi's method, at most
+
+
+def stability_of_matrix(
+    A: Array, own: Array | None = None, error: float = ROUNDING, errors: Array | None = None
+) -> str:
+    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
+
+    Without states it is 'no freedom': what drivers and constraints hold entirely is neither.
+
+    Parameters
+    ----------
+    A : (n, n) array
+        Of s' = A s (1/s).
+    own : (n_dof,) array, optional
+        Accelerations of the model's own forces in units of the last n_dof states' displacements (1/s^2): slopes of
+        forces far below them are rounding.
+    error : float
+        Relative error of A.
+    errors : (n, n) array, optional
+        Bounds for the errors of its entries, which can split a double zero by their root.
+    """
+    if not A.size:
+        return "no freedom"
+    scale = _balance(A, own)
+    balanced = A * scale / scale[:, None]
+    values = algebra.eigvals(balanced)
+    far = error * float(algebra.norm2(balanced))
+    zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
+    if errors is not None:
+        scale = _balance(np.maximum(np.abs(A), errors), own)  # so that what is but an error is not blown up
+        balanced, scaled = A * scale / scale[:, None], errors * scale / scale[:, None]
+        for k in np.flatnonzero(~zero & (values.real > 0.0)):
+            zero[k] = _reaches_axis_in_cluster(balanced, scaled, np.abs(values), complex(values[k]))
+    if (values.real[~zero] > 0.0).any():
+        return "unstable"
+    return "marginal" if zero.any() else "asymptotically stable"
+
+
+def _reaches_axis(A: Array, value: complex, far: float) -> bool:
+    """Whether a change of A by a norm of `far` can move an eigenvalue to the imaginary axis, straight on."""
+    identity = np.eye(len(A))
+    return all(algebra.singular_values(A - (1j * value.imag + part * value.real) * identity)[-1] <= far for part in WAY)
+
+
+def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: complex) -> bool:
+    """The same within the invariant subspace of an eigenvalue and all smaller ones, with the errors that it sees.
+
+    The subspace is that of the spectral projector, a contour integral of the resolvent (T. Kato, Perturbation Theory
+    for Linear Operators, 1980, section I.5.3), which no defective eigenvalue spoils.
+    """
+    sizes = np.sort(sizes)
+    wider = sizes[sizes > GAP * abs(value)]
+    if not wider.size:
+        return False
+    inner = sizes[sizes <= GAP * abs(value)]
+    radius = float(np.sqrt(inner[-1] * wider[0]))
+    nodes = radius * np.exp(2j * np.pi * (np.arange(NODES) + 0.5) / NODES)
+    identity = np.eye(len(A))
+    try:
+        projector = np.mean([z * np.linalg.inv(z * identity - A) for z in nodes], axis=0).real
+    except np.linalg.LinAlgError:
+        return False
+    basis = algebra.svd(projector)[0][:, : len(inner)]
+    left = basis.T @ projector
+    far = float(algebra.norm2(np.abs(left) @ errors @ np.abs(basis)))
+    return _reaches_axis(left @ A @ basis, value, far)
+
+
+def _balance(A: Array, own: Array | None) -> Array:
+    """Units of the states that make rows and columns alike; forces of the model keep rows from being blown up."""
+    sizes = np.abs(A)
+    if own is not None and len(own) and len(A) >= 2 * len(own):
+        n = len(own)
+        rows = np.arange(len(A) - n, len(A))
+        sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], own)
+        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], TINY)
+    np.fill_diagonal(sizes, 0.0)
+    d = np.ones(len(A))
+    for _ in range(ROUNDS):
+        worst = 1.0
+        for i in range(len(A)):
+            row, column = float(np.linalg.norm(sizes[i])), float(np.linalg.norm(sizes[:, i]))
+            if row > 0.0 and column > 0.0:
+                f = 2.0 ** round(0.5 * np.log2(row / column))
+                sizes[i] /= f
+                sizes[:, i] *= f
+                d[i] *= f
+                worst = max(worst, f, 1.0 / f)
+        if worst <= 2.0:
+            break
+    return d
+
+
+def own_accelerations(module: BoundModel, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
+    """Accelerations that the forces of the model would make if they did not balance, scaled (1/s^2), (n_dof,).
+
+    Parameters
+    ----------
+    module : BoundModel
+    t : float
+    x : (n_x,) array
+    B : (n_v, n_dof) array
+        Virtual displacements.
+    velocities : (n_dof,) indices
+    mass : (n_dof, n_dof) array
+        Embedded.
+    """
+    if not len(mass):
+        return np.zeros(0)
+    forces = np.abs(B).T @ np.abs(module.kernels.bias(t, x))
+    try:
+        return np.asarray(np.abs(np.linalg.inv(mass)) @ forces / module.layout.scales.q[velocities])
+    except np.linalg.LinAlgError:
+        return np.ones(len(mass))
+
+
+def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
+    """Squares of frequencies and shapes of symmetric M and K, slow modes as accurate as K has them.
+
+    By Jacobi's method on the nearly diagonal K of modes, which keeps small eigenvalues next to large ones (J. Demmel,
+    K. Veselic, Jacobi's method is more accurate than QR, SIAM J. Matrix Anal. Appl. 13 (1992), 1204-1245).
+    """
+    S = shapes / np.sqrt(np.einsum("ik,ij,jk->k", shapes, M, shapes))
+    T = S.T @ K @ S
+    T = 0.5 * (T + T.T)
+    for _ in range(SWEEPS):
+        turned = False
+        for i in range(len(T)):
+            for j in range(i):
+                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + TINY:
+                    continue
+                angle = 0.5 * np.arctan2(2.0 * T[i, j], T[i, i] - T[j, j])
+                if T[i, i] < T[j, j]:  # the smaller of both turns
+                    angle = 0.5 * np.arctan(2.0 * T[i, j] / (T[i, i] - T[j, j]))
+                c, s = np.cos(angle), np.sin(angle)
+                turn = np.array([[c, -s], [s, c]])
+                T[:, [i, j]] = T[:, [i, j]] @ turn
+                T[[i, j]] = turn.T @ T[[i, j]]
+                S[:, [i, j]] = S[:, [i, j]] @ turn
+                T[i, j] = T[j, i] = 0.0
+                turned = turned or abs(s) > EPS
+        if not turned:
+            break
+    order = np.argsort(T.diagonal())
+    return np.asarray(T.diagonal()[order]), np.asarray(S[:, order])
+
+
+# -- stability ---------------------------------------------------------------------------------------------------------
+
+# Of a rigid body that may turn freely, and of every other neutral motion, 0 is a double eigenvalue with one
+# eigenvector: an error e of the matrix splits it by sqrt(e), so that its sign says nothing. Where C has no negative
+# part and K is symmetric, the sign of K decides instead (Kelvin, Tait, Chetaev: D. R. Merkin, Introduction to the
+# Theory of Stability, 1997, chapter 6): no eigenvalue is on the right where K is positive semidefinite, and as many as
+# K has negative ones where nothing is gyroscopic. An eigenvalue of K is wrong by e at most, not by its root.
+
+
+MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
+
+
+class SecondOrder(NamedTuple):
+    """Equations of second order and bounds for the errors of their entries."""
+
+    M: Array  #: (n, n)
+    C: Array  #: (n, n)
+    K: Array  #: (n, n) by the displacements that the velocities make
+    C_error: Array  #: (n, n)
+    K_error: Array  #: (n, n)
+
+
+def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: float = MARGIN) -> Array:
+    """Bounds (n, n_z) for the errors that rounding leaves in K.
+
+    Of the sums that make an acceleration, of the forces behind them, and of what cancels within one stiff force whose
+    other directions do not show it.
+
+    Parameters
+    ----------
+    M : (n, n) array
+    slopes : (n, n_z) array
+        Of accelerations by displacements; -M^-1 K.
+    own : (n,) array
+        Accelerations of the model's own forces, each without the others, per unit displacement.
+    sizes : (n_z,) array
+        Unit displacements.
+    error : float
+        Relative error of forces.
+    """
+    local = np.abs(M) @ np.abs(slopes)
+    if len(own):
+        local[:, : len(own)] += np.diag(M.diagonal() * own)
+    n = len(M)
+    stiffest = float((sizes[:n] * np.abs(M @ slopes)[:, :n].diagonal() * sizes[:n]).max(initial=0.0))
+    rows = np.ones(n)  # of first-order states, which are no displacements
+    rows[: len(sizes)] = sizes[:n]
+    shared = 2.0 * EPS * max(1.0, error / MARGIN) * stiffest / np.outer(rows, sizes)
+    return np.asarray(error * local + shared)
+
+
+def symmetric_modes(M: Array, K: Array) -> tuple[Array, Array]:
+    """Squares of frequencies, ascending, and shapes (columns, s^T M s = 1) of symmetric M and K."""
+    factor = algebra.cholesky(M)
+    inverse = algebra.inv(factor)
+    reduced = inverse @ K @ inverse.T
+    return graded_modes(M, K, inverse.T @ algebra.eigh(0.5 * (reduced + reduced.T))[1])
+
+
+def uncertainty(squares: Array, shapes: Array, K_error: Array) -> Array:
+    """What errors of K can do to each square: to first order, and by rounding of the shapes."""
+    sizes = np.abs(shapes) + EPS * np.abs(shapes).sum(axis=1, keepdims=True)
+    bound = np.einsum("ik,ij,jk->k", sizes, K_error, sizes)
+    return np.asarray(np.maximum(bound, ROUNDING * EPS * np.abs(squares).max(initial=0.0)))
+
+
+def verdict(
+    second: SecondOrder | None,
+    A: Array,
+    own: Array | None = None,
+    error: float = ROUNDING,
+    errors: Array | None = None,
+) -> str:
+    """The stability of s' = A s.
+
+    Parameters
+    ----------
+    second : SecondOrder or None
+        The same equations of second order, where they have that form: displacements z, then velocities z'.
+    A : (n, n) array
+    own, error, errors
+        As for :func:`~.linearization.stability_of_matrix`, which decides where the signs of K and C do not.
+    """
+    if second is None or not A.size or not _is_dissipative(second):
+        return stability_of_matrix(A, own, error, errors)
+    squares, shapes = symmetric_modes(second.M, 0.5 * (second.K + second.K.T))
+    bound = uncertainty(squares, shapes, second.K_error)
+    if (squares < -bound).any():
+        gyroscopic = np.abs(second.C - second.C.T) > second.C_error + second.C_error.T
+        return stability_of_matrix(A, own, error, errors) if gyroscopic.any() else "unstable"
+    if (squares <= bound).any():
+        return "marginal"
+    found = stability_of_matrix(A, own, error, errors)
+    return found if found == "asymptotically stable" else "stable (undamped)"  # a least potential
+
+
+def _is_dissipative(second: SecondOrder) -> bool:
+    """Whether K is symmetric and C takes no energy from anywhere, up to their errors."""
+    K, C, M = second.K, second.C, second.M
+    if (np.abs(K - K.T) > second.K_error + second.K_error.T).any():
+        return False
+    if not np.isfinite(C).all():
+        return False
+    try:
+        inverse = np.linalg.inv(np.linalg.cholesky(M))
+    except np.linalg.LinAlgError:
+        return False
+    rates, shapes = algebra.eigh(inverse @ (0.5 * (C + C.T)) @ inverse.T)
+    sizes = np.abs(inverse.T @ shapes)
+    bound = np.einsum("ik,ij,jk->k", sizes, second.C_error, sizes)
+    return bool((rates >= -bound - ROUNDING * np.abs(rates).max(initial=0.0)).all())
+
+
+# -- the result --------------------------------------------------------------------------------------------------------
 
 
 class Linearization:

@@ -1,4 +1,4 @@
-"""Analysis: a linearization at rest -> natural frequencies, mode shapes, damping ratios.
+"""A linearization at rest -> natural frequencies, mode shapes, damping ratios.
 
 Undamped modes solve ``K s = omega^2 M s`` (L. Meirovitch, Fundamentals of Vibrations, 2001, sections 4.6 and 7.5),
 damped ones are the eigenvalues of A.
@@ -22,13 +22,12 @@ from ..base.limits.numbers import SHOWN_COMPLEX
 from ..base.notation import Notation
 from ..base.texts import as_html, as_text, html_text, number
 from ..errors import EomgenError, cannot, off_range
+from ..runtime.argument_checks import read_numbers
 from ..runtime.assembled import initial_of
-from ..runtime.room import read_numbers
-from ..runtime.show_parts import load_show
+from ..runtime.drawing import load_show
 from .equilibrium import equilibrium
 from .linear import linearize
-from .linearization import Linearization
-from .stability import symmetric_modes, uncertainty
+from .linearization import Linearization, symmetric_modes, uncertainty
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

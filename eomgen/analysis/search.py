@@ -1,27 +1,73 @@
-"""Analysis: a closed position, what is held and what is unknown -> a position where all forces are in balance."""
+"""A closed position, what is fixed and what is unknown -> a position where all forces are in balance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.analyses import DIFFERENCES, LEAST_UNKNOWN
-from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
+from ..base.limits.analyses import ARRIVED, CLOSE, DAMPING, DIFFERENCES, GAINED, LEAST_UNKNOWN, MOVING, SHORTEST
+from ..base.limits.numbers import EPS, TINY
+from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
 from ..numeric.projection import largest
+from ..runtime.argument_checks import unknown
 from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
-from ..runtime.near_names import unknown
-from .balance import Balance, balance_forces, force_slopes, slopes
-from .eigenvalue_rounding import own_accelerations
-from .linear_step import RANK, LinearizedResidual, Solver
-from .tangent import displacement_names
+from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes
+from .linearization import BALANCED, own_accelerations
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+
+# -- linear steps ------------------------------------------------------------------------------------------------------
+
+
+RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
+
+
+class LinearizedResidual(NamedTuple):
+    """Equations near an iterate: J by scaled variables, which move the tree and change unknowns."""
+
+    J: Array  #: (m, k)
+    moved: Array  #: (n_v, k) scaled displacements; the first n_z of length 1, at right angles
+    changed: Array  #: (j, k) changes of the unknowns
+    sizes: Array  #: (m,) of the terms in each row
+    noise: float  #: relative error of J
+    flow: Array | None  #: (n_v, n_z) how what drives the tree changes along them
+
+
+class Solver:
+    """Solutions of least norm with one J, rows divided by the sizes of their terms."""
+
+    def __init__(self, linear: LinearizedResidual) -> None:
+        self.linear = linear
+        self.sizes = np.where(linear.sizes > 0.0, linear.sizes, 1.0)
+        self.J = linear.J / self.sizes[:, None]
+        self.U, values, self.V = algebra.svd(self.J, full_matrices=False)
+        self.kept = values > linear.noise
+        self.inverse = np.where(self.kept, 1.0 / np.where(self.kept, values, 1.0), 0.0)
+
+    def solve(self, residual: Array) -> Array:
+        """The correction."""
+        return np.asarray(-self.V.T @ (self.inverse * (self.U.T @ (residual / self.sizes))))
+
+    def shown(self, change: Array) -> Array:
+        """The correction as a scaled displacement of the tree and a change of scaled unknowns."""
+        return np.concatenate([self.linear.moved @ change, change[self.J.shape[1] - len(self.linear.changed) :]])
+
+    def arrived(self, residual: Array, change: Array, numbers: float) -> bool:
+        """Whether no correction and no residual is left but for rounding.
+
+        numbers: scaled size of what the position is made of.
+        """
+        rounding = BALANCED * numbers
+        left = residual / self.sizes + self.J @ change
+        answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
+        limit = max(ARRIVED, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
+        return largest(self.shown(change)) <= limit and largest(left) <= rounding
 
 
 class SearchPoint(NamedTuple):
@@ -227,3 +273,300 @@ def _orthonormal(Z: Array) -> tuple[Array, Array]:
     """Z R^-1 with columns of length 1 at right angles, and R^-1."""
     basis, R = np.linalg.qr(Z)
     return basis, algebra.inv(R)
+
+
+# -- Newton's iteration ------------------------------------------------------------------------------------------------
+
+# Steps are judged by the corrections that they leave, not by residuals (the natural monotonicity test: P. Deuflhard,
+# Newton Methods for Nonlinear Problems, 2004, algorithm NLEQ-ERR, section 3.3.2).  Neither the scale nor the mixture of
+# the equations matters then: a stiff spring stretched by the curvature of a step is one small correction away.
+
+
+STEPS = 200  #: at most
+LONGEST = 0.5  #: largest scaled step of a coordinate
+STIFFEST = 1e16  #: largest damping of a step
+POLISHED = 8  #: most steps after the correction has reached rounding
+CONTRACTS = 0.5  #: part of a correction that the next one may be
+
+
+def newton(
+    search: Search, point: SearchPoint, plain: bool = False, reach: float = np.inf
+) -> tuple[SearchPoint, int, bool]:
+    """The last iterate, the number of steps, and whether it is balanced.
+
+    plain: whole steps, whatever they lead to; reach: largest scaled distance from the start.
+    """
+    part, before, start, last = 1.0, None, point.q, np.inf
+    for step in range(STEPS):
+        solver = Solver(search.linearize(point))
+        residual = search.residual(point.here, point.here)
+        change = solver.solve(residual)
+        shown = solver.shown(change)
+        size, longest = float(np.linalg.norm(shown)), search.longest(solver.linear.moved @ change)
+        if not np.isfinite(size):
+            return point, step, False
+        arrived = solver.arrived(residual, change, search.rounded(point))
+        if arrived and (size <= ARRIVED or size > CONTRACTS * last):
+            return _polished(search, point, solver, change), step, True
+        if size <= ARRIVED or largest(search.layout.place_scales.distance(point.q, start)) > reach:
+            return point, step, False
+        most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
+        if before is not None:
+            apart = float(np.linalg.norm(before[1] - shown))
+            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, TINY)
+        part, retried = most if plain else min(most, part), False
+        there, grown = None, None
+        while part >= SHORTEST * most:
+            there = search.step(point, solver.linear.moved @ (part * change), solver.linear.changed @ (part * change))
+            if there is None:
+                part *= 0.5
+                continue
+            left = solver.shown(solver.solve(search.residual(there.here, point.here)))
+            if plain:
+                break
+            off = float(np.linalg.norm(left - (1.0 - part) * shown))
+            wanted = 0.5 * size * part**2 / max(off, TINY)
+            if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
+                if arrived:  # rounding: no correction gets smaller
+                    return _polished(search, point, solver, change), step, True
+                there, part, retried = None, min(wanted, 0.5 * part), True
+            elif min(wanted, most) >= 4.0 * part and not retried:
+                there, part, retried = None, min(wanted, most), True
+            else:
+                grown = left, part
+                break
+        if there is None:
+            return point, step, arrived
+        point, last = there, size
+        before = None if grown is None or plain else (shown, grown[0], grown[1])
+    return point, STEPS, False
+
+
+def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array) -> SearchPoint:
+    """The iterate of whole steps from here, as long as each halves the residual.
+
+    Where stiff forces stand beside soft ones, a correction within rounding of the stiff ones may leave more than that
+    of the soft ones; the next steps have only these left.
+    """
+    sizes = solver.sizes
+    left = float(np.linalg.norm(search.residual(point.here, point.here) / sizes))
+    for _ in range(POLISHED):
+        there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
+        if there is None:
+            break
+        after = float(np.linalg.norm(search.residual(there.here, point.here) / sizes))
+        if not after < left:
+            break
+        point, left, enough = there, after, after > 0.5 * left or largest(solver.shown(change)) <= ARRIVED
+        if enough:
+            break
+        solver = Solver(search.linearize(point))
+        if len(solver.sizes) != len(sizes):
+            break
+        change = solver.solve(search.residual(point.here, point.here))
+    return point
+
+
+def marquardt(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
+    """Down the residual: Levenberg and Marquardt's steps, with columns scaled by the largest norms that they have had.
+
+    J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows
+    the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
+    """
+    damping, growth, columns = DAMPING, 2.0, np.zeros(0)
+    start = Solver(search.linearize(point)).sizes
+    for step in range(STEPS):
+        solver, here = Solver(search.linearize(point)), point.here
+        residual = search.residual(here, here)
+        change = solver.solve(residual)
+        if not residual.any() or solver.arrived(residual, change, search.rounded(point)):
+            return point, step, False  # near enough for Newton's iteration, which tells rounding from what is left
+        same = len(start) == len(solver.sizes)
+        sizes = start if same else solver.sizes
+        J, r = solver.linear.J / sizes[:, None], residual / sizes
+        norms = np.linalg.norm(J, axis=0)
+        columns = np.maximum(columns, norms) if len(columns) == len(norms) else norms
+        scale = np.where(columns > 0.0, columns, 1.0)
+        there = None
+        while damping < STIFFEST:
+            stacked = np.vstack([J, np.sqrt(damping) * np.diag(scale)])
+            change = algebra.lstsq(stacked, np.concatenate([-r, np.zeros(len(scale))]), rcond=None)
+            there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
+            gain = -1.0
+            if there is not None:
+                lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
+                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
+            if gain > GAINED:
+                damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
+                break
+            there, damping, growth = None, damping * growth, 2.0 * growth
+        if there is None:
+            return point, step, False
+        point = there
+    return point, STEPS, False
+
+
+# -- viscous descent ---------------------------------------------------------------------------------------------------
+
+# Implicit Euler steps of q' = v'(q) (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35
+# (1998), 508-523), along the forces in the metric of the masses and so down the potential where there is one.  Each is
+# solved by Newton's iteration and is as long as that contracts, so that stiff directions that curve are followed.
+
+
+DESCENT_STEPS = 400  #: at most
+TRIES = 60  #: of a step, each with a quarter of the time
+CORRECTIONS = 5  #: of a step, at most
+
+
+def creep(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
+    """An iterate near which it rests, the number of steps, and False: Newton's iteration has the last word."""
+    rate = None
+    for step in range(DESCENT_STEPS):
+        here = _Flow.at(search, point)
+        if here is None:
+            return point, step, False
+        size = float(np.linalg.norm(here.drive))
+        if size == 0.0 or not np.isfinite(size):
+            return point, step, False
+        rate = size / LONGEST if rate is None else rate
+        there, contraction = None, 1.0
+        for _ in range(TRIES):
+            change = here.implicit(rate, here.drive)
+            longest = np.inf if change is None else search.longest(here.basis @ change)
+            if change is not None and longest <= LONGEST:
+                there, contraction = _corrected(search, point, rate, here.basis @ change)
+                if there is not None:
+                    break
+            rate = 4.0 * max(rate, EPS * here.slope)
+        if there is None:
+            return point, step, False
+        point = there
+        if longest <= CLOSE or (rate <= CLOSE**2 * here.slope and contraction < 0.1):
+            return point, step + 1, False
+        rate *= 0.1 if contraction < 0.1 else 0.3 if contraction < 0.25 else 1.0
+    return point, DESCENT_STEPS, False
+
+
+class _Flow(NamedTuple):
+    """What drives the tree at an iterate, along directions of the constraints."""
+
+    basis: Array  #: (n_v, n)
+    drive: Array  #: (n,)
+    A: Array  #: (n, n) its derivative
+    M: Array  #: (n, n) metric
+    slope: float  #: size of A
+
+    @classmethod
+    def at(cls, search: Search, point: SearchPoint) -> _Flow | None:
+        """None where there is none."""
+        linear = search.linearize(point)
+        if linear.flow is None:
+            return None
+        basis = linear.moved
+        A = basis.T @ linear.flow
+        drive = basis.T @ search.drive(point.here)
+        return cls(basis, drive, A, search.metric(point, basis), float(np.linalg.norm(A)))
+
+    def implicit(self, rate: float, drive: Array) -> Array | None:
+        """(rate - A)^-1 drive; None where that does not lead down a potential."""
+        shifted = rate * np.eye(len(self.A)) - self.A
+        return np.asarray(algebra.solve(shifted, drive)) if _definite(self.M @ shifted) else None
+
+
+def _corrected(
+    search: Search, start: SearchPoint, rate: float, displacement: Array
+) -> tuple[SearchPoint | None, float]:
+    """The iterate an implicit step away, None where Newton's iteration does not contract; its first contraction."""
+    before, first, point = float(np.linalg.norm(displacement)), 1.0, start
+    for k in range(CORRECTIONS):
+        there = search.step(point, displacement, np.zeros(0))
+        if there is None:
+            return None, 1.0
+        if k and np.linalg.norm(displacement) <= 0.1 * before:  # what is left is for the next step
+            return there, first
+        point, before = there, float(np.linalg.norm(displacement))
+        here = _Flow.at(search, point)
+        assert here is not None
+        moved = here.basis.T @ search.distance(point, start)
+        change = algebra.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)
+        displacement = here.basis @ change
+        size = float(np.linalg.norm(displacement))
+        if not size <= CONTRACTS * before:
+            return None, 1.0
+        first = size / before if k == 0 else first
+    return None, 1.0
+
+
+def _definite(A: Array) -> bool:
+    """Whether the symmetric part is positive definite."""
+    try:
+        np.linalg.cholesky(0.5 * (A + A.T))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+# -- searches in turn --------------------------------------------------------------------------------------------------
+
+
+REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
+
+
+def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
+    """From a position: each way in turn until one leads to balance.
+
+    Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
+    leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
+    Marquardt find.
+
+    Raises
+    ------
+    EquilibriumError
+    """
+    start = search.start(q)
+    first, steps, found = newton(search, start, reach=REACH)
+    if found:
+        return first, steps
+    ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
+        lambda: newton(search, start),
+        lambda: newton(search, start, plain=True),
+        lambda: marquardt(search, start),
+    ]
+    if not search.names:
+        ways.insert(0, lambda: creep(search, start))
+    ends = [start, first]
+    for way in ways:
+        point, more, found = way()
+        ends.append(point)
+        steps += more
+        if not found:
+            point, more, found = newton(search, point)
+            steps += more
+        if found:
+            return point, steps
+    raise _failure(search, min(ends, key=lambda end: float(np.abs(search.residual(end.here, end.here)).max())))
+
+
+def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
+    here, layout = point.here, search.layout
+    names = [layout.velocity_labels[k] for k in here.velocities]
+    left = dict(zip(names, here.forces.tolist(), strict=True))
+    where = ", ".join(f"{n} = {x:.6g}" for n, x in zip((*layout.q, *layout.states), (*point.q, *point.s), strict=True))
+    head = f"no equilibrium of {layout.name!r} found from this guess: "
+    rates = np.abs(here.v / layout.scales.q)[here.surplus]
+    if rates.size and rates.max() > MOVING:
+        worst = int(here.surplus[rates.argmax()])
+        return EquilibriumError(
+            f"{head}the nonholonomic constraints move {layout.velocity_labels[worst]} at a rate of {here.v[worst]:.6g} "
+            f"at {where} even if all independent velocities are 0, so the model cannot stand still there; give another "
+            "guess, or constraints that allow a state of rest",
+            left,
+        )
+    scaled = np.abs(here.forces * layout.scales.q[here.velocities])
+    worst = int(scaled.argmax())
+    what = "rate of the state" if names[worst] in layout.states else "generalized force along"
+    return EquilibriumError(
+        f"{head}the {what} {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
+        "another guess, or hold a coordinate that no force balances",
+        left,
+    )

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..equations.digits_kept import note_lost_digits
-from ..equations.positive import require_inertia
+from ..equations.positive import note_lost_digits, require_inertia
 from ..errors import AssemblyError, EomgenError, ModelError, UsageError
-from ..kinematics.other_branches import other_branches
-from ..kinematics.report import MechanismReport, report
+from ..kinematics.report import MechanismReport, other_branches, report
 from ..pipeline import compile_core, derive
 from ..runtime.bound_model import BoundModel
 

@@ -12,7 +12,7 @@ from .. import pipeline
 from ..base.inline_pictures import picture_html, side_by_side
 from ..derivation import Derivation
 from ..module import Module
-from ..runtime.near_names import find_lacking
+from ..runtime.argument_checks import find_lacking
 
 if TYPE_CHECKING:
     from ..describe.model import Builder

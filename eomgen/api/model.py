@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from ..base.inline_pictures import picture_html, side_by_side
 from ..describe.model import Builder
 from ..errors import too_large
-from ..simulation.progress import waiting
+from ..simulation.bound_run import waiting
 from .equations import Equations, derive
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Stage show: the picture's part of a model's metadata and parameters -> the same with numbers."""
+"""The picture's part of a model's metadata and parameters -> the same with numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage cli: command line -> exit code; a file of verbs is loaded when one of them is called."""
+"""Command line -> exit code; a file of verbs is loaded when one of them is called."""
 
 from __future__ import annotations
 

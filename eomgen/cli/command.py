@@ -1,4 +1,4 @@
-"""Stage cli, the group: the first word of the command line -> the verb of that name, imported only now."""
+"""The first word of the command line -> the verb of that name, imported only now."""
 
 from __future__ import annotations
 

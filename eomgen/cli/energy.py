@@ -1,4 +1,4 @@
-"""Stage cli, energy: Equations and Trajectory -> change of the energy, held against the work of forces and inputs."""
+"""Equations and Trajectory -> change of the energy, held against the work of forces and inputs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, reachable, substitute
 from ..graph.evaluate import evaluate
-from ..graph.pair_calls import PairCall
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
+from ..graph.pairs import PairCall
 
 if TYPE_CHECKING:
     from ..api.equations import Equations

@@ -12,8 +12,7 @@ import click
 
 from ..base.files import open_plain, save_figure, write_whole
 from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
-from ..runtime.near_names import require
-from ..runtime.room import require_room
+from ..runtime.argument_checks import require, require_room
 from ..runtime.storage import split_head, write_netcdf
 from .options import Number, Prepared, analysis_verb, end_option, file_option, parse_number, require_folder
 from .output import finite, print_heading, print_json, print_table, say, stage

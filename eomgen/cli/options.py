@@ -15,7 +15,7 @@ import click
 from ..base.files import kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import unknown
 from ..targets import TARGETS
 from .output import reports_failures, say, stage
 
@@ -433,7 +433,7 @@ class Prepared(NamedTuple):
 
     def heading(self, t: float) -> dict[str, Any]:
         """What every result of --json begins with."""
-        from ..runtime.origin import origin
+        from ..runtime.identity import origin
 
         return {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
 

@@ -1,4 +1,4 @@
-"""Stage cli, plot: a run -> a picture: coordinates over time, and the paths of points among the outputs."""
+"""A run -> a picture: coordinates over time, and the paths of points among the outputs."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def check_columns(module: Module, picture: Picture) -> None:
     ------
     UsageError
     """
+    from ..runtime.argument_checks import unknown
     from ..runtime.columns import column_names
-    from ..runtime.near_names import unknown
 
     known = ("t", *column_names(module.layout))
     for name in (*picture.columns, *((picture.against,) if picture.against else ())):
@@ -136,8 +136,7 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
     """
     from matplotlib.figure import Figure
 
-    from ..runtime.plotting import Curves, choose, draw_panel, height, stack
-    from ..runtime.refined import refined
+    from ..runtime.plotting import Curves, choose, draw_panel, height, refined, stack
 
     led = trajectory.metadata.get("led", ())
     own = picture == Picture()

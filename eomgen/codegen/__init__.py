@@ -1,1 +1,1 @@
-"""Stages program and code: equations -> functions to generate -> the text of generated files, for every target."""
+"""Equations -> functions to generate -> the text of generated files, for every target."""

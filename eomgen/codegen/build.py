@@ -15,7 +15,7 @@ from ..base.names import hint, joined
 from ..equations.positive import require_inertia
 from ..equations.tree_equations import TreeEquations
 from ..errors import UsageError, ill_placed, no_such
-from ..graph.substitute import symbols_of
+from ..graph.core import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from .contact_columns import COLUMNS

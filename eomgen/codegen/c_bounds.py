@@ -9,7 +9,7 @@ from functools import cache
 from math import floor, log2, prod
 
 from ..base.limits.crossings import REACH, SHORTEST
-from ..graph.count import Operations
+from ..graph.schedule import Operations
 from .factor import factoring_operations
 from .program import Block, Program
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import incomplete
 from ..graph.functions import Function
-from ..graph.pair_calls import pair_call
+from ..graph.pairs import pair_call
 from ..numeric.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from .files import render
 from .program import Program

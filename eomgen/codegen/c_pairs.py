@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from ..graph.pair_calls import PairFunction
-from ..graph.pair_kinds import PairKind, PairPart
-from ..graph.substitute import symbols_of
+from ..graph.core import symbols_of
+from ..graph.pairs import PairFunction, PairKind, PairPart
 from ..numeric.outline_pieces import CHOSEN, PIECE
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..numeric.polygon_edges import OTHER, OWN

@@ -14,9 +14,7 @@ from typing import NamedTuple
 
 from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..base.texts import comment_text
-from ..graph.core import Expr
-from ..graph.nodes import Node
-from ..graph.traverse import reachable
+from ..graph.core import Expr, Node, reachable
 from .c_functions import each_lane, each_name
 from .c_layout import places_again
 from .pair_sums import CopiedRun, PairLists, copied_runs

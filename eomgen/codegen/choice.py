@@ -7,11 +7,11 @@ from copy import copy
 from functools import cached_property
 
 from ..equations import METHODS, TreeEquations
-from ..graph.count import count
 from ..graph.evaluate import compile_evaluator
+from ..graph.schedule import count
 from ..kinematics import Kinematics
-from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
+from ..kinematics.wrenches import drives_cut_joint
 from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
 from .loop_systems import BodyLoops, EmbeddedLoops, LoopBlocks, estimate
 from .program import Limits

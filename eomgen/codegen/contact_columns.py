@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, reachable, substitute, symbols_of
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import PairFunction, pair_call
-from ..graph.substitute import substitute, symbols_of
-from ..graph.traverse import reachable
+from ..graph.pairs import PairFunction, pair_call
 from ..numeric.pair_sums import POSE
 from .terms import SystemTerms
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, reachable
 from ..graph.functions import Function, NativeCode
-from ..graph.traverse import reachable
 from ..numeric.user_functions import Curve, Surface
 from .program import Program
 

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from ..equations.tree_slopes import ForceSlopes
-from ..graph.core import Expr
-from ..graph.count import count
+from ..equations.embedding import ForceSlopes
+from ..graph.core import Expr, reachable, substitute
 from ..graph.differentiate import jacobian
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
+from ..graph.schedule import count
 from .factor import Factor, factorize, path, positivity, solve
 from .program import Limits
 from .terms import SystemTerms

@@ -8,11 +8,9 @@ from itertools import pairwise
 
 from ..base.limits.systems import FIXED
 from ..base.operations import CONDITION, operations_with
-from ..graph.core import Expr, Graph, sqrt
+from ..graph.core import Expr, Graph, reachable, sqrt, substitute
 from ..graph.differentiate import jacobian
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
-from ..kinematics.eliminate import Matrix, combined, eliminate, total
+from ..kinematics.motion import Matrix, combined, eliminate, total
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64

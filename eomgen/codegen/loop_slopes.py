@@ -15,13 +15,11 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from ..base.limits.constraints import TIKHONOV
-from ..equations.articulated import ConstraintRow
-from ..graph.core import Expr
+from ..equations.recursions import ConstraintRow
+from ..graph.core import Expr, reachable, substitute
 from ..graph.differentiate import jacobian, jvp
-from ..graph.pair_calls import list_operands
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
-from ..kinematics.eliminate import dot, total
+from ..graph.pairs import list_operands
+from ..kinematics.motion import dot, total
 from .linear_algebra import times
 from .loop_systems import BodyLoops
 from .program import Block, Port

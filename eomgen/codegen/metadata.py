@@ -17,20 +17,16 @@ from ..describe.requirements import Requirement
 from ..equations.tree_equations import TreeEquations
 from ..errors import TO_BE_FINITE, ModelError, UsageError
 from ..frames import GROUND, Marker
-from ..graph.core import Expr
+from ..graph.core import Expr, reachable, symbols_of
 from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator, evaluate
-from ..graph.substitute import symbols_of
-from ..graph.tape import record_tape
-from ..graph.traverse import reachable
-from ..joints.many_degrees import Cylindrical, Planar, Translational
-from ..joints.one_degree import Prismatic
-from ..joints.turning import Free
+from ..graph.schedule import record_tape
+from ..joints.joint_types import Cylindrical, Free, Planar, Prismatic, Translational
 from ..kinematics import Kinematics
+from ..kinematics.constraint_functions import row_groups, row_velocities
 from ..kinematics.mobility import Mobility, initial_values
 from ..kinematics.near_pairs import describe_contacts
-from ..kinematics.row_groups import row_groups, row_velocities
-from ..kinematics.state import acceleration_name
+from ..kinematics.topology import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .picture import describe_picture
 from .terms import flag_forces, independent_places, resets, resolved

@@ -7,9 +7,8 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 from ..errors import cannot
-from ..graph.core import Expr, Graph
-from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..graph.traverse import reachable
+from ..graph.core import Expr, Graph, reachable
+from ..graph.pairs import PairCall, PairFunction, pair_call
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 from .contact_columns import WRENCH
 from .loop_slopes import BY_BODIES

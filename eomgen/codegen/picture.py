@@ -28,10 +28,9 @@ from ..elements.looks import (
 from ..errors import UsageError
 from ..forces import Force
 from ..frames import Frame, Marker, WrapCylinder
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute, symbols_of
 from ..graph.evaluate import evaluate
-from ..graph.substitute import substitute, symbols_of
-from ..graph.tape import record_tape
+from ..graph.schedule import record_tape
 from ..numeric.user_functions import Curve
 
 #: Symbols that stand for the parameters of a curve or a surface.

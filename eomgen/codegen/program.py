@@ -14,9 +14,8 @@ from typing import Any
 
 from ..base.kernel_table import Sizes
 from ..equations.tree_equations import LinearSystem
-from ..graph.core import Expr, Graph
-from ..graph.count import Operations, count
-from ..graph.traverse import LEAVES, reachable
+from ..graph.core import LEAVES, Expr, Graph, reachable
+from ..graph.schedule import Operations, count
 from ..records import dataclass
 from .contact_columns import ContactColumns
 

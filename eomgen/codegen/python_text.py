@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..base.operations import CONDITION, OPERATIONS
-from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..graph.pair_kinds import PairPart
-from ..graph.slopes import square_under_root
-from ..graph.substitute import symbols_of
+from ..graph.core import symbols_of
+from ..graph.differentiate import square_under_root
+from ..graph.pairs import PairCall, PairFunction, PairPart, pair_call
 from .program import Block, Program
 from .statements import Pieces, PrintedFunction, cut, references
 

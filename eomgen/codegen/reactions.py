@@ -20,23 +20,18 @@ from ..equations import METHODS
 from ..equations.tree_equations import TreeEquations
 from ..errors import ModelError, Problem
 from ..forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
-from ..forces.joint_reactions import is_carried, multiplier_of, reaction_of
-from ..graph.core import Expr
+from ..forces.friction import is_carried, multiplier_of, reaction_of
+from ..graph.core import Expr, operands, reachable, substitute, symbols_of
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import compile_evaluator
-from ..graph.substitute import substitute, symbols_of
-from ..graph.traverse import operands, reachable
 from ..kinematics import Kinematics
-from ..kinematics.carried_reactions import carried_reactions
 from ..kinematics.constraint_functions import ConstraintFunctions
-from ..kinematics.eliminate import Matrix, combined, dot, eliminate, total
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
-from ..kinematics.reaction_parts import force_and_moment
-from ..kinematics.resolved_loads import entries_of, with_entries
+from ..kinematics.motion import Matrix, combined, dot, eliminate, entries_of, force_and_moment, total, with_entries
 from ..kinematics.switched import SwitchedRow, switched_rows
-from ..kinematics.wrenches import JointWrenches, Row6
-from ..numeric.row_chains import SparseRows
+from ..kinematics.wrenches import JointWrenches, Row6, carried_reactions
+from ..numeric.ranks import SparseRows
 from .factor import factorize, solve
 from .laws import MANY, laws_in, pieces_of, solve_laws
 from .switched_constraints import AfterEvents, LinearValues, solve_rows

@@ -18,8 +18,7 @@ from itertools import chain, groupby
 
 import numpy as np
 
-from ..graph.core import Expr, Graph
-from ..graph.traverse import LEAVES, parts, reachable
+from ..graph.core import LEAVES, Expr, Graph, parts, reachable
 from ..records import dataclass
 from .pair_sums import PairLists
 from .statements import CIRCULAR

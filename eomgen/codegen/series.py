@@ -12,8 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, OPERATIONS
-from ..graph.nodes import Node
-from ..graph.traverse import reachable
+from ..graph.core import Node, reachable
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.

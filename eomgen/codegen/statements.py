@@ -12,9 +12,8 @@ from math import prod
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, operations_with
-from ..graph.core import Expr, Graph
+from ..graph.core import LEAVES, Expr, Graph
 from ..graph.schedule import chunk, order
-from ..graph.traverse import LEAVES
 from ..records import dataclass
 from .program import Program
 

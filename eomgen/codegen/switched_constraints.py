@@ -12,11 +12,10 @@ from typing import NamedTuple
 from ..base.limits.constraints import MEASURED
 from ..base.limits.numbers import SINGULAR
 from ..describe.mechanism import Event
-from ..forces.branches import where
-from ..graph.core import Expr
-from ..graph.substitute import substitute
+from ..forces.force import where
+from ..graph.core import Expr, substitute
 from ..kinematics import Kinematics
-from ..kinematics.eliminate import Matrix, combined, dot, total
+from ..kinematics.motion import Matrix, combined, dot, total
 from ..kinematics.switched import SwitchedRow
 
 

@@ -9,27 +9,22 @@ from functools import cached_property, partial
 from ..base.kernel_table import Sizes
 from ..base.notation import rate_of
 from ..base.operations import operations_with
-from ..equations.articulated import ConstraintRow, TreeMotion
+from ..equations.embedding import can_differentiate
+from ..equations.recursions import ConstraintRow, TreeMotion
 from ..equations.tree_equations import TreeEquations
-from ..equations.tree_slopes import can_differentiate
 from ..errors import UsageError
-from ..forces.branches import where
+from ..forces.force import where
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
+from ..graph.core import Expr, reachable, substitute
 from ..kinematics import Kinematics
-from ..kinematics.closing_gradients import shortest_rows
-from ..kinematics.closing_rates import shortest_gamma
+from ..kinematics.closing import shortest_gamma, shortest_rows
+from ..kinematics.constraint_functions import row_groups, row_scales
 from ..kinematics.kinematics import ForceTerms
-from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import motion_axes, near_pairs
-from ..kinematics.row_groups import row_groups
-from ..kinematics.row_scales import row_scales
-from ..kinematics.state import acceleration_name
-from ..kinematics.wrenches import find_wrenches
+from ..kinematics.topology import acceleration_name
+from ..kinematics.wrenches import drives_cut_joint, find_wrenches
 from .factor import has_long_paths
 from .reactions import multiplier_values
 
@@ -86,7 +81,7 @@ class SystemTerms:
         #: (n,) typical size of each coordinate, of parameters only
         self.coordinate_scales: Row = tuple(size[kind] for kind in k.velocity_kinds)
         self.constraint_scales = row_scales(k)  #: (m,) typical size of each row's residual, of parameters only
-        self.row_groups = row_groups(k)  #: per row which it is compared with, as in kinematics/row_groups.py; none: all
+        self.row_groups = row_groups(k)  #: per row which it is compared with, as the rows of the kinematics; none: all
         self.n_dof = mobility.n_dof  #: degrees of freedom; n - n_dof is the rank of C_q
         #: n_dof indices into v: independent velocities, in the order of v_i
         self.preferred: tuple[int, ...] = independent_places(k, mobility)

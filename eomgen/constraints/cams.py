@@ -1,10 +1,4 @@
-"""Constraint elements: cam and follower, by a law of lift or by contact with the cam's contour.
-
-Contact is bilateral: the follower is held to the cam (a groove, a spring that never lets go).  Polar coordinates of
-the contour are those of the cam's marker: theta from its x axis about its z axis, which is the cam's axis.  In the axes
-(e_r, e_theta) of the contact point the contour r(theta) has the tangent (r', r) and the outward normal (r, -r') over
-sqrt(r^2 + r'^2) (Norton, Cam Design and Manufacturing Handbook, ch. 7; Litvin and Fuentes, Gear Geometry, sec. 1.6).
-"""
+"""Constraint elements: cam and follower, by a law of lift or by contact with the cam's contour."""
 
 from __future__ import annotations
 
@@ -12,16 +6,93 @@ import math
 from abc import abstractmethod
 from typing import ClassVar
 
+import numpy as np
+
+from ..base.limits.numbers import ZERO
 from ..elements.dimensions import LENGTH, NONE, REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.kinds import Choice, CoordinateName, Flag, JointReference, Latex, MarkerReference, Scalar
 from ..elements.looks import Contour, LiftCurve, Seen, Wheel
 from ..frames import Frame, Marker
-from ..graph.core import Expr, atan2, cos, sin, sqrt
+from ..graph.core import Expr, atan2, cos, sin, sqrt, substitute, symbols_of
+from ..graph.differentiate import jvp
+from ..graph.evaluate import evaluate
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
-from .profiles import Profile
+
+# -- laws of lift ------------------------------------------------------------------------------------------------------
+
+
+TRIALS = 5
+
+
+@dataclass(frozen=True)
+class Profile:
+    """f(theta), theta from 0 to a full turn; ``local`` is the symbol that stands for theta in ``expression``.
+
+    Beyond one turn it repeats if ``periodic``: theta then is brought back to [0, 2 pi], unless the expression repeats
+    of itself.
+    """
+
+    expression: Expr
+    local: Expr
+    periodic: bool = True
+
+    def at(self, angle: Expr) -> Expr:
+        """f(angle)."""
+        return self._put(self.expression, angle)
+
+    def slope(self, angle: Expr) -> Expr:
+        """f'(angle)."""
+        return self._put(jvp([self.expression], {self.local: self.local.graph.one})[0], angle)
+
+    def toward(self, x: Expr, y: Expr) -> Expr:
+        """f at the direction of (x, y)."""
+        return self._insert(self.expression, atan2(-y, -x) + math.pi)
+
+    def _put(self, expression: Expr, angle: Expr) -> Expr:
+        if self.periodic and not self.repeats():
+            angle = atan2(-sin(angle), -cos(angle)) + math.pi
+        return self._insert(expression, angle)
+
+    def _insert(self, expression: Expr, angle: Expr) -> Expr:
+        return substitute([expression], {self.local: angle})[0]
+
+    def over_a_turn(self) -> tuple[list[Expr], str] | None:
+        """Value and slope, which close after a turn, and the name of their angle; None where they need not."""
+        if not self.periodic:
+            return None
+        (name,) = symbols_of([self.local])
+        return [self.expression, *jvp([self.expression], {self.local: self.local.graph.one})], name
+
+    def repeats(self) -> bool:
+        """Whether the expression repeats every turn of itself, tried at random values of all symbols."""
+        (name,) = symbols_of([self.local])
+        others = sorted(symbols_of([self.expression]) - {name})
+        random = np.random.default_rng(5)
+        theta = np.concatenate([random.uniform(-7.0, 7.0, TRIALS), np.linspace(0.0, 6.2, 2 * TRIALS)])
+        for _ in range(2):
+            values = dict(zip(others, random.uniform(0.2, 1.4, len(others)).tolist(), strict=True))
+            with np.errstate(all="ignore"):
+                here, there, back = (
+                    np.broadcast_to(evaluate([self.expression], values | {name: theta + k * math.tau})[0], theta.shape)
+                    for k in (0, 1, -1)
+                )
+            size = float(np.abs(here).max())
+            if not all(bool((np.abs(x - here) <= ZERO * size).all()) for x in (there, back)):
+                return False
+        return True
+
+
+# -- cams --------------------------------------------------------------------------------------------------------------
+
+# Contact is bilateral: the follower is held to the cam (a groove, a spring that never lets go). Polar coordinates of
+# the contour are those of the cam's marker: theta from its x axis about its z axis, which is the cam's axis. In the
+# axes (e_r, e_theta) of the contact point the contour r(theta) has the tangent (r', r) and the outward normal (r, -r')
+# over sqrt(r^2 + r'^2) (Norton, Cam Design and Manufacturing Handbook, ch. 7; Litvin and Fuentes, Gear Geometry, sec.
+# 1.6).
+
 
 #: The name that stands for the angle in profiles of cams.
 CAM_ANGLE = "theta"

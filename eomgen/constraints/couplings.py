@@ -7,9 +7,8 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.kinds import OUTPUT, Factors, Scalar
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.differentiate import gradient
-from ..graph.substitute import symbols_of
 from ..records import dataclass
 from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
 

@@ -16,9 +16,7 @@ from ..elements.kinds import MOTION, Axis, JointReference, MarkerReference, Pair
 from ..elements.looks import ROUND_ARROW, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, sqrt
-from ..graph.substitute import symbols_of
-from ..graph.traverse import reachable
+from ..graph.core import Expr, reachable, sqrt, symbols_of
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView, on_two_bodies

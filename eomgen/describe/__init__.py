@@ -1,4 +1,4 @@
-"""Stage describe: what the user says, in Python or in a file -> Mechanism, the frozen value every later stage reads."""
+"""What the user says, in Python or in a file -> Mechanism, the frozen value every later stage reads."""
 
 from .description import Description
 from .handles import BodyHandle, JointHandle, MarkerHandle

@@ -1,4 +1,4 @@
-"""Stage describe, parts of a body: solids, meshes, point masses -> mass properties; what pictures show of it."""
+"""Solids, meshes, point masses -> mass properties; what pictures show of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, cams: contact points on contours, and profiles that close after a turn."""
+"""Contact points on contours, and profiles that close after a turn."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 
 from ..base.value_rules import TURN
 from ..constraints import Constraint
-from ..constraints.profiles import Profile
+from ..constraints.cams import Profile
 from ..errors import ModelError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.substitute import symbols_of
+from ..graph.core import symbols_of
 from ..joints import JOINTS
 from .description import DescribedEntry
 from .mechanism import Body, JointSpec

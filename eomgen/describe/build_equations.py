@@ -1,4 +1,4 @@
-"""Stage describe, given equations of motion: the equations section -> GivenEquations on the graph."""
+"""The equations section -> GivenEquations on the graph."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import Any
 from ..base.limits.numbers import TENSOR
 from ..elements import kinds
 from ..elements.kinds import MOTION
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute, symbols_of
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.shown import quoted, shown
-from ..graph.substitute import substitute, symbols_of
 from .checks import check_keys
 from .description import Faults, items
 from .fields import EQUATIONS

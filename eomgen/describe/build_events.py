@@ -1,4 +1,4 @@
-"""Stage describe, events: entries of the section ``events`` -> Events of the mechanism, with their resets."""
+"""Entries of the section ``events`` -> Events of the mechanism, with their resets."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any
 from ..base.operations import CONDITION, operations_with
 from ..elements import kinds
 from ..elements.kinds import OUTPUT
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.shown import shown
-from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT

@@ -1,4 +1,4 @@
-"""Stage describe, functions: entries of the functions section -> functions that expressions of the graph can call."""
+"""Entries of the functions section -> functions that expressions of the graph can call."""
 
 from __future__ import annotations
 

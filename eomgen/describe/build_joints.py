@@ -1,4 +1,4 @@
-"""Stage describe, joints: entries of the joints section -> coordinate names in the namespace, then JointSpecs."""
+"""Entries of the joints section -> coordinate names in the namespace, then JointSpecs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, a bare Lagrangian: the lagrangian section -> Lagrangian on the graph."""
+"""The lagrangian section -> Lagrangian on the graph."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from typing import Any
 
 from ..elements import kinds
 from ..elements.kinds import MOTION
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.differentiate import jacobian
 from ..graph.shown import quoted, shown
-from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
 from .fields import LAGRANGIAN

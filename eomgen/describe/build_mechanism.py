@@ -1,4 +1,4 @@
-"""Stage describe, the check: Description (raw) -> Mechanism, or ModelError with every problem at once."""
+"""Description (raw) -> Mechanism, or ModelError with every problem at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, native functions: an entry that names a C source file -> a function with that source and its twin.
+"""An entry that names a C source file -> a function with that source and its twin.
 
 Nothing is read before permission: an entry of a model file is refused unless the file was loaded with
 ``allow_native``, because compiling and calling it runs code of the file's author.

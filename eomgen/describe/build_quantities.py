@@ -1,4 +1,4 @@
-"""Stage describe, parameters, inputs and outputs: their entries -> Parameter, Input and Output, values in SI units."""
+"""Their entries -> Parameter, Input and Output, values in SI units."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from dataclasses import replace
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import NONE
 from ..elements.kinds import MOTION, OUTPUT, Fields
-from ..graph.core import Expr
-from ..graph.substitute import symbols_of
-from ..graph.traverse import LEAVES, reachable
+from ..graph.core import LEAVES, Expr, reachable, symbols_of
 from .checks import check_keys
 from .description import DescribedEntry
 from .fields import INPUT, OUTPUT_FIELDS, PARAMETER

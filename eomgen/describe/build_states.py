@@ -1,4 +1,4 @@
-"""Stage describe, states: entries of the section ``states`` -> States of the mechanism and their initial values."""
+"""Entries of the section ``states`` -> States of the mechanism and their initial values."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 from ..base.value_rules import POSITIVE
 from ..elements.kinds import LAW
-from ..graph.core import Expr
-from ..graph.substitute import substitute
+from ..graph.core import Expr, substitute
 from .build_quantities import in_si, read_described
 from .description import DescribedEntry
 from .fields import STATE

@@ -1,4 +1,4 @@
-"""Stage describe, constraints that close and open: their keys -> a state 1 or 0, events, and the constraint apart.
+"""Their keys -> a state 1 or 0, events, and the constraint apart.
 
 A constraint of that kind is no equation of the mechanism; it acts by a force while its state is 1.
 """
@@ -9,9 +9,8 @@ from collections.abc import Sequence
 
 from ..constraints import Constraint
 from ..elements import kinds
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, symbols_of
 from ..graph.shown import quoted
-from ..graph.substitute import symbols_of
 from .build_events import instant
 from .description import DescribedEntry, items
 from .mechanism import Event, FirstOrderState, Switched

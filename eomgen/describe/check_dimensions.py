@@ -1,4 +1,4 @@
-"""Stage describe, dimensions: expressions that were read -> faults where quantities of different dimensions meet.
+"""Expressions that were read -> faults where quantities of different dimensions meet.
 
 The check runs where at least one parameter, input or output has a unit.  A parameter or input without one may be
 anything.  A plain number as a term, or alone, may be anything too.  As a factor it may have any unit (``-40*x``,
@@ -17,8 +17,7 @@ from ..base.names import place_of_marker
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
 from ..elements.kinds import Field
-from ..graph.core import Expr, Graph
-from ..graph.traverse import reachable
+from ..graph.core import Expr, Graph, reachable
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
 from .mechanism import TURNING, JointSpec, Output

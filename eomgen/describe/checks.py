@@ -1,4 +1,4 @@
-"""Stage describe, checks without kinematics: keys by the table of fields, names, connection to ground."""
+"""Keys by the table of fields, names, connection to ground."""
 
 from __future__ import annotations
 

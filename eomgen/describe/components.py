@@ -1,4 +1,4 @@
-"""Stage describe, components: the sections ``components`` and ``add`` of a model file -> entries of the model."""
+"""The sections ``components`` and ``add`` of a model file -> entries of the model."""
 
 from __future__ import annotations
 

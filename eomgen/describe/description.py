@@ -1,4 +1,4 @@
-"""Stage describe, raw data: what Python calls and model files both fill, in the layout of the model file.
+"""What Python calls and model files both fill, in the layout of the model file.
 
 A :class:`Description` is plain data: sections of named entries whose values are numbers, texts, sequences, mappings or
 SymPy expressions as the user gave them.  Nothing is looked up or judged here; that is done by

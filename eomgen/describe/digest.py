@@ -1,4 +1,4 @@
-"""Stage describe: Mechanism -> a digest that tells whether two results come from one model.
+"""Mechanism -> a digest that tells whether two results come from one model.
 
 It follows from what is computed: names, numbers and expressions, whichever way they were written down.  Documentation
 and lines of files do not count.
@@ -14,8 +14,7 @@ import numpy as np
 
 from ..base.operations import OPERATIONS
 from ..elements.kinds import Field
-from ..graph.core import Expr, Graph
-from ..graph.traverse import LEAVES, reachable
+from ..graph.core import LEAVES, Expr, Graph, reachable
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism

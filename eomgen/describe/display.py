@@ -1,4 +1,4 @@
-"""Stage describe, display: Description -> a short HTML table for notebooks."""
+"""Description -> a short HTML table for notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, one entry of a section of elements: its keys -> expressions, markers, coordinates, bodies."""
+"""Its keys -> expressions, markers, coordinates, bodies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, the builder's elements: a method for every type in the tables; element_methods.pyi lists them."""
+"""A method for every type in the tables; element_methods.pyi lists them."""
 
 from __future__ import annotations
 

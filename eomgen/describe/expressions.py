@@ -1,4 +1,4 @@
-"""Stage describe, expressions: text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
+"""Text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
 :func:`~eomgen.describe.names.function_words`, functions that the graph declares and, where markers can be resolved (in

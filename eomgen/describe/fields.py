@@ -1,4 +1,4 @@
-"""Stage describe, the table of fields: section or type -> the keys it knows, what each holds, and its default.
+"""Section or type -> the keys it knows, what each holds, and its default.
 
 This one table drives the check of Python calls, the keys of model files and the exported JSON Schema.
 """

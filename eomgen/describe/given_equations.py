@@ -1,4 +1,4 @@
-"""Stage describe, equations of motion from Python: M, f, coordinates, ... -> Description."""
+"""M, f, coordinates, ... -> Description."""
 
 from __future__ import annotations
 

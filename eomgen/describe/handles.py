@@ -1,4 +1,4 @@
-"""Stage describe, handles: what Model's methods give back -> references by name, and SymPy symbols on demand."""
+"""What Model's methods give back -> references by name, and SymPy symbols on demand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, inputs that move: the equations of a model -> the rates of inputs they need, as inputs of their own.
+"""The equations of a model -> the rates of inputs they need, as inputs of their own.
 
 Where an input u stands in what is differentiated by time (dL/dv of a Lagrangian, constraints, the gap of an impact,
 q' = N v + b of given equations), u' and u'' stand in the equations of motion.  They are further inputs ``u_dot`` and
@@ -16,11 +16,9 @@ from ..base.notation import chains, rate_of, split_rate
 from ..base.operations import CONDITION, operations_with
 from ..constraints import Driver, Equation
 from ..constraints.constraint import POSITION, Constraint
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, reachable, substitute, symbols_of
 from ..graph.differentiate import gradient, jvp
 from ..graph.rounding_bounds import is_rounding, with_bounds
-from ..graph.substitute import substitute, symbols_of
-from ..graph.traverse import reachable
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
 from .values import Reader
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..errors import cannot
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, symbols_of
 from ..graph.differentiate import gradient, jvp
-from ..graph.substitute import symbols_of
-from ..graph.tape import Tape, record_tape
+from ..graph.schedule import Tape, record_tape
 from .expressions import parse
 
 

@@ -1,4 +1,4 @@
-"""Stage describe, one instance: a component, a prefix, attachments and values -> the entries that it brings."""
+"""A component, a prefix, attachments and values -> the entries that it brings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, the bare Lagrangian in SymPy: L, coordinates, forces, ... -> Description."""
+"""L, coordinates, forces, ... -> Description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, calls of names in expressions: ``vx(hub, in=road)`` -> quantity, markers, axes; ``force(k1)``."""
+"""``vx(hub, in=road)`` -> quantity, markers, axes; ``force(k1)``."""
 
 from __future__ import annotations
 

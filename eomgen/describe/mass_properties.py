@@ -1,4 +1,4 @@
-"""Stage describe, bodies: mass, centre of mass and inertia, in any of the ways to give them -> Body.
+"""Mass, centre of mass and inertia, in any of the ways to give them -> Body.
 
 Ways that exclude each other are told as faults; what is given adds up: the body's own mass, its solids, its points.
 """

@@ -1,4 +1,4 @@
-"""Stage describe: Model (builder) -> Mechanism, the frozen value every later stage reads.
+"""Model (builder) -> Mechanism, the frozen value every later stage reads.
 
 A Mechanism holds graph expressions in the symbols of its graph: ``t``; parameters, inputs and coordinates under their
 own names; the velocity and acceleration of coordinate ``theta`` as ``theta_dot`` and ``theta_ddot``.  A coordinate of

@@ -1,4 +1,4 @@
-"""Stage describe, methods of the builder: a type of element -> the method of Model that adds one, documented.
+"""A type of element -> the method of Model that adds one, documented.
 
 Arguments, defaults and their documentation are those of the type's keys, so that Python and model files cannot differ.
 """

@@ -1,4 +1,4 @@
-"""Stage describe, the builder: Python calls -> Description -> Mechanism."""
+"""Python calls -> Description -> Mechanism."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, names: a name the user chose -> what is wrong with it, or the name they probably meant."""
+"""A name the user chose -> what is wrong with it, or the name they probably meant."""
 
 from __future__ import annotations
 

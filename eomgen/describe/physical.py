@@ -1,4 +1,4 @@
-"""Stage describe, checks of bodies: masses and inertias that no rigid body can have."""
+"""Masses and inertias that no rigid body can have."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from ..base.algebra import Array
 from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
 from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_scales, judge_bodies, longest_within
 from ..frames import GROUND
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from .mechanism import Body, JointSpec
 from .requirements import Requirements

@@ -1,4 +1,4 @@
-"""Stage describe, placements on placements: a place given from a marker -> the same place in the marker's body."""
+"""A place given from a marker -> the same place in the marker's body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, placements: roll-pitch-yaw and joint axes -> rotation matrices, with zeros and ones kept exact."""
+"""Roll-pitch-yaw and joint axes -> rotation matrices, with zeros and ones kept exact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, notation: LaTeX given for names -> checked, by name."""
+"""LaTeX given for names -> checked, by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, wrenches in texts: the trees of ``reaction(A, in=rod.tip).x`` and others -> the quantities."""
+"""The trees of ``reaction(A, in=rod.tip).x`` and others -> the quantities."""
 
 from __future__ import annotations
 

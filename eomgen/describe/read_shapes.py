@@ -1,4 +1,4 @@
-"""Stage describe, shapes of contacts: a list of mappings {shape, on, sizes} -> the shapes, one for each marker."""
+"""A list of mappings {shape, on, sizes} -> the shapes, one for each marker."""
 
 from __future__ import annotations
 
@@ -12,10 +12,20 @@ from typing import Any
 from ..base.value_rules import BELOW, OUTLINE, RISING, SPROCKET, Flaw, sense_of_outline
 from ..elements import kinds
 from ..forces.contact_fields import PLACES
-from ..forces.contact_outlines import half_gap, half_tooth
-from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS, ContactShapes
+from ..forces.contact_profiles import half_gap, half_tooth
 from ..forces.contact_shapes import ContactShape
-from ..forces.contact_states import BED, MOST_PAIRS, POINTS, TEETH, cells_of_bed, points_of_plate, teeth_of_sprocket
+from ..forces.contact_states import (
+    BED,
+    CORNERS,
+    MOST_PAIRS,
+    POINTS,
+    SHAPE_FIELDS,
+    TEETH,
+    ContactShapes,
+    cells_of_bed,
+    points_of_plate,
+    teeth_of_sprocket,
+)
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from .build_functions import read_table

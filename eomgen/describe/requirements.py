@@ -1,4 +1,4 @@
-"""Stage describe, requirements of numbers: expressions and a rule -> faults now, and what late values must keep too.
+"""Expressions and a rule -> faults now, and what late values must keep too.
 
 Each rule of :mod:`..base.value_rules` is the only home of its condition: here it judges the declared values of
 parameters, and a compiled module judges by it what parameters are given later.
@@ -13,9 +13,8 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.value_rules import LIMITS, NOT_NEGATIVE, NOT_ZERO, POINTS, POSITIVE, RANGE, RULES, Allowed
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
 
 
 class Requirement(NamedTuple):

@@ -1,4 +1,4 @@
-"""Stage describe, rewriting texts: an expression -> the same with other names, other axes or other units.
+"""An expression -> the same with other names, other axes or other units.
 
 Values are numbers and texts.  Texts are changed by their tokens, never evaluated as code.
 """

@@ -1,4 +1,4 @@
-"""Stage describe, schema: the table of fields -> the JSON Schema of the model file (draft 2020-12)."""
+"""The table of fields -> the JSON Schema of the model file (draft 2020-12)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage describe, names in expressions: the one namespace of a model -> what each name means and where it may stand."""
+"""The one namespace of a model -> what each name means and where it may stand."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from ..base.names import joined
 from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from ..errors import ExpressionError
 from ..frames import Marker
-from ..graph.core import Expr, Graph
-from ..graph.substitute import symbols_of
+from ..graph.core import Expr, Graph, symbols_of
 from .description import Faults
 from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity

@@ -1,4 +1,4 @@
-"""Stage describe, the SymPy border: SymPy expressions -> graph, names -> SymPy symbols; SymPy loads on first use."""
+"""SymPy expressions -> graph, names -> SymPy symbols; SymPy loads on first use."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
     ExpressionError
         The expression has a part without a meaning.
     """
-    from ..graph.sympy_lower import LoweringError, lower
+    from ..graph.sympy_bridge import LoweringError, lower
 
     def meaning(part: Any) -> Expr | None:  # declared functions, also f(t), are calls and do not come here
         name = sympy_name(part)

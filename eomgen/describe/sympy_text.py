@@ -1,4 +1,4 @@
-"""Stage describe, SymPy -> names and texts: what a model calls its names, and how a model file writes expressions."""
+"""What a model calls its names, and how a model file writes expressions."""
 
 from __future__ import annotations
 

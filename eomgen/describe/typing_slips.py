@@ -1,4 +1,4 @@
-"""Stage describe, slips: a text that is no expression, as a person types it -> what is wrong with it and what to write.
+"""A text that is no expression, as a person types it -> what is wrong with it and what to write.
 
 Only looked at once a text has been refused: nothing here decides what an expression is.
 """

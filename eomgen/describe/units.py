@@ -1,4 +1,4 @@
-"""Stage describe, units: the text of a unit -> its dimension and how many SI units it is.
+"""The text of a unit -> its dimension and how many SI units it is.
 
 Words that are SI units without a prefix are known here.  Every other word is looked up with pint, which is imported
 then and not before.  The text is split into words and powers here, so that it is never run as code.

@@ -1,4 +1,4 @@
-"""Stage describe, values: numbers, texts and SymPy as the user gave them -> graph expressions, frames and markers.
+"""Numbers, texts and SymPy as the user gave them -> graph expressions, frames and markers.
 
 Every method notes what is wrong with a value as a fault at its path and returns a stand-in, so that one pass over a
 description finds all of its problems.

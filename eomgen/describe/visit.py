@@ -1,4 +1,4 @@
-"""Stage describe, visits: a description of texts and numbers -> a copy in which scalars, markers and names are changed.
+"""A description of texts and numbers -> a copy in which scalars, markers and names are changed.
 
 The kind of each key says what it holds (:meth:`~eomgen.elements.kinds.Field.map`), so a change states only what it does
 to a scalar, a marker, a coordinate.  What does not have the form of its key stays as it is; the check of the model

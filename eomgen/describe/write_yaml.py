@@ -1,4 +1,4 @@
-"""Stage describe, writing: Description -> the text of a model file that reads back as the same model."""
+"""Description -> the text of a model file that reads back as the same model."""
 
 from __future__ import annotations
 

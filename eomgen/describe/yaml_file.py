@@ -1,4 +1,4 @@
-"""Stage describe, model files: YAML 1.2 -> Description, without SymPy; every fault says its file and line."""
+"""YAML 1.2 -> Description, without SymPy; every fault says its file and line."""
 
 from __future__ import annotations
 

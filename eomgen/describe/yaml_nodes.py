@@ -1,4 +1,4 @@
-"""Stage describe, YAML: the text of a model file -> plain values, with the line of every dotted path.
+"""The text of a model file -> plain values, with the line of every dotted path.
 
 Only what a model file needs is read: mappings with plain keys, sequences and scalars of YAML 1.2.  Anchors, aliases,
 tags and duplicate keys are refused; size, depth and number of nodes are bounded.

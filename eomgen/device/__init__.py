@@ -1,1 +1,1 @@
-"""Stage device: batches and ensembles of a model on a GPU; text of device code and arrays -> results."""
+"""Batches and ensembles of a model on a GPU; text of device code and arrays -> results."""

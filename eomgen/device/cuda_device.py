@@ -1,4 +1,4 @@
-"""Stage device: a GPU of NVIDIA through cuda-core: compilation by NVRTC, memory, copies, kernels."""
+"""A GPU of NVIDIA through cuda-core: compilation by NVRTC, memory, copies, kernels."""
 
 from __future__ import annotations
 

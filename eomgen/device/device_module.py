@@ -1,4 +1,4 @@
-"""Stage device: the text of a model and a device -> its functions for many states at once, and its runs."""
+"""The text of a model and a device -> its functions for many states at once, and its runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base.value_rules import read_count
 from ..errors import cannot, ill_shaped, ill_typed, incomplete, no_choice, no_such
-from ..runtime.given_start import Span
+from ..runtime.trajectory import Span
 from ..simulation.run_arguments import check_method, check_tolerances, declare, find_span, ordered_times, own_step
 from ..targets import TIMED_ON_DEVICE
 from .cuda_device import Array, Device, DeviceArray

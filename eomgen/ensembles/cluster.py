@@ -17,13 +17,12 @@ from ..base.algebra import Array
 from ..base.files import MANIFEST, read_entry
 from ..base.value_rules import as_count
 from ..errors import MissingDependencyError, ToolchainError, UsageError, bad_file, cannot, ill_typed
+from ..runtime.argument_checks import require
 from ..runtime.late import eager
-from ..runtime.near_names import require
 from ..runtime.pickling import processor_features, restore
 from .block import LOST, MEANING, Plan, RunBlock, find_events
 from .given_cases import Cases
-from .reductions import Custom, Reduction
-from .run_blocks import RUNS, Kept, keep, reduce_block
+from .run_blocks import RUNS, Custom, Kept, Reduction, keep, reduce_block
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -15,13 +15,13 @@ from ..base.notation import TIME, Notation, label
 from ..base.texts import html_table, html_text
 from ..base.value_rules import read_count
 from ..errors import UsageError, bad_file, cannot, off_range
-from ..runtime.near_names import require, unknown
-from ..runtime.origin import origin, plain, spell_input
+from ..runtime.argument_checks import require, unknown
+from ..runtime.identity import origin, plain, spell_input
 from ..runtime.storage import attributes, free
 from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .given_cases import Cases
-from .reductions import KeptStates, Reduction, Statistics, names_of, summarise, with_outputs
+from .run_blocks import KeptStates, Reduction, Statistics, names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
     import pandas

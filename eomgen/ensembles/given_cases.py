@@ -16,12 +16,11 @@ from ..base.algebra import Array
 from ..base.names import place_of_marker
 from ..base.value_rules import read_count
 from ..errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
+from ..runtime.argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
 from ..runtime.assembled import initial_of
-from ..runtime.given_start import last_state
 from ..runtime.late_start import fixed_told, late_values, tell_fixed
-from ..runtime.near_names import check_names, require_mapping, without_dots
 from ..runtime.refusals import require_switched
-from ..runtime.room import read_axis, read_numbers, require_room
+from ..runtime.trajectory import last_state
 from ..simulation.events import at_next_samples, require_agreement
 from ..simulation.run_arguments import find_state
 

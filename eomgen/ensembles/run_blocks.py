@@ -1,23 +1,191 @@
-"""All blocks of an ensemble -> what is kept of each: on threads, and in files of a folder."""
+"""All blocks of an ensemble -> what is kept of each: states, samples, statistics; on threads, and in files."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..base.algebra import Array
 from ..base.files import as_path, open_plain, remove_parts, write_whole
-from ..errors import UsageError, bad_data, bad_file
-from ..runtime.arrays import BROKEN, read_arrays, sealed
-from .block import COUNTS, Plan, RunBlock, run_block
+from ..base.texts import shown
+from ..errors import UsageError, bad_data, bad_file, ill_typed, no_choice
+from ..runtime.storage import BROKEN, read_arrays, sealed
+from .block import COUNTS, EVENT, Plan, RunBlock, inputs_at, run_block
 from .given_cases import Cases
-from .reductions import GRAIN, Arrays, Reduction
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+
+# -- reductions --------------------------------------------------------------------------------------------------------
+
+# A reduction turns a block into named arrays and joins those of all blocks in the order of the runs, so that the result
+# does not depend on which was ready first.
+
+
+Arrays = dict[str, Any]
+GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
+
+
+class Reduction(Protocol):
+    """How blocks are boiled down."""
+
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays: ...
+    def join(self, parts: Sequence[Arrays]) -> Arrays: ...
+
+
+class KeptStates:
+    """The last states, the samples where times were asked for, and the events.
+
+    Parameters
+    ----------
+    kept : sequence of str
+        Which of them.
+    """
+
+    def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
+        self.kept = tuple(kept)
+
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+        """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
+        return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """Side by side."""
+        return {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
+
+
+class Statistics:
+    """Count, mean, variance, least and greatest of every state and output over the runs that got there.
+
+    Means and variances of blocks are merged as in T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the
+    sample variance, The American Statistician 37 (1983).
+    """
+
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+        """count, mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
+        if plan.t_eval is None or block.samples is None:
+            ended = (block.status == 0) | (block.status == EVENT)
+            states, times = np.where(ended, block.x, np.nan)[:, None, :], block.t[None]
+        else:
+            states, times = block.samples, np.repeat(plan.t_eval[:, None], cases.count, axis=1)
+        grains = []
+        values = [with_outputs(module, cases, plan, states[:, j], t) for j, t in enumerate(times)]
+        for start in range(0, cases.count, GRAIN):
+            parts = [summarise(x[:, start : start + GRAIN]) for x in values]
+            grains.append({name: np.stack([part[name] for part in parts], axis=-1) for name in parts[0]})
+        return {name: np.stack([grain[name] for grain in grains]) for name in grains[0]}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """One grain after the other, and the variance at the end."""
+        grains = [{name: rows[g] for name, rows in part.items()} for part in parts for g in range(len(part["count"]))]
+        total = grains[0]
+        for grain in grains[1:]:
+            total = merge(total, grain)
+        count = total["count"]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            variance = np.where(count > 1, total["squares"] / (count - 1.0), np.nan)
+        return {**{name: total[name] for name in ("count", "mean", "least", "greatest")}, "variance": variance}
+
+
+class Custom:
+    """What a user's function makes of each block.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(block)`` with a :class:`~.block.RunBlock` -> a mapping of names to arrays.
+    """
+
+    def __init__(self, function: Callable[[RunBlock], Mapping[str, Any]]) -> None:
+        self.function = function
+
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+        """As the function says."""
+        made = self.function(block)
+        if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
+            raise ill_typed(f"the function of reduce must return a mapping of names to arrays, not {made!r}")
+        return {f"made_{name}": np.asarray(value) for name, value in made.items()}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """A list of what was made of each block, for each name."""
+        names = dict.fromkeys(name for part in parts for name in part)
+        return {name.removeprefix("made_"): [part[name] for part in parts if name in part] for name in names}
+
+
+WANTED = "reduce must be 'states', 'statistics', 'events' or a function of a block"
+
+
+def choose_reduction(reduce: Any) -> Reduction:
+    """The reduction that a user names: None or 'states', 'statistics', 'events', or a function of a block."""
+    if callable(reduce):
+        return Custom(reduce)
+    if reduce is not None and not isinstance(reduce, str):
+        raise ill_typed(f"{WANTED}, not {shown(reduce)}")
+    if reduce in (None, "states"):
+        return KeptStates()
+    if reduce == "events":
+        return KeptStates(["notes"])
+    if reduce == "statistics":
+        return Statistics()
+    raise no_choice(f"{WANTED}, not {reduce!r}")
+
+
+def with_outputs(module: BoundModel, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:
+    """States (n_x, k) at times (k,) with their outputs, as ``names_of`` has them; NaN where one cannot be evaluated."""
+    further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
+    if not further:
+        return x
+    y = np.full((module.n_y, x.shape[1]), np.nan)
+    good = np.flatnonzero(np.isfinite(x).all(axis=0))
+    if not good.size:
+        return np.concatenate([x, y[further]])
+    outputs, u = module.kernels.timed("outputs", nan=True), inputs_at(module, cases, plan, t, x)
+    if cases.p.ndim == 1:
+        y[:, good] = outputs(t[good], x[:, good], p=cases.p, u=np.ascontiguousarray(u[:, good]))
+    else:
+        for k in good:
+            y[:, k] = outputs(float(t[k]), x[:, k], p=cases.column(int(k))["p"], u=u[:, k])
+    return np.concatenate([x, y[further]])
+
+
+def names_of(module: BoundModel) -> tuple[str, ...]:
+    """States, then the outputs that do not repeat a coordinate."""
+    return (*module.x_names, *(name for name in module.y_names if name not in module.x_names))
+
+
+def summarise(values: Array) -> Arrays:
+    """Count, mean, sum of squared deviations, least and greatest (n,) over what is finite in each row."""
+    finite = np.isfinite(values)
+    count = finite.sum(axis=1)
+    some = count > 0
+    mean = np.where(some, np.where(finite, values, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)
+    squares = (np.where(finite, values - np.where(some, mean, 0.0)[:, None], 0.0) ** 2).sum(axis=1)
+    least = np.where(finite, values, np.inf).min(axis=1, initial=np.inf)
+    greatest = np.where(finite, values, -np.inf).max(axis=1, initial=-np.inf)
+    extremes = {"least": np.where(some, least, np.nan), "greatest": np.where(some, greatest, np.nan)}
+    return {"count": count, "mean": mean, "squares": np.where(some, squares, np.nan), **extremes}
+
+
+def merge(one: Arrays, other: Arrays) -> Arrays:
+    """Both together."""
+    a, b = one["count"], other["count"]
+    total = np.maximum(a + b, 1)
+    gap = other["mean"] - one["mean"]
+    mean, squares = one["mean"] + gap * (b / total), one["squares"] + other["squares"] + gap**2 * (a * b / total)
+    return {
+        "count": a + b,
+        "mean": np.where(a == 0, other["mean"], np.where(b == 0, one["mean"], mean)),
+        "squares": np.where(a == 0, other["squares"], np.where(b == 0, one["squares"], squares)),
+        "least": np.fmin(one["least"], other["least"]),
+        "greatest": np.fmax(one["greatest"], other["greatest"]),
+    }
+
+
+# -- runs and files ----------------------------------------------------------------------------------------------------
 
 
 # -- finished blocks in files ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Stage runtime: Module, many initial values, parameters and inputs -> Ensemble."""
+"""Module, many initial values, parameters and inputs -> Ensemble."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike
 
 from ..base.value_rules import read_count
 from ..errors import bad_data, ill_typed, no_choice, untrue
-from ..runtime.given_start import Span
+from ..runtime.argument_checks import check_names, require_room, require_steps, without_dots
 from ..runtime.inputs import Forcing, Signal, fill_rates, rate_pairs
-from ..runtime.near_names import check_names, without_dots
 from ..runtime.refusals import refuse_moreau, refuse_rigid
-from ..runtime.room import require_room, require_steps
+from ..runtime.trajectory import Span
+from ..simulation.bound_run import Progress, wanted
 from ..simulation.compiled import can_run
 from ..simulation.events import require_forward
-from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import (
     check_method,
     check_tolerances,
@@ -33,8 +32,7 @@ from ..simulation.run_arguments import (
 from .block import LOST, Plan, find_events
 from .ensemble import Ensemble
 from .given_cases import Cases, collect_cases, grid_axes, spread_grid
-from .reductions import GRAIN, Reduction, choose_reduction
-from .run_blocks import RUNS, Kept, choose_size, run_local, split, stored_length
+from .run_blocks import GRAIN, RUNS, Kept, Reduction, choose_reduction, choose_size, run_local, split, stored_length
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,9 +1,7 @@
-"""Stage equations: Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
+"""Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
 from . import amalgamated, augmented, embedding, gibbs_appell, hamilton, lagrange, newton_euler, recursive
-from .armature import with_armature
-from .given import GIVEN, take_given
-from .tree_equations import Method, TreeEquations
+from .tree_equations import GIVEN, Method, TreeEquations, take_given, with_armature
 
 METHODS: dict[str, Method] = {
     "embedding": with_armature(embedding.derive),

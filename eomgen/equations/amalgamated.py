@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> absolute accelerations, joint accelerations and reactions in one sparse linear system.
+"""Kinematics -> absolute accelerations, joint accelerations and reactions in one sparse linear system.
 
 The amalgamated formulation (Shabana, Computational Dynamics, sec. 7.8: recursive methods, "amalgamated formulations"):
 nothing is eliminated, so that every coefficient is simple and most are zero.  Unknowns are the six accelerations of
@@ -11,9 +11,8 @@ from __future__ import annotations
 from ..graph.core import Expr
 from ..graph.spatial import scaled, sub
 from ..kinematics import Kinematics
-from ..kinematics.typical_sizes import Units
-from .free_bodies import FreeBodies, cut_joints
-from .free_body_system import Forces, Unknowns, free_body_equations
+from ..kinematics.constraint_functions import Units
+from .free_bodies import Forces, FreeBodies, Unknowns, cut_joints, free_body_equations
 from .tree_equations import LinearSystem, TreeEquations
 
 

@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> T, V and the forces without a potential, what analytical mechanics starts from."""
+"""Kinematics -> T, V and the forces without a potential, what analytical mechanics starts from."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 from ..frames import GROUND
 from ..graph import vectors as vec
-from ..graph.core import Expr
-from ..graph.count import count
+from ..graph.core import Expr, substitute
 from ..graph.differentiate import gradient, jvp, vjp
 from ..graph.rounding_bounds import vanishing
-from ..graph.substitute import substitute
+from ..graph.schedule import count
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 

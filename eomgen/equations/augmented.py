@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> the augmented form, accelerations and multipliers in one system of index 1.
+"""Kinematics -> the augmented form, accelerations and multipliers in one system of index 1.
 
 [M C_q^T; C_q 0] [a; l] = [-h; -gamma] (Shabana, Computational Dynamics, sec. 6.2 ff., augmented formulation).  Where
 Baumgarte's stabilisation is on, gamma holds 2 alpha C' + beta^2 C too, and states are not projected
@@ -12,11 +12,10 @@ from dataclasses import replace
 
 from ..graph.core import Expr
 from ..kinematics import Kinematics
+from ..kinematics.constraint_functions import Units
 from ..kinematics.loops import Constraints
-from ..kinematics.typical_sizes import Units
 from . import embedding, lagrange
-from .armature import with_armature
-from .tree_equations import LinearSystem, TreeEquations
+from .tree_equations import LinearSystem, TreeEquations, with_armature
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

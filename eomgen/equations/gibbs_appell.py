@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> TreeEquations by the equations of Gibbs and Appell.
+"""Kinematics -> TreeEquations by the equations of Gibbs and Appell.
 
 dS/da = Q with the energy of acceleration S = sum (m a_c . a_c + alpha . J alpha) / 2 + alpha . (omega x J omega) over
 the bodies, terms without accelerations left out (P. Appell, Sur une forme generale des equations de la dynamique, 1900;
@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from ..frames import GROUND
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute
 from ..graph.differentiate import gradient, jacobian, vjp
-from ..graph.substitute import substitute
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from .tree_equations import TreeEquations

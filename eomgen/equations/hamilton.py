@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> TreeEquations by Hamilton's canonical equations.
+"""Kinematics -> TreeEquations by Hamilton's canonical equations.
 
 q' = dH/dp, p' = -dH/dq + Q with H(q, p, t) = (p - b) . M^-1 (p - b) / 2 - T_0 + V, where T = v . M v / 2 + b . v + T_0
 (Shabana, Computational Dynamics, sec. 4.11; Goldstein, Classical Mechanics, 3rd ed., sec. 8.1).  Momenta are dL/dv.
@@ -16,7 +16,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from ..kinematics.loads import drive_inertias
+from ..kinematics.wrenches import drive_inertias
 from .analytical import form_energies, generalized_forces
 from .tree_equations import TreeEquations
 

@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> TreeEquations by Lagrange's equations, differentiated on the graph.
+"""Kinematics -> TreeEquations by Lagrange's equations, differentiated on the graph.
 
 d/dt (dT/dv) - dT/dq + dV/dq = Q (Shabana, Computational Dynamics, sec. 4.4 ff.).  T and V come from the velocity
 recursion and are linear in the number of bodies; one reverse gradient and one forward derivative keep the equations

@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> Newton-Euler equations in absolute accelerations and the reactions of all joints.
+"""Kinematics -> Newton-Euler equations in absolute accelerations and the reactions of all joints.
 
 Every body is set free and every joint, of the tree and cut ones alike, replaced by its reaction (Shabana,
 Computational Dynamics, ch. 3 and sec. 7.6).  Unknowns are the six accelerations of each body, the six components of
@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from ..graph.core import Expr
 from ..graph.spatial import add, dot, scaled, sub
-from ..graph.symmetric import solve_symmetric
+from ..graph.tensors import solve_symmetric
 from ..kinematics import Kinematics
-from ..kinematics.typical_sizes import Units
-from .free_bodies import FreeBodies, cut_joints
-from .free_body_system import Forces, Unknowns, free_body_equations
+from ..kinematics.constraint_functions import Units
+from .free_bodies import Forces, FreeBodies, Unknowns, cut_joints, free_body_equations
 from .tree_equations import LinearSystem, TreeEquations
 
 

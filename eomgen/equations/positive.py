@@ -1,21 +1,101 @@
-"""Stage equations: mass matrix at configurations tried -> an error naming coordinates with no inertia behind them."""
+"""The mass matrix at configurations tried -> coordinates without inertia, digits that rounding leaves."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import correlated, safely_positive
-from ..base.limits.numbers import LEAST, TINY
+from ..base.limits.constraints import UNMOVED
+from ..base.limits.numbers import EPS, LEAST, TINY, WORTH_A_WORD
 from ..describe.mechanism import Mechanism
 from ..errors import EvaluationError, ModelError, PartitionError, Problem
-from ..graph.evaluate import compile_evaluator
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.evaluate import compile_evaluator, evaluate
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import ConstraintFunctions
 from ..kinematics.mobility import Mobility
-from ..numeric.partitions import partition
-from .idle import IdleMotion
+from ..numeric.ranks import partition
+from ..records import dataclass
 from .tree_equations import TreeEquations
+
+# -- motions that move no mass -----------------------------------------------------------------------------------------
+
+
+FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of a message
+
+
+@dataclass(frozen=True)
+class IdleMotion:
+    """Velocities (n,) that move no mass at a configuration.
+
+    Attributes
+    ----------
+    q : (n_q,) array
+    v : (n,) array
+        In the order of the freedoms.
+    what : str
+        "no inertia" or "negative inertia".
+    numbers : mapping of str to float
+        Parameters and inputs.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    what: str
+    numbers: Mapping[str, float]
+
+    def problem(self, kinematics: Kinematics) -> Problem:
+        """The fault, at the joint that moves the most."""
+        names, mechanism = kinematics.velocity_labels, kinematics.mechanism
+        v = self.v / np.abs(self.v).max()
+        involved = [j for j in np.argsort(-np.abs(v), kind="stable") if abs(v[j]) > FAINT]
+        largest = names[involved[0]]
+        spec = next((s for s in mechanism.joints if largest in (*s.coordinates, *s.velocities)), None)
+        section = "lagrangian" if mechanism.given is None else "equations"
+        path = f"joints.{spec.name}" if spec else f"{section}.{largest}"
+        shown = sorted(involved)
+        ratio = " : ".join(f"{v[j]:.3g}" for j in shown)
+        together = f"{', '.join(names[j] for j in shown)} at the rates {ratio}"
+        turning = self._turning(kinematics)
+        if not turning:
+            message = f"the motion of {together} has {self.what} behind it"
+            return mechanism.problem(path, message, "give the bodies it moves a mass or an inertia", "EG-NO-INERTIA")
+        bodies = "; ".join(f"{name!r} about ({', '.join(f'{x:.3g}' for x in axis)})" for name, axis in turning)
+        message = f"the motion of {together} has {self.what} behind it: it turns {bodies} in body axes"
+        name = turning[0][0]
+        remedy = f"give {name!r} an inertia about that axis, or a joint that does not turn it about that axis"
+        return mechanism.problem(path, message, remedy, "EG-NO-INERTIA")
+
+    def _turning(self, kinematics: Kinematics) -> list[tuple[str, Sequence[float]]]:
+        """Bodies that turn, and their axes in body axes."""
+        graph, motion = kinematics.graph, kinematics.motion
+        zero = dict.fromkeys(kinematics.velocity_names, 0.0)
+        values = {**self.numbers, "t": 0.0, **dict(zip(kinematics.names, map(float, self.q), strict=True)), **zero}
+        rates = dict(zip(kinematics.velocity_names, map(float, self.v), strict=True))
+        found: list[tuple[str, np.ndarray]] = []
+        for k, body in enumerate(kinematics.mechanism.bodies):
+            marker = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+            rotation = [x for row in motion.rotation(marker) for x in row]
+            expressions = kinematics.resolve([*motion.angular_velocity(marker), *rotation])
+            moving, still = (np.array(evaluate(expressions, values | part), dtype=float) for part in (rates, {}))
+            found.append((body.name, moving[3:].reshape(3, 3).T @ (moving[:3] - still[:3])))  # drivers turn bodies too
+        largest = max((float(np.linalg.norm(w)) for _, w in found), default=0.0)
+        return [(name, clean(w)) for name, w in found if np.linalg.norm(w) > max(FAINT * largest, UNMOVED)]
+
+
+def clean(axis: np.ndarray) -> list[float]:
+    """A direction of length 1 whose first component that counts is positive; rounding is left out."""
+    unit = np.round(axis / np.linalg.norm(axis), 9) + 0.0
+    first = unit[np.flatnonzero(unit)[0]]
+    return [float(x) + 0.0 for x in (unit if first > 0.0 else -unit)]
+
+
+# -- coordinates without inertia ---------------------------------------------------------------------------------------
+
 
 REMEDY = "give the body that it moves a mass or an inertia; for kinematics alone, check_inertia: note"
 SHOWN = 8  #: bodies that a message names
@@ -140,3 +220,57 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
             problems.append(m.problem(path, message, REMEDY, "EG-NO-INERTIA"))
     return problems
+
+
+# -- digits that rounding leaves ---------------------------------------------------------------------------------------
+
+# With B the motions of the degrees of freedom, B^T M B is a sum of terms of the size of D, the sums of B_ik^2 M_ii.
+# What rounding leaves undetermined along a motion is eps over the smallest eigenvalue of D^-1/2 B^T M B D^-1/2 (A. van
+# der Sluis, Numerische Mathematik 14, 1969; J. W. Demmel, K. Veselic, SIAM J. Matrix Anal. Appl. 13, 1992). Masses or
+# lengths that are far apart make it small: in some motion a heavy body moves little beside a light one, whose inertia
+# is lost in the sum. Methods that solve for the motion of every free body never form that sum.
+
+
+FREE = ("newton_euler", "amalgamated")  #: methods that never form the embedded mass matrix
+
+
+def note_lost_digits(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> str:
+    """A note where rounding takes more than half of the digits at every configuration tried; else empty."""
+    least = smallest_share(kinematics, mobility, tree)
+    if not least < WORTH_A_WORD:
+        return ""
+    kept = max(0, int(-np.log10(EPS / max(least, EPS))))
+    bodies = "" if kinematics.mechanism.lagrangian else f"; the methods {' and '.join(FREE)} keep all digits"
+    return (
+        f"masses or lengths differ so much in size that rounding leaves about {kept} of 16 digits of the accelerations "
+        f"(smallest share of inertia {least:.1g}){bodies}"
+    )
+
+
+def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> float:
+    """The smallest eigenvalue of the scaled embedded mass matrix, at the configuration where it is largest.
+
+    1 where there is no degree of freedom.
+    """
+    m, names = kinematics.mechanism, kinematics.velocity_labels
+    n, r = len(names), mobility.rank
+    if n == r or m.negative:
+        return 1.0
+    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
+    functions = ConstraintFunctions(kinematics, numbers)
+    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
+    scales = functions.scales.q
+    independent = [names.index(name) for name in mobility.independent]
+    best = 0.0
+    for sample in mobility.samples:
+        q = np.array(sample)
+        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
+        try:
+            B = partition(functions.scaled_jacobian(q), r, independent).B if functions.m else np.eye(n)
+            root = np.sqrt(np.maximum((B**2 * np.abs(M.diagonal())[:, None]).sum(axis=0), TINY))
+            best = max(best, float(algebra.eigvalsh((B.T @ M @ B) / np.outer(root, root))[0]))
+        except EvaluationError:
+            continue  # rank is lost here, or nothing is finite
+        if best >= WORTH_A_WORD:
+            break
+    return best

@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> TreeEquations by the articulated-body method, linear in the number of bodies.
+"""Kinematics -> TreeEquations by the articulated-body method, linear in the number of bodies.
 
 Featherstone, Rigid Body Dynamics Algorithms (2008), ch. 5 and 7, in link axes.  Linear accelerations are those of the
 links' origins, gravity subtracted, so that linear velocities never appear.
@@ -13,17 +13,29 @@ from functools import partial
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from ..graph.count import count
+from ..graph.schedule import count
 from ..graph.spatial import Twist, Wrench, add, dot, scaled
 from ..kinematics import Kinematics
-from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.joint_rates import JointRates, joint_rates
-from ..kinematics.link_axes import SlidingTriple, falling, turn_back, turn_forces, turn_links
-from ..kinematics.link_inertia import SpatialInertia
-from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
-from ..kinematics.regroup import regroup
-from .articulated import ArticulatedBodies, ConstraintRow, TreeMotion
-from .composite_bodies import composite_mass_matrix
+from ..kinematics.link_frames import (
+    JointRates,
+    SlidingTriple,
+    falling,
+    joint_rates,
+    regroup,
+    turn_back,
+    turn_forces,
+    turn_links,
+)
+from ..kinematics.tree import SpatialInertia
+from ..kinematics.wrenches import (
+    applied_wrenches,
+    coordinate_forces,
+    drive_inertias,
+    drives_cut_joint,
+    kinetic_energy,
+    potential_energy,
+)
+from .recursions import ArticulatedBodies, ConstraintRow, TreeMotion, composite_mass_matrix
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]

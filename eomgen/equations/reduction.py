@@ -1,4 +1,4 @@
-"""Stage equations: tree equations, constraints -> the embedded system in the independent coordinates, as expressions.
+"""Tree equations, constraints -> the embedded system in the independent coordinates, as expressions.
 
 M_e = B^T M B and f_e = -B^T (h + M a) with v = B v_i and v' = B v_i' + a (Shabana, sec. 5.7).  For reading: compiled
 modules eliminate numerically with pivoting.  Here the pivots are fixed, chosen by their size at the reference.

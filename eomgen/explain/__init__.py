@@ -1,4 +1,4 @@
-"""Stage explain: derived equations -> the worked solution as HTML, Markdown, LaTeX or PDF.
+"""Derived equations -> the worked solution as HTML, Markdown, LaTeX or PDF.
 
 Every formula comes from :mod:`eomgen.reading`, is printed by :mod:`eomgen.base.notation`, and is compared with the
 compiled module at the end.

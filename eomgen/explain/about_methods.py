@@ -1,4 +1,4 @@
-"""Stage explain, sections: the steps of each method of derivation, from the motion to the equations."""
+"""The steps of each method of derivation, from the motion to the equations."""
 
 from __future__ import annotations
 

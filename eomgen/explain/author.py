@@ -1,4 +1,4 @@
-"""Stage explain, the author: equations and a level -> formulas in their notation, with a record of what was shown."""
+"""Equations and a level -> formulas in their notation, with a record of what was shown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sympy
 from ..base.notation import literal, with_instance
 from ..errors import UnavailableError
 from ..graph.core import Expr
-from ..kinematics.state import acceleration_name
+from ..kinematics.topology import acceleration_name
 from ..reading import Quantities, ReadingView
 from ..reading.quantities import Written, needed, write
 from .document import Folded, FormulaLine, Piece, Printer, PutIn, Sentence

@@ -1,4 +1,4 @@
-"""Stage explain, comparison: shown formulas through SymPy at random consistent states, against the module."""
+"""Shown formulas through SymPy at random consistent states, against the module."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ import sympy
 from ..base import algebra
 from ..base.limits.numbers import ALIKE, EPS, ROUNDED
 from ..errors import EomgenError
-from ..graph.core import Expr
+from ..graph.core import Expr, symbols_of
 from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
-from ..graph.substitute import symbols_of
-from ..kinematics.state import acceleration_name
+from ..kinematics.topology import acceleration_name
 from ..runtime.constrained import multipliers
 from .author import Author
 

@@ -1,4 +1,4 @@
-"""Stage explain, the document: headings, sentences, formulas, tables and pictures, as every writer takes them."""
+"""Headings, sentences, formulas, tables and pictures, as every writer takes them."""
 
 from __future__ import annotations
 

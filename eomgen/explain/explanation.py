@@ -1,4 +1,4 @@
-"""Stage explain, the whole: equations -> the worked solution, in sections, and its HTML, Markdown and LaTeX."""
+"""Equations -> the worked solution, in sections, and its HTML, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.files import write_whole
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
-from ..graph.pair_calls import opaque_names
+from ..graph.pairs import opaque_names
 from .document import DrawnPicture, Folded, Piece, Printer, Section
 from .writers import write_html, write_markdown, write_tex
 

@@ -1,4 +1,4 @@
-"""Stage explain, sections: the mechanism, its motion, its forces, and the formulas line by line at one state."""
+"""The mechanism, its motion, its forces, and the formulas line by line at one state."""
 
 from __future__ import annotations
 
@@ -555,7 +555,7 @@ def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
 
 
 def _acceleration_names(eqs: Any) -> list[str]:
-    from ..kinematics.state import acceleration_name
+    from ..kinematics.topology import acceleration_name
 
     return [acceleration_name(name) for name in eqs.kinematics.velocity_names]
 

@@ -1,4 +1,4 @@
-"""Stage explain, writers: sections -> a page of HTML, Markdown or LaTeX."""
+"""Sections -> a page of HTML, Markdown or LaTeX."""
 
 from __future__ import annotations
 

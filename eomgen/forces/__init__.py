@@ -6,7 +6,7 @@ from . import (
     attraction,
     bushing,
     contact,
-    contact_groups_read,
+    contact_groups,
     creep,
     friction,
     laws,
@@ -17,28 +17,25 @@ from . import (
 )
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
-from .bristles import LuGre
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
 from .contact_shapes import ContactShape
 from .creep import Creep
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import JointFriction
-from .friction_laws import BrownMcPhee, Friction
+from .friction import JointFriction, ReactionFriction
+from .friction_laws import BrownMcPhee, Friction, LuGre
 from .laws import GeneralElement
 from .muscle import Muscle
 from .normal_laws import DampedLinear, HuntCrossley, NormalLaw
-from .paths import JointCoordinate, Line, Path, Turn
-from .reaction_friction import ReactionFriction
-from .routes import Route
+from .paths import JointCoordinate, Line, Path, Route, Turn
 from .springs import Damper, Spring
 from .stops import JointStop
 from .tyres import Tyre
 
 FORCES: Types = {}
 _HOMES = (
-    *(actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups_read, muscle, creep),
+    *(actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups, muscle, creep),
     tyres,
 )
 for _home in _HOMES:

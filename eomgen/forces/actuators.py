@@ -15,8 +15,7 @@ from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, View
-from .paths import ON_JOINT, PathForce, read_coordinate
-from .routes import ANYWHERE
+from .paths import ANYWHERE, ON_JOINT, PathForce, read_coordinate
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,8 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .bristles import UNIT, LuGre
-from .dry_friction import DryFriction, Slip
 from .force import Force, Load, MarkerLoad, Measured, View
-from .friction_laws import FRICTION, FRICTION_CHOICE, has_bristles, read_friction
+from .friction_laws import FRICTION, FRICTION_CHOICE, UNIT, DryFriction, LuGre, Slip, has_bristles, read_friction
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, PartlyDamped, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.

@@ -15,18 +15,15 @@ import numpy as np
 from ..base.limits.contacts import ASTRAY, FOOT, STEEP
 from ..base.limits.runs import BEYOND, UP_TO
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, sqrt
+from ..graph.core import Expr, Graph, reachable, sqrt, substitute
 from ..graph.differentiate import gradient
-from ..graph.substitute import substitute
-from ..graph.traverse import reachable
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.user_functions import Surface
 from ..records import dataclass
-from .branches import where
 from .contact import Contact, Touch
 from .contact_ellipsoids import quadratic_form
 from .contact_rounds import seen_from, settled
-from .force import View
+from .force import View, where
 
 #: Symbols of a place in the expression of a height, and the names by which texts know them.
 PLACES = {"x": "x[height]", "y": "y[height]"}

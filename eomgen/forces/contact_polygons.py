@@ -25,10 +25,9 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..numeric.polygon_edges import FACING, OWN
 from ..records import dataclass
-from .branches import where
 from .contact import Contact, Touch
 from .contact_profiles import Point, dot, minus, times, unit
-from .force import View
+from .force import View, where
 from .normal_laws import NormalLaw, PartOfLaw
 
 _PARALLEL = 0.25  #: part of the squared half angle to a neighbour up to which edges count as parallel

@@ -1,24 +1,32 @@
-"""Force elements, contact with a profile in the plane: points of ground -> pieces, and how a circle touches a piece.
-
-A piece owns the points whose nearest point of the profile it holds, those between the bisectors at its ends, and where
-a neighbour turns towards it all that it faces.  So a circle meets one piece, or several where it bridges a valley.
-"""
+"""Contact with profiles and closed outlines in the plane -> where they touch, how parts overlap."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
 
+import numpy as np
+
+from ..base.limits.contacts import EVEN, FLAT_CORNER, ROOM, SHARED
 from ..frames import Frame
 from ..graph import vectors as vec
-from ..graph.core import Expr, sqrt
+from ..graph.core import Expr, cos, sin, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.outline_pieces import PIECE
 from ..records import dataclass
-from .branches import where
 from .contact import Contact, Touch
-from .force import View
+from .force import View, where
+
+# -- profiles ----------------------------------------------------------------------------------------------------------
+
+# A piece owns the points whose nearest point of the profile it holds, those between the bisectors at its ends, and
+# where a neighbour turns towards it all that it faces. So a circle meets one piece, or several where it bridges a
+# valley.
+
 
 Point = tuple[Expr, Expr]
 WALLS = 7  #: place among the sizes of an edge of whether it is felt beside its neighbours
@@ -340,3 +348,341 @@ class ArcRound(SurfaceRound):
         q = sqrt(where(apart, square, 1.0))
         gap = (2.0 * y - k * (x * x + y * y)) / (1.0 + q)
         return self._touching(view, gap, (-k * x / q, up / q), reach)
+
+
+# -- closed outlines ---------------------------------------------------------------------------------------------------
+
+# The overlap of a circle of radius R about c with the solid S has the energy
+#
+#     V(c) = integral of E'(R - r) n(r) over r from 0 to R, n(r) the number of separate parts of S within r of c,
+#
+# and E(R + d) - E(R) more where c is d inside. A part begins at each place of the outline that is nearest to c among
+# those beside it, where it adds E(R - r); two grow together at each that is farthest, where -E(R - r) is added. So the
+# energy is continuous: where a place that is nearest meets one that is farthest both have the same r, and the number of
+# parts within r of c changes with c as continuously as distances do (Cohen-Steiner, Edelsbrunner and Harer, Stability
+# of persistence diagrams, 2007, of dimension 0). Forces are its slopes.
+#
+# Pieces of an outline add the parts (:mod:`.contact_profiles`). Here are the places where they grow together, inner
+# corners and far sides of hollow arcs, which act back with the elastic part of the law alone, and the nearest place for
+# centres that are deeper inside than pieces tell by themselves.
+
+
+_SAMPLES = 12  #: points of an arc at which the room inside is measured
+
+
+def notch(corner: Point, before: Point, after: Point, width: Expr) -> ProfilePart:
+    """The inner corner between two edges of given directions; its x axis points out of the solid.
+
+    Sizes: cosine and sine of half of the angle between the edges.
+    """
+    out = unit((-before[1] - after[1], before[0] + after[0]))
+    cosine, sine = dot(out, after), out[0] * after[1] - out[1] * after[0]
+    return ProfilePart("notch", corner, out, (cosine, -sine, width), width.graph.zero, False)
+
+
+def bowls(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
+    """The hollow arcs among some pieces, as far as numbers tell."""
+    arcs = [one for one in pieces if one.kind == "arc"]
+    return [one._replace(kind="bowl") for one in arcs if one.sizes[0].value is None or one.sizes[0].value > 0.0]
+
+
+def notches(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
+    """The inner corners among some corners, as far as numbers tell."""
+    found = [one for one in pieces if one.kind == "notch"]
+    return [one for one in found if one.sizes[0].value is None or one.sizes[0].value > EVEN]
+
+
+def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
+    """Whether a circle of a radius that is known never holds a place where parts of its overlap grow together."""
+    if kind == "bowl":
+        bend = sizes[0].value
+        return radius.value is not None and bend is not None and radius.value * bend <= 1.0
+    return kind == "notch" and radius.is_zero
+
+
+def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
+    """Of each piece those that :mod:`~eomgen.numeric.outline_pieces` reads."""
+    found: list[Expr] = []
+    for one in pieces:
+        half, bend = (one.half, one.half.graph.zero) if one.kind == "edge" else (one.sizes[1], one.sizes[0])
+        found += [*one.origin, *one.along, half, bend]
+    return found
+
+
+def told_by_arcs(pieces: Sequence[ProfilePart]) -> float:
+    """How deep inside an outline of arcs every point has one nearest place, as far as numbers tell; else infinite.
+
+    It is the least radius of circles that touch the outline from inside and hold none of its points, |w|^2 / (2 w n)
+    with the way w between two points and the inward normal n at the first, over points of all arcs.
+    """
+    numbers = [[x.value for x in (*one.origin, *one.along, *one.sizes[:2])] for one in pieces if one.kind == "arc"]
+    if len(numbers) < len(pieces) or any(None in row for row in numbers):
+        return math.inf
+    x, y, c, s, bend, half = np.array(numbers, dtype=float).T[:, :, None]
+    part = (np.arange(_SAMPLES) + 0.5) * 2.0 / _SAMPLES - 1.0
+    angle = np.arcsin(np.clip(bend * half, -1.0, 1.0))
+    turn = np.where(angle == 0.0, FLAT_CORNER, angle)
+    along = half * np.sin(turn * part) / np.sin(turn)
+    up = along * np.tan(0.5 * turn * part)
+    nx, ny = np.sin(turn * part), -np.cos(turn * part)
+    place = np.stack([x + c * along - s * up, y + s * along + c * up]).reshape(2, -1)
+    normal = np.stack([c * nx - s * ny, s * nx + c * ny]).reshape(2, -1)
+    way = place[:, None, :] - place[:, :, None]
+    inward = 2.0 * (way * normal[:, :, None]).sum(axis=0)
+    ahead = inward > 0.0
+    return ROOM * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
+
+
+class NotchRound(ProfilePiece):
+    """At an inner corner that is farther from the centre than the edges beside it."""
+
+    def share(self, view: View) -> Expr:
+        x, y, _ = self._place(view)
+        cosine, sine, width, _ = self.sizes
+        first, second = part(sine * (x * cosine + y * sine), width), part(sine * (x * cosine - y * sine), width)
+        both = view.graph.apply("max", 0.0, first + second - 1.0)  # what the edges have more than one, flat ones too
+        return where(view.graph.apply("lt", 0.0, cosine), -both, 0.0)
+
+    def touch(self, view: View) -> Touch:
+        x, y, reach = self._place(view)
+        square = x * x + y * y
+        apart = view.graph.apply("lt", 0.0, square)
+        distance = sqrt(where(apart, square, 1.0))
+        normal = where(apart, x / distance, 1.0), where(apart, y / distance, 0.0)
+        return self._touching(view, where(apart, distance, 0.0), normal, reach)
+
+
+class BowlRound(ProfilePiece):
+    """At the far side of a hollow arc of curvature k, seen from beyond its centre.
+
+    It is (1 + q) / k away, q = |(k x, 1 - k y)|.
+    """
+
+    def share(self, view: View) -> Expr:
+        x, y, _ = self._place(view)
+        bend, half, rise, cosine, sine, width = self.sizes[:6]
+        left = (x + half) * cosine - (y - rise) * sine
+        right = (half - x) * cosine - (y - rise) * sine
+        return where(view.graph.apply("lt", 0.0, bend), -part(-left, width) * part(-right, width), 0.0)
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        x, y, reach = self._place(view)
+        hollow = graph.apply("lt", 0.0, self.sizes[0])
+        k = where(hollow, self.sizes[0], 1.0)
+        square = k * k * x * x + (k * y - 1.0) * (k * y - 1.0)
+        apart = graph.apply("lt", 0.0, square)
+        q = sqrt(where(apart, square, 1.0))
+        normal = where(apart, k * x / q, 0.0), where(apart, (k * y - 1.0) / q, 1.0)
+        return self._touching(view, (1.0 + where(apart, q, 0.0)) / k, normal, reach)
+
+
+@dataclass(frozen=True)
+class InsideRound(ProfilePiece):
+    """A circle whose centre is deep inside an outline: pushed out to the nearest place of its nearest piece."""
+
+    def share(self, view: View) -> Expr:
+        return self.sizes[PIECE + 1]
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        x, y, reach = self._place(view)
+        px, py, c, s, half, k, corner, deep = self.sizes
+        u, v = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)
+        sine = k * half
+        rise = half * sine / (1.0 + sqrt(graph.apply("max", 0.0, 1.0 - sine * sine)))
+        along, up = u + half, v - rise  # from its first corner
+        away = sqrt(where(graph.apply("lt", 0.5, corner), along * along + up * up, 1.0))
+        square = k * k * u * u + (1.0 - k * v) * (1.0 - k * v)
+        q = sqrt(where(graph.apply("lt", 0.0, square), square, 1.0))
+        gap = (2.0 * v - k * (u * u + v * v)) / (1.0 + q)
+        at_corner = graph.apply("lt", 0.5, corner)
+        nx, ny = where(at_corner, -along / away, -k * u / q), where(at_corner, -up / away, (1.0 - k * v) / q)
+        out = vec.times(view.rotation(self.first), (c * nx - s * ny, s * nx + c * ny, graph.zero))
+        depth = where(graph.apply("lt", 0.5, deep), self.radius + where(at_corner, away, -gap), -self.radius)
+        second = vec.scale(0.5 * depth - self.radius, out)
+        return out, depth, vec.add(reach, second), second
+
+
+# -- corners, curves, sprockets ----------------------------------------------------------------------------------------
+
+# Pieces are those of :mod:`.contact_profiles`, one after the other from left to right, or clockwise about a solid, and
+# the corners where two of them turn towards each other.
+
+
+Pair = tuple[float, float]
+
+
+def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
+    """Edges from point to point; the first and the last go on beyond their ends."""
+    width = SHARED * length(minus(points[-1], points[0]))
+    edges = [minus(b, a) for a, b in itertools.pairwise(points)]
+    ways = [unit(one) for one in edges]
+    sides = [None, *edges, None]
+    last = len(edges) - 1
+    found = [
+        edge(points[k], one, sides[k], sides[k + 2], width, walls=True, endless=(k == 1, k == last - 1))
+        for k, one in enumerate(edges)
+    ]
+    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
+
+
+def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
+    """Two circular arcs of one tangent from point to point (biarcs), and straight lines beyond the ends.
+
+    The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
+    circle; the arcs are those of equal tangent lengths (Bolton, 1975, Computer-Aided Design 7, 83-89).
+    """
+    width = SHARED * length(minus(points[-1], points[0]))
+    ways = _tangents(points)
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    ray = times(ways[0], length(first))
+    found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
+    for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
+        found += biarcs(a, b, s, t, width)
+    return beside_bowls([*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
+
+
+def _tangents(points: Sequence[Point]) -> list[Point]:
+    """Directions of the circles through each point and its neighbours."""
+    inner = [tangent(a, b, c) for a, b, c in zip(points, points[1:], points[2:], strict=False)]
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    return [_mirrored(inner[0], first), *inner, _mirrored(inner[-1], last)]
+
+
+def _mirrored(way: Point, chord: Point) -> Point:
+    """The tangent at the other end of a chord of a circle."""
+    c = unit(chord)
+    along = 2.0 * dot(way, c)
+    return along * c[0] - way[0], along * c[1] - way[1]
+
+
+def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
+    """Edges from point to point, clockwise."""
+    width = _width(points)
+    edges = [minus(b, a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    ways = [unit(one) for one in edges]
+    n = len(points)
+    found = [edge(points[k], edges[k], edges[k - 1], edges[(k + 1) % n], width, walls=True) for k in range(n)]
+    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(n)]
+
+
+def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
+    """Two circular arcs of one tangent from point to point, clockwise."""
+    width, n = _width(points), len(points)
+    ways = [tangent(points[k - 1], points[k], points[(k + 1) % n]) for k in range(n)]
+    found: list[ProfilePart] = []
+    for k in range(n):
+        found += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
+    return beside_bowls(found)
+
+
+class Tooth(NamedTuple):
+    """A seat of a sprocket on the x axis: where its arc ends on the side of y, its flank, and the corner of its tip."""
+
+    seat_end: Point
+    flank: Point
+    length: Expr
+    tip: Point
+
+
+def _tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Tooth:
+    c, s = cos(0.5 * angle), sin(0.5 * angle)
+    x, y = _pitch_radius(teeth, pitch) - seat * c, seat * s
+    along = x * s + y * c
+    flank = sqrt(along * along + tip * tip - (x * x + y * y)) - along
+    return Tooth((x, y), (s, c), flank, (x + flank * s, y + flank * c))
+
+
+def half_tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
+    """Half of the width of the teeth of a sprocket at their narrowest: at the tip, or between the seats.
+
+    Arcs that reach the line between neighbouring pins are nearest there, and the flanks part from it outwards.
+    """
+    corner, half = _tooth(teeth, pitch, seat, tip, angle).tip, math.pi / teeth
+    at_tip = corner[0] * math.sin(half) - corner[1] * math.cos(half)
+    return where(pitch.graph.apply("lt", math.pi - 2.0 * half, angle), 0.5 * pitch - seat, at_tip)
+
+
+def sprocket_ring(
+    teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr
+) -> tuple[list[ProfilePart], list[Point], list[Point]]:
+    """A wheel for a chain of pins: its pieces, its outer corners and points of its outline, all clockwise.
+
+    A seat is an arc about the place of a pin on the pitch circle, whose radius is pitch / (2 sin(pi / teeth)); straight
+    flanks go on from its ends to the tip circle (ISO 606, with the flank in place of its large arc).  The first seat
+    lies on the x axis.
+
+    Parameters
+    ----------
+    teeth : int
+    pitch : Expr
+        The straight distance between neighbouring pins (m).
+    seat : Expr
+        The radius of the seats (m).
+    tip : Expr
+        The radius of the tip circle (m).
+    angle : Expr
+        The seating angle, over which the arc of a seat goes (rad).
+    """
+    graph = pitch.graph
+    (x, y), (s, c), flank, end = _tooth(teeth, pitch, seat, tip, angle)
+    turns = [(math.cos(2.0 * math.pi * k / teeth), math.sin(2.0 * math.pi * k / teeth)) for k in range(teeth)]
+    step = (graph.constant(turns[1][0]), graph.constant(-turns[1][1]))
+    low, low_end = (x, -y), (end[0], -end[1])
+    across = minus(end, _turned(low_end, (step[0], -step[1])))  # along the tip before the first flank
+    over, down, up = unit(across), (-s, -c), (s, -c)
+    width = SHARED * (teeth * pitch)
+    tooth = [
+        edge(end, times(down, flank), over, down, width, walls=True),
+        arc((x, y), low, down, width),
+        edge(low, times(up, flank), up, _turned(over, step), width, walls=True),
+        edge(low_end, _turned(across, step), up, _turned(down, step), width, walls=True),
+    ]
+    line = [end, (x, y), (_pitch_radius(teeth, pitch) - seat, graph.zero), low, low_end]
+    pieces: list[ProfilePart] = []
+    places: list[Point] = []
+    for a, b in reversed(turns):
+        turn = (graph.constant(a), graph.constant(b))
+        pieces += [one._replace(origin=_turned(one.origin, turn), along=_turned(one.along, turn)) for one in tooth]
+        places += [_turned(point, turn) for point in line]
+    tops = [point for k, point in enumerate(places) if k % len(line) in (0, len(line) - 1)]
+    return beside_bowls(pieces), tops, places
+
+
+def _pitch_radius(teeth: int, pitch: Expr) -> Expr:
+    return pitch / (2.0 * math.sin(math.pi / teeth))
+
+
+def half_gap(points: Sequence[Pair]) -> float:
+    """Half of the least distance between edges of a closed outline that are no neighbours."""
+    n, least = len(points), math.inf
+    edges = [(points[k], points[(k + 1) % n]) for k in range(n)]
+    for i, j in itertools.combinations(range(n), 2):
+        if j - i in (1, n - 1):
+            continue
+        for one, (start, end) in ((edges[i], edges[j]), (edges[j], edges[i])):
+            least = min(least, *(_away(point, start, end) for point in one))
+    if n == 3:  # all are neighbours: the smallest height
+        least = min(_away(points[k - 1], *edges[k]) for k in range(3))
+    return 0.5 * least
+
+
+def _away(point: Pair, start: Pair, end: Pair) -> float:
+    """The distance of a point from a straight line between two others."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    run = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / (dx * dx + dy * dy)
+    run = min(1.0, max(0.0, run))
+    return math.hypot(point[0] - start[0] - run * dx, point[1] - start[1] - run * dy)
+
+
+def _width(points: Sequence[Point]) -> Expr:
+    """Over which neighbouring pieces share a circle."""
+    around = [length(minus(b, a)) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    return SHARED * reduce(lambda a, b: a + b, around)
+
+
+def _turned(point: Point, turn: Point) -> Point:
+    """Turned by an angle whose cosine and sine are given."""
+    c, s = turn
+    return c * point[0] - s * point[1], s * point[0] + c * point[1]

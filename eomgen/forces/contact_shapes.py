@@ -22,21 +22,27 @@ from ..graph.vectors import Vec3
 from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact_fields import field_lines
-from .contact_insides import bowls, notches, piece_numbers, told_by_arcs
-from .contact_outlines import smooth_pieces, smooth_ring, sprocket_ring, straight_pieces, straight_ring
 from .contact_profiles import (
     Point,
     ProfilePart,
     arc_points,
+    bowls,
     cross,
     length,
     minus,
+    notches,
     peaks,
+    piece_numbers,
+    smooth_pieces,
+    smooth_ring,
     solid_depth,
+    sprocket_ring,
+    straight_pieces,
+    straight_ring,
+    told_by_arcs,
 )
-from .contact_shape_fields import GROUNDS
-from .contact_solids import cuboid_parts
-from .contact_states import BED, BED_CELL, FIELD, INSIDE, WHEEL, ShapeParts, parts_of
+from .contact_rounds import cuboid_parts
+from .contact_states import BED, BED_CELL, FIELD, GROUNDS, INSIDE, WHEEL, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -79,7 +85,7 @@ class ContactShape:
     Attributes
     ----------
     kind : str
-        One of :data:`~.contact_shape_fields.SHAPE_FIELDS`.
+        One of :data:`~.contact_states.SHAPE_FIELDS`.
     sizes : tuple of Expr
         radius, and of a wheel on soil its width; length, radius; of a box or polygon x and y of its corners,
         counterclockwise; of a profile or an outline its depth and x and y of its points, of outlines clockwise; of a

@@ -15,8 +15,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .branches import beyond_zero, where
-from .force import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View, beyond_zero, where
 
 LAWS = ("linear", "vermeulen_johnson", "polach")
 

@@ -1,12 +1,9 @@
-"""Force elements: each a frozen class holding graph expressions and markers, asked for loads or a potential.
-
-A force element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.
-"""
+"""Force elements: each a frozen class of expressions and markers, asked for loads or a potential."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ..elements.looks import Seen
@@ -15,6 +12,27 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
+
+# -- one-sided laws ----------------------------------------------------------------------------------------------------
+
+
+def where(condition: Expr, yes: Expr | float, no: Expr | float) -> Expr:
+    """``yes`` where the condition holds, else ``no``."""
+    return condition.graph.apply("select", condition, yes, no)
+
+
+def beyond_zero(x: Expr, law: Callable[[Expr], Expr]) -> Expr:
+    """law(x) for x > 0, else 0.
+
+    Where x <= 0 the law sees 1, so that neither it nor its derivative has to exist there (a root of a negative number).
+    """
+    inside = x.graph.apply("lt", 0.0, x)
+    return where(inside, law(where(inside, x, 1.0)), 0.0)
+
+
+# -- the class ---------------------------------------------------------------------------------------------------------
+
+# A force element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.
 
 
 class View(Protocol):

@@ -10,13 +10,11 @@ from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.kinds import LAW, Fields, Scalar
 from ..elements.looks import LAW_BOX, LAW_RING, Seen
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute
 from ..graph.differentiate import gradient
-from ..graph.substitute import substitute
 from ..records import dataclass
 from .force import Load, View
-from .paths import BETWEEN, ON_JOINT, Path, PathForce, read_angle
-from .routes import VIA, read_joint_or_path
+from .paths import BETWEEN, ON_JOINT, VIA, Path, PathForce, read_angle, read_joint_or_path
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
 from .force import View
-from .paths import BETWEEN, PathForce
-from .routes import VIA, read_path
+from .paths import BETWEEN, VIA, PathForce, read_path
 
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
 # problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement,

@@ -12,7 +12,7 @@ from ..elements.entry import Entry
 from ..elements.kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
 from ..graph.core import Expr, sqrt
 from ..records import dataclass
-from .branches import beyond_zero
+from .force import beyond_zero
 
 _PRESSURE = FORCE.times(LENGTH, -2)
 

@@ -15,10 +15,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .branches import beyond_zero, where
 from .contact import Contact, Touch
 from .contact_shapes import SOLE
-from .force import Load, View
+from .force import Load, View, beyond_zero, where
 from .normal_laws import NormalLaw
 from .soil_laws import SoilPressure, SoilShear
 

@@ -11,9 +11,8 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, cos, sin, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .branches import beyond_zero, where
 from .contact import Contact, Touch
-from .force import Load, MarkerLoad, View
+from .force import Load, MarkerLoad, View, beyond_zero, where
 from .soil_laws import SoilPressure, SoilShear
 
 NODES = 8  #: of Gauss's rule on each of the two parts of the arc

@@ -12,8 +12,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..records import dataclass
 from .force import Load, View
-from .paths import ANGLE, COORDINATE, Line, PathForce
-from .routes import LINE
+from .paths import ANGLE, COORDINATE, LINE, Line, PathForce
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,14 @@
-"""Stage graph: scalar operations -> one hash-consed expression graph, with derivatives, values, counts and schedules.
+"""Scalar operations -> one hash-consed expression graph, with derivatives, values, counts and schedules.
 
-SymPy enters and leaves through :mod:`eomgen.graph.sympy_lower` and :mod:`eomgen.graph.sympy_raise`, which are not
+SymPy enters and leaves through :mod:`eomgen.graph.sympy_bridge` and :mod:`eomgen.graph.sympy_bridge`, which are not
 imported here, so that work without SymPy does not load it.
 """
 
 from . import vectors
-from .core import Expr, Graph, atan2, cos, sin, sqrt
-from .count import Operations, count, critical_path
+from .core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_of
 from .differentiate import gradient, jacobian, jvp, vjp
 from .evaluate import Evaluator, compile_evaluator, evaluate
-from .schedule import Chunk, chunk, order
-from .substitute import substitute, symbols_of
+from .schedule import Chunk, Operations, chunk, count, critical_path, order
 
 __all__ = [
     "Chunk",

@@ -1,4 +1,4 @@
-"""Stage graph: expressions and numbers -> their values, in NumPy; the oracle for every target.
+"""Expressions and numbers -> their values, in NumPy; the oracle for every target.
 
 Numbers are evaluated as Python floats, arrays with NumPy's broadcasting.  Nothing raises and nothing warns: a division
 by zero gives an infinity, a logarithm of a negative number NaN.  Both branches of ``select`` are evaluated and one is
@@ -14,9 +14,7 @@ import numpy as np
 
 from ..base.operations import OPERATIONS
 from ..errors import ill_shaped, incomplete
-from .core import Expr
-from .substitute import symbols_of
-from .traverse import common_graph, reachable
+from .core import Expr, common_graph, reachable, symbols_of
 
 Value = Any  # float or ndarray
 

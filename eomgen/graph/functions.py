@@ -1,4 +1,4 @@
-"""Stage graph: functions declared from outside (tables, native code) -> calls and derivatives of calls as nodes.
+"""Functions declared from outside (tables, native code) -> calls and derivatives of calls as nodes.
 
 A call is a node whose operation is the text ``name(orders)``: ``spring(0)`` is the value of the function ``spring`` of
 one argument, ``map(1,0)`` the derivative of ``map`` along its first.  The chain rule raises the orders.

@@ -1,4 +1,4 @@
-"""Stage graph: expressions and numbers -> values with bounds of their rounding; which expressions vanish identically.
+"""Expressions and numbers -> values with bounds of their rounding; which expressions vanish identically.
 
 Running error analysis (J. H. Wilkinson; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002,
 3.3): beside every value x stands a bound e such that x is known to about eps e.  A sum adds the bounds of its terms, so
@@ -14,11 +14,9 @@ import numpy as np
 
 from ..base.limits.numbers import CHANCE, ROUNDED
 from ..base.operations import OPERATIONS, operations_with, unit
-from .core import Expr, Graph
+from .core import LEAVES, Expr, Graph, common_graph, reachable, symbols_of
 from .differentiate import gradient
 from .evaluate import Evaluator, Value
-from .substitute import symbols_of
-from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
 
 TRIES = 3  #: random points at which an identity is tried

@@ -1,13 +1,122 @@
-"""Stage graph: expressions -> an order of evaluation with few live values, cut into chunks where few values cross."""
+"""Expressions -> their number of operations, an order of evaluation, a tape that a loop can play."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import field
 from itertools import pairwise
+from typing import Any
 
+from ..base.operations import ARITHMETIC, OPERATIONS, operations_with
+from ..errors import cannot
 from ..records import dataclass
-from .core import Expr, Graph
-from .traverse import LEAVES, common_graph, reachable
+from .core import LEAVES, Expr, Graph, common_graph, reachable
+from .pairs import pair_call
+
+# -- numbers of operations ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Operations:
+    """How many operations evaluate some expressions, each shared node counted once.
+
+    Attributes
+    ----------
+    multiplications, additions, divisions, negations : int
+        Subtractions are additions.
+    functions : mapping of str to int
+        sqrt, sin, pow, ... by name; a sum over pairs of shapes, its derivatives along a direction, ... once each.
+    choices : mapping of str to int
+        abs, sign, min, max, comparisons, logic and select by name.
+    """
+
+    multiplications: int = 0
+    additions: int = 0
+    divisions: int = 0
+    negations: int = 0
+    functions: Mapping[str, int] = field(default_factory=dict)
+    choices: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def total(self) -> int:
+        """Multiplications, additions and divisions together."""
+        return self.multiplications + self.additions + self.divisions
+
+    def __add__(self, other: Operations) -> Operations:
+        return Operations(
+            self.multiplications + other.multiplications,
+            self.additions + other.additions,
+            self.divisions + other.divisions,
+            self.negations + other.negations,
+            _sum(self.functions, other.functions),
+            _sum(self.choices, other.choices),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The counts as plain numbers and dicts, for a metadata file."""
+        return {
+            "multiplications": self.multiplications,
+            "additions": self.additions,
+            "divisions": self.divisions,
+            "negations": self.negations,
+            "functions": dict(self.functions),
+            "choices": dict(self.choices),
+        }
+
+
+def _sum(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
+    return {name: a.get(name, 0) + b.get(name, 0) for name in sorted({*a, *b})}
+
+
+def count(outputs: Sequence[Expr]) -> Operations:
+    """Count the distinct operations that the outputs are made of."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return Operations()
+    nodes = graph.nodes
+    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
+    found = _with_pairs(graph, found)
+    bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
+    return Operations(
+        multiplications=found["mul"] + found["absorb"],
+        additions=found["add"] + found["sub"],
+        divisions=found["div"],
+        negations=found["neg"],
+        functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
+        choices={k: found[k] for k in sorted(found.keys() & bends)},
+    )
+
+
+def _with_pairs(graph: Graph, found: Counter[str]) -> Counter[str]:
+    """The same, with sums over pairs of shapes under their names; that results are read from lists is no operation."""
+    calls = {name: call for name in found.keys() & graph.calls.keys() if (call := pair_call(graph, name)) is not None}
+    if not calls:
+        return found
+    rest = Counter({name: n for name, n in found.items() if name not in calls})
+    for name, call in calls.items():
+        if call.part not in ("item", "given"):
+            rest[f"pairs {call.function.element}({call.part})"] += found[name]
+    return rest
+
+
+def critical_path(outputs: Sequence[Expr]) -> int:
+    """Operations on the longest chain from a leaf to an output; every operation counts 1, negation 0."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return 0
+    nodes = graph.nodes
+    depth: dict[int, int] = {}
+    for i in reachable(graph, (y.id for y in outputs)):
+        node = nodes[i]
+        if node[0] in LEAVES:
+            depth[i] = 0
+        else:
+            depth[i] = max(depth[k] for k in node[1:]) + (node[0] != "neg")
+    return max(depth[y.id] for y in outputs)
+
+
+# -- order of evaluation -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -200,3 +309,49 @@ def chunk(
             )
         )
     return chunks
+
+
+# -- tapes -------------------------------------------------------------------------------------------------------------
+
+
+Instruction = tuple[str, int, int, int]
+#: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
+Tape = tuple[list[Instruction], list[float], list[int]]
+
+
+def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, int]]) -> Tape:
+    """One tape for several expressions.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+        Each of a graph of its own, or of the same.
+    place : callable
+        Name of a symbol -> its kind (``t``, ``x``, ``u``, ``p``) and index.
+
+    Raises
+    ------
+    UsageError
+        An expression calls a function that the model declares: a tape knows operations only.
+    """
+    code: list[Instruction] = []
+    numbers: list[float] = []
+    out: list[int] = []
+    for expression in expressions:
+        graph = expression.graph
+        found: dict[int, int] = {}
+        for i in reachable(graph, [expression.id]):
+            kind, *given = graph.nodes[i]
+            if kind == "const":
+                code.append(("const", len(numbers), 0, 0))
+                numbers.append(float(given[0]))
+            elif kind == "sym":
+                code.append((*place(given[0]), 0, 0))
+            elif kind in OPERATIONS:
+                a, b, c = (*(found[k] for k in given), 0, 0)[:3]
+                code.append((kind, a, b, c))
+            else:
+                raise cannot("functions of the model cannot be used in an input over time")
+            found[i] = len(code) - 1
+        out.append(found[expression.id])
+    return code, numbers, out

@@ -1,4 +1,4 @@
-"""Stage graph, shown: a value of any kind -> the text that messages and labels show; it always comes to an end."""
+"""A value of any kind -> the text that messages and labels show; it always comes to an end."""
 
 from __future__ import annotations
 

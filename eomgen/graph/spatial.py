@@ -1,4 +1,4 @@
-"""Stage graph: spatial vectors, an angular and a linear part, of expressions (Featherstone, RBDA, ch. 2)."""
+"""Spatial vectors, an angular and a linear part, of expressions (Featherstone, RBDA, ch. 2)."""
 
 from __future__ import annotations
 

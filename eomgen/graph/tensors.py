@@ -1,13 +1,38 @@
-"""Stage graph: 3 x 3 matrices and inertia tensors of expressions, with few operations.
-
-A turn about a coordinate axis touches only what it changes.
-"""
+"""DOC"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from . import vectors as vec
 from .core import Expr
 from .vectors import Mat3, Vec3
+
+# -- symmetric systems -------------------------------------------------------------------------------------------------
+
+
+def solve_symmetric(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
+    """x with matrix x = right by L^T D L; the last is eliminated first, so that a tree's branches stay apart."""
+    n = len(right)
+    rows, x = [list(row) for row in matrix], list(right)
+    for k in reversed(range(n)):
+        for i in range(k):
+            if rows[k][i].is_zero:
+                continue
+            ratio = rows[k][i] / rows[k][k]
+            for j in range(i + 1):
+                rows[i][j] = rows[i][j] - ratio * rows[k][j]
+            x[i] = x[i] - ratio * x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] = x[i] - rows[i][j] * x[j]
+        x[i] = x[i] / rows[i][i]
+    return x
+
+
+# -- matrices and inertia tensors --------------------------------------------------------------------------------------
+
+# A turn about a coordinate axis touches only what it changes.
 
 
 def symmetric(a: Mat3) -> Mat3:

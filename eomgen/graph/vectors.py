@@ -1,4 +1,4 @@
-"""Stage graph: 3-vectors and 3 x 3 matrices of expressions, as tuples; zeros and ones fold as everywhere."""
+"""3-vectors and 3 x 3 matrices of expressions, as tuples; zeros and ones fold as everywhere."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Stage identification: measured motions -> parameters of a module."""
+"""Measured motions -> parameters of a module."""

@@ -1,4 +1,4 @@
-"""Identification: combinations of inertial parameters that forces can tell, and their values from measured motions."""
+"""Combinations of inertial parameters that forces can tell, and their values from measured motions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from ..base.algebra import Array
 from ..base.limits.analyses import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from ..base.texts import as_html, as_text
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
-from ..runtime.near_names import read_names, unknown
+from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_states
-from ..runtime.room import read_number, read_numbers
 from .regressor import (
     STANDARD,
     free_directions,

@@ -1,4 +1,4 @@
-"""Identification: what a user measured -> experiments, each with times, columns, initial values and inputs."""
+"""What a user measured -> experiments, each with times, columns, initial values and inputs."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import ill_typed, incomplete, off_range
-from ..runtime.near_names import unknown
-from ..runtime.room import read_numbers
+from ..runtime.argument_checks import read_numbers, unknown
 from ..runtime.storage import split_head
 
 if TYPE_CHECKING:

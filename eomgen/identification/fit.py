@@ -1,4 +1,4 @@
-"""Identification: parameters, inputs and initial values of a module that reproduce measured motions best."""
+"""Parameters, inputs and initial values of a module that reproduce measured motions best."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ from ..errors import (
     no_choice,
     off_range,
 )
-from ..runtime.allowed_parameters import bounds_of
+from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
 from ..runtime.derivative_calls import output_derivatives
 from ..runtime.inputs import Forcing, Table
 from ..runtime.late_start import fixed_told, start_slopes, tell_fixed
-from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
+from ..runtime.layout import bounds_of
 from ..runtime.refusals import refuse_rigid
-from ..runtime.room import read_number
 from ..runtime.tapes import Expression
 from ..simulation.simulate import simulate
 from .experiments import Experiment, read_experiments, read_sigma

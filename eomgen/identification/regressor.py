@@ -12,9 +12,9 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError, cannot, ill_shaped
+from ..runtime.argument_checks import read_numbers
 from ..runtime.kernels import into
 from ..runtime.refusals import refuse_states
-from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -18,11 +18,10 @@ from ..describe.scope import RATES
 from ..describe.sympy_face import function_name, is_sympy, lower_sympy, name_of, named, names_of, one_or_several
 from ..describe.sympy_text import SympyNames
 from ..errors import ExpressionError, ModelError, Problem, ill_typed
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, substitute, symbols_of
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
 from ..graph.rounding_bounds import with_bounds
-from ..graph.substitute import substitute, symbols_of
 from .sympy_mechanics import Forms, read_forms, replaced, solve_auxiliary
 
 TRIES = 5  #: places at which the rank of constraints is looked for

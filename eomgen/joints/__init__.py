@@ -2,11 +2,21 @@
 
 from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
 from .joint import Closure, Coordinate, Joint, QuaternionSlot, Shape, Velocity
-from .many_degrees import Cylindrical, Planar, Translational, Weld
-from .one_degree import Continuous, Prismatic, Revolute, Screw
+from .joint_types import (
+    ConstantVelocity,
+    Continuous,
+    Cylindrical,
+    Free,
+    Planar,
+    Prismatic,
+    Revolute,
+    Screw,
+    Spherical,
+    Translational,
+    Universal,
+    Weld,
+)
 from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
-from .turning import Free, Spherical
-from .two_angles import ConstantVelocity, Universal
 
 JOINTS: dict[str, type[Joint]] = {
     joint.type_name: joint

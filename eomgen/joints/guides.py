@@ -11,13 +11,11 @@ from ..elements.element_type import key
 from ..elements.kinds import MOTION, Vector, ref
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, substitute, symbols_of
 from ..graph.differentiate import jvp
-from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .joint import SEQUENCE, Closure, Coordinate, Joint, Shape
-from .rotation_coordinates import euler, euler_rates
+from .joint import SEQUENCE, Closure, Coordinate, Joint, Shape, euler, euler_rates
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)

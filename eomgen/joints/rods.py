@@ -14,8 +14,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .closure_conditions import along, parallel_axes, same_orientation
-from .joint import LENGTH, Closure, Joint
+from .joint import LENGTH, Closure, Joint, along, parallel_axes, same_orientation
 
 
 @dataclass(frozen=True)

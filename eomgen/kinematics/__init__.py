@@ -1,4 +1,4 @@
-"""Stage kinematics: Mechanism -> Kinematics (spanning tree, poses, twists, loop constraints) and its mobility."""
+"""Mechanism -> Kinematics (spanning tree, poses, twists, loop constraints) and its mobility."""
 
 from .kinematics import ForceTerms, Kinematics, LoopCoordinates, analyse
 from .loops import Constraints

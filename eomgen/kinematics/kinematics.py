@@ -1,4 +1,4 @@
-"""Stage kinematics: Mechanism -> Kinematics, everything about the motion that every method of derivation shares."""
+"""Mechanism -> Kinematics, everything about the motion that every method of derivation shares."""
 
 from __future__ import annotations
 
@@ -11,22 +11,24 @@ from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..frames import Marker
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, substitute, symbols_of
 from ..graph.differentiate import jvp
 from ..graph.spatial import Twist
-from ..graph.substitute import substitute, symbols_of
 from ..joints import QuaternionSlot
 from ..records import dataclass
-from .constraint_equations import couple
-from .length import length_scale
-from .loops import Constraints, close_loop, differentiate_constraints, own_rows
-from .motion import MarkerMotion
-from .resolved_loads import entries_of, with_entries
-from .state import MotionSymbols, acceleration_name, lay_out
-from .topology import Topology, find_topology
+from .loops import (
+    Constraints,
+    close_loop,
+    couple,
+    differentiate_constraints,
+    find_undefined,
+    own_rows,
+    refuse_rows_of_time,
+    refuse_unusable,
+)
+from .motion import MarkerMotion, entries_of, with_entries
+from .topology import MotionSymbols, Topology, acceleration_name, find_topology, lay_out, length_scale
 from .tree import Link, Poses, build_links, link_twists
-from .undefined_rows import find_undefined, refuse_rows_of_time
-from .written_equations import refuse_unusable
 
 
 @dataclass(frozen=True)

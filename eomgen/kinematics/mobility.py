@@ -1,27 +1,369 @@
-"""Stage kinematics: Kinematics and numbers -> Mobility: assembled reference, rank, degrees of freedom, partition."""
+"""Kinematics and numbers -> Mobility: assembled reference, rank, degrees of freedom, partition."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.limits.constraints import CHOSEN
+from ..base.limits.constraints import BESIDE, CHOSEN, CONTRADICTION, FLAT
 from ..base.names import hint, joined
-from ..errors import AssemblyError, ModelError
-from ..graph.core import Expr
+from ..constraints import Driver, RollingDisc
+from ..constraints.rolling import LYING
+from ..errors import TO_BE_FINITE, AssemblyError, ModelError
+from ..graph.core import Expr, substitute, symbols_of
 from ..graph.evaluate import compile_evaluator
-from ..numeric.independent_columns import choose_independent
-from ..numeric.nearest_branch import differences
-from ..numeric.ranks import independent_rows
-from ..numeric.row_chains import SparseRows
+from ..graph.rounding_bounds import vanishing
+from ..numeric.assembly import Assembly, ConstraintSystem, differences
+from ..numeric.continuation import Continuation, HeldPath
+from ..numeric.ranks import SparseRows, choose_independent, conditioning, independent_rows, rank
 from ..records import dataclass
-from .candidates import rate_candidates
 from .constraint_functions import Array, ConstraintFunctions
-from .driving import close_driven, follow_drivers
-from .idle_rows import refuse_idle_rows, refuse_squares, require_finite
 from .kinematics import Kinematics
+from .loops import place_of
+
+if TYPE_CHECKING:
+    from .constraint_functions import ConstraintFunctions
+
+# -- constraints that hold nothing -------------------------------------------------------------------------------------
+
+
+IDLE = "holds nothing"  #: what is said of rows without slopes
+TRIES = 12  #: directions in which a row is evaluated
+
+
+def require_finite(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none.
+
+    Raises
+    ------
+    AssemblyError
+        Names the rows.
+    """
+    if not functions.m:
+        return
+    C, J = functions.position(q)
+    with np.errstate(over="ignore", invalid="ignore"):  # rows whose squares overflow have no length, and no rank
+        finite = np.isfinite(np.column_stack([J**2, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
+    if finite.all():
+        return
+    k = functions.kinematics
+    bad = [k.constraints.labels[i] for i in np.flatnonzero(~finite)]
+    discs = {c.name for c in k.mechanism.constraints if isinstance(c, RollingDisc)}
+    place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
+    what = f"{', '.join(bad)}: the constraint is not finite at the initial configuration {place}"
+    if all(label.partition(".")[0] in discs for label in bad):
+        raise AssemblyError(f"{what}: {LYING}; tilt the disc in initial or guess", bad, code="EG-NOT-FINITE")
+    raise AssemblyError(f"{what}; give another configuration in initial or guess", bad, code="EG-NOT-FINITE")
+
+
+def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse written constraints that are least or greatest where they hold, as |r|^2 = 0 of two points is.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    if not functions.h:
+        return
+    k, scales = functions.kinematics, functions.system.scales
+    slopes = np.abs(functions.scaled_jacobian(q)[: functions.h]).max(axis=1, initial=0.0)
+    least = np.array(k.constraints.written[: functions.h], dtype=bool) & (slopes < FLAT)
+    if not least.any():
+        return
+    side = np.zeros(functions.h)
+    for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * BESIDE:
+        for away in (step, -step):
+            higher = np.sign(functions.position(scales.move(q, away))[0] - functions.position(q)[0])
+            side = np.where(side == 0, higher, side)
+            least &= (higher == side) & (side != 0)
+        if not least.any():
+            return
+    what = (
+        "is 0 only where it is least or greatest, as a sum of squares: its slopes vanish there, so it can hold nothing"
+    )
+    remedy = "write each component as a constraint: x1 - x2 and y1 - y2 for (x1 - x2)**2 + (y1 - y2)**2"
+    labels = (k.constraints.labels[i] for i in np.flatnonzero(least))
+    raise ModelError(
+        [k.mechanism.problem(place_of(k.mechanism, x), f"{x} {what}", remedy, "EG-REDUNDANT") for x in labels]
+    )
+
+
+def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
+    """Refuse constraints of which no slope is found at any position, where they are all there is.
+
+    Such are a relation whose factors cancel, and one that nothing proves to be an identity.  Rows of joints whose
+    slopes vanish identically with the given parameters are no fault: a body may be held twice.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    numbers : mapping of str to float
+        Values of the parameters.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints and the parameters whose values cancel.
+    """
+    c, graph = kinematics.constraints, kinematics.graph
+    known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
+    problems = []
+    for i, (label, row, written) in enumerate(zip(c.labels, c.jacobian, c.written, strict=True)):
+        slopes = [x for x in row if not x.is_zero]
+        if kinematics.given_rates and i < len(c.slopes) and not all(vanishing(substitute(c.slopes[i], known))):
+            continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
+        if (written and slopes) or not all(vanishing(substitute(slopes, known))):
+            used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
+            what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
+            remedy = "remove it"
+            if used:
+                what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
+                remedy = "declare values with which it acts (they determine the degrees of freedom), or remove it"
+            problems.append(
+                kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy, "EG-REDUNDANT")
+            )
+    if problems:
+        raise ModelError(problems)
+
+
+# -- candidates for independent coordinates ----------------------------------------------------------------------------
+
+
+LARGEST = 120  #: coordinates up to which every one is judged
+
+
+def rate_candidates(J: Array, chosen: Sequence[int]) -> dict[int, float]:
+    """How well each coordinate would do as independent: columns -> conditioning, the best first.
+
+    Parameters
+    ----------
+    J : (m, n) array
+        Scaled Jacobian at one configuration.
+    chosen : sequence of int
+        The independent columns there.
+
+    Returns
+    -------
+    dict of int to float
+        For a chosen column the conditioning of the chosen set, for any other that of the best set in which it takes
+        the place of a chosen one; columns that cannot are left out.  Empty where there is no choice.
+    """
+    n = J.shape[1]
+    if not len(J) or not chosen or n > LARGEST or (n - len(chosen)) * len(chosen) > LARGEST:
+        return {}
+    found = dict.fromkeys(chosen, conditioning(J, chosen))
+    for k in range(n):
+        if k not in found:
+            swaps = ([k if i == old else i for i in chosen] for old in chosen)
+            found[k] = max(conditioning(J, columns) for columns in swaps)
+    ordered = sorted(found.items(), key=lambda item: -round(item[1], 6))
+    return {k: value for k, value in ordered if value > CHOSEN}
+
+
+# -- drivers -----------------------------------------------------------------------------------------------------------
+
+# Drivers take their degrees of freedom in the order of the model; one that finds none left over-drives the mechanism.
+# It may stay where it asks for nothing that the others do not give, at all times tried.
+
+
+FIRST, STEPS = 1e-3, 16  #: part of the span in the first step of a motion over it; its steps at most
+
+
+def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
+    """Row -> name of its driver."""
+    labels = functions.kinematics.constraints.labels
+    names = {c.name for c in functions.kinematics.mechanism.constraints if isinstance(c, Driver)}
+    found = {i: label.partition(".")[0] for i, label in enumerate(labels)}
+    return {i: name for i, name in found.items() if name in names}
+
+
+def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    """Assemble at t = 0; where that fails for the drivers, say so.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or not with the values that the drivers ask for.
+    ModelError
+        There are more drivers than degrees of freedom, and they contradict each other.
+    """
+    drivers = driver_rows(functions)
+    try:
+        found = functions.close_nearest(given, guess)
+    except AssemblyError as error:
+        if not drivers:
+            raise
+        raise _explain(functions, drivers, given, guess, error) from None
+    if drivers:
+        _refuse_contradictions(functions, drivers, found.q)
+    return found
+
+
+def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
+    """Closed positions at later times, as further samples; none without drivers, or where they cannot be followed."""
+    drivers = driver_rows(functions)
+    jacobian = [e for row in functions.kinematics.constraints.jacobian for e in row]
+    if not drivers or "t" in symbols_of(jacobian):
+        return []
+    return [position for _, position in _follow(functions.system, q, functions)][1::4]
+
+
+def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) -> list[tuple[float, Array]]:
+    """Closed positions at times after 0, a small motion apart."""
+    end = functions.kinematics.mechanism.simulation.end
+    continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
+    continuation.step = FIRST
+    continuation.to(1.0, steps=STEPS)
+    return [(point.s * end, point.q) for point in continuation.points[1:]]
+
+
+def _guess(functions: ConstraintFunctions, q: Array) -> dict[str, float]:
+    """Coordinates of a position, but for those that have a better guess of their own."""
+    hinted = {name for name, _ in functions.kinematics.hints}
+    return {n: float(x) for n, x in zip(functions.kinematics.names, q, strict=True) if n not in hinted}
+
+
+def _others(functions: ConstraintFunctions, drivers: Sequence[int]) -> list[int]:
+    return [i for i in range(functions.m) if i not in drivers]
+
+
+def _needed(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array, t: float = 0.0
+) -> tuple[list[int], list[int]]:
+    """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
+    J = functions.scaled_jacobian(q, t)
+    kept = _others(functions, list(drivers))
+    spare = []
+    for row in drivers:
+        if rank(J[[*kept, row]]).rank > rank(J[kept]).rank:
+            kept.append(row)
+        else:
+            spare.append(row)
+    return sorted(kept), spare
+
+
+def _explain(
+    functions: ConstraintFunctions,
+    drivers: Mapping[int, str],
+    given: Mapping[str, float],
+    guess: Mapping[str, float],
+    error: AssemblyError,
+) -> AssemblyError | ModelError:
+    """Why the mechanism cannot be assembled with its drivers."""
+    free = functions.with_rows(_others(functions, list(drivers)))
+    try:
+        q = functions.close(given, guess, system=free).q
+    except AssemblyError as loops:
+        return loops  # not for the drivers' sake
+    with np.errstate(all="ignore"):
+        values = functions.position(q)[0]
+    lost = [i for i in drivers if not np.isfinite(values[i])]
+    if lost:
+        names, labels = [drivers[i] for i in lost], functions.kinematics.constraints.labels
+        return AssemblyError(
+            f"{', '.join(names)} has no finite value at t = 0: {TO_BE_FINITE}",
+            [labels[i] for i in lost],
+            code="EG-NOT-FINITE",
+        )
+    kept, spare = _needed(functions, drivers, q)
+    if spare:
+        try:
+            q = functions.close(given, guess, system=functions.with_rows(kept)).q
+        except AssemblyError:
+            pass
+        else:
+            return _contradiction(functions, drivers, spare, q, 0.0)
+    if given:
+        try:
+            functions.close({}, {**guess, **given})
+        except AssemblyError:
+            pass
+        else:
+            held = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
+            return AssemblyError(held, error.rows, code="EG-CONTRADICTION")
+    C = functions.position(q)[0]
+    gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
+    rows = [functions.kinematics.constraints.labels[i] for i in drivers]
+    text = str(error).partition("; check")[0]
+    words = (
+        f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
+        f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
+        "reach, or a guess nearer to them"
+    )
+    return AssemblyError(words, [*rows, *error.rows], code="EG-CONTRADICTION")
+
+
+def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
+    """Follow the drivers that count; those left over must agree with them."""
+    kept, spare = _needed(functions, drivers, q)
+    if not spare:
+        return
+    for t, here in _follow(functions.with_rows(kept), q, functions):
+        if len(_needed(functions, drivers, here, t)[0]) > len(kept):
+            break  # the first position was singular; elsewhere all of them count
+        C = functions.scales.residual(functions.position(here, t)[0])
+        if np.abs(C[spare]).max() > CONTRADICTION:
+            raise _contradiction(functions, drivers, spare, here, t)
+
+
+def _contradiction(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], spare: Sequence[int], q: Array, t: float
+) -> ModelError:
+    mechanism = functions.kinematics.mechanism
+    C = functions.position(q, t)[0]
+    deaf = [row for row in spare if not _felt(functions, drivers, row, q)]
+    others = [name for row, name in drivers.items() if row not in spare]
+    freedoms = len(others)
+    problems = []
+    for row in spare:
+        gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
+        verb = "moves" if freedoms == 1 else "move"
+        who = f"{' and '.join(others)} {verb} it already" if others else "the mechanism cannot move"
+        if row in deaf:
+            problems.append(
+                mechanism.problem(
+                    f"constraints.{drivers[row]}",
+                    "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
+                    f"and this is off by {gap}",
+                    "drive a coordinate, or two markers that move relative to each other",
+                    "EG-REDUNDANT",
+                )
+            )
+            continue
+        message = (
+            f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
+            f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
+        )
+        remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
+        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy, "EG-CONTRADICTION"))
+    return ModelError(problems)
+
+
+def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, q: Array) -> bool:
+    """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
+    loops = _others(functions, list(drivers))
+    free = functions.with_rows(loops)
+    random = np.random.default_rng(1)
+    for moved in (0.0, 0.1, 0.3, 0.3):
+        step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
+        try:
+            start = _guess(functions, functions.scales.move(q, step))
+            here = functions.close({}, start, restarts=0, system=free).q if moved else q
+        except AssemblyError:
+            continue
+        J = functions.scaled_jacobian(here)
+        if rank(J[[*loops, row]]).rank > rank(J[loops]).rank:
+            return True
+    return False
+
+
+def _unit(functions: ConstraintFunctions, row: int) -> str:
+    return "m" if functions.kinematics.constraints.kinds[row] == "length" else "rad"
+
 
 PROBES = 4  #: further assembled configurations at which the rank is judged
 

@@ -1,9 +1,10 @@
-"""Stage kinematics: motion of markers and joint coordinates in ground axes, what force elements and outputs look at."""
+"""Motion of markers and joint coordinates in ground axes, momentum, what force elements and outputs look at."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import Protocol, TypeVar, cast
 
 from ..describe.mechanism import (
     ANGULAR_MOMENTUM,
@@ -13,24 +14,274 @@ from ..describe.mechanism import (
     STATE_RATE,
     TURNING,
     CarriedQuantity,
+    JointSpec,
     Mechanism,
     Quantity,
     WrenchQuantity,
 )
 from ..errors import ModelError
-from ..forces.force import Force
+from ..forces import CoordinateLoad
+from ..forces.force import Force, MarkerLoad, View, beyond_zero
+from ..forces.friction import reaction_symbol
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, atan2, sqrt
+from ..graph.core import Expr, Graph, atan2, sqrt, substitute, symbols_of
 from ..graph.differentiate import jvp
 from ..graph.spatial import Twist
-from ..graph.substitute import substitute, symbols_of
+from ..graph.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..graph.vectors import Mat3, Vec3
-from .exerted import part_exerted
-from .momentum import Momentum
-from .reaction_parts import part_of_reaction
-from .state import MotionSymbols
-from .tree import Poses
+from .topology import MotionSymbols
+from .tree import Link, Poses
+
+# -- elimination -------------------------------------------------------------------------------------------------------
+
+
+Matrix = list[list[Expr]]
+
+
+def eliminate(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
+    """x with A x = right, without exchange of rows: A is positive definite, or I less a contraction."""
+    A, x, n = [list(row) for row in matrix], list(right), len(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            if A[i][k].is_zero:
+                continue
+            ratio = A[i][k] / A[k][k]
+            for j in range(k + 1, n):
+                A[i][j] = A[i][j] - ratio * A[k][j]
+            x[i] = x[i] - ratio * x[k]
+    for k in reversed(range(n)):
+        x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))]) / A[k][k]
+    return x
+
+
+def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    """The product of two rows that are not empty."""
+    return total([x * y for x, y in zip(a, b, strict=True)])
+
+
+def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
+    """A value with multiples of others."""
+    return total([base, *(k * x for k, x in zip(factors, values, strict=True))])
+
+
+def total(terms: Sequence[Expr]) -> Expr:
+    """The sum of terms, of which there is one at least."""
+    found = terms[0]
+    for term in terms[1:]:
+        if not term.is_zero:
+            found = found + term
+    return found
+
+
+# -- reaction parts ----------------------------------------------------------------------------------------------------
+
+# The wrench that passes through a joint holds what acts along its coordinates too (a drive, friction).  The reaction is
+# the rest, which does no work in the motions that the joint allows, as in :mod:`~eomgen.analysis.reactions`: what acts
+# along a coordinate is a torque where that turns, a force where it slides.
+
+
+class Placed(Protocol):
+    """What the parts need to know of the motion."""
+
+    graph: Graph
+
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def coordinate(self, name: str) -> tuple[Expr, Expr]: ...
+
+
+def part_of_reaction(motion: Placed, spec: JointSpec, quantity: CarriedQuantity) -> Expr:
+    """The part, in symbols of the joint's wrench along the axes of S."""
+    wrench = [reaction_symbol(motion.graph, spec.name, k) for k in range(6)]
+    force, moment = force_and_moment(motion, spec, wrench)
+    if quantity.part == "size":
+        return beyond_zero(vec.dot(force, force), sqrt)
+    if quantity.part == "normal":  # across the z axis of the joint
+        return beyond_zero(force[0] * force[0] + force[1] * force[1], sqrt)
+    found = vec.times(motion.rotation(spec.successor), moment if quantity.part.startswith("m") else force)
+    if quantity.axes is not None:
+        found = vec.transpose_times(motion.rotation(quantity.axes), found)
+    return found["xyz".index(quantity.part[-1])]
+
+
+def force_and_moment(motion: Placed, spec: JointSpec, wrench: Sequence[Expr]) -> tuple[Vec3, Vec3]:
+    """Force and moment that do no work in the motions that the joint allows, of the wrench that passes through it."""
+    graph, x = motion.graph, wrench
+    force, moment = (x[0], x[1], x[2]), (x[3], x[4], x[5])
+    if spec.joint.role == "loop":
+        return force, moment
+    columns = spec.joint.subspace(graph, [motion.coordinate(name)[0] for name in spec.coordinates])
+    turns = [(angular, linear) for angular, linear in columns if not all(part.is_zero for part in angular)]
+    slides = [linear for angular, linear in columns if all(part.is_zero for part in angular)]
+    pushed = _spanned(graph, slides, [vec.dot(s, force) for s in slides])
+    wanted = [vec.dot(w, moment) + vec.dot(s, force) - vec.dot(s, pushed) for w, s in turns]
+    turned = _spanned(graph, [w for w, _ in turns], wanted)
+    return vec.sub(force, pushed), vec.sub(moment, turned)
+
+
+def _spanned(graph: Graph, directions: Sequence[Vec3], work: Sequence[Expr]) -> Vec3:
+    """The shortest vector that does the given work along directions."""
+    found = vec.zero(graph)
+    if directions:
+        gram = [[vec.dot(a, b) for b in directions] for a in directions]
+        for factor, direction in zip(eliminate(gram, work), directions, strict=True):
+            found = vec.add(found, vec.scale(factor, direction))
+    return found
+
+
+# -- loads of force elements on bodies ---------------------------------------------------------------------------------
+
+
+def part_exerted(view: View, force: Force, quantity: WrenchQuantity) -> Expr | str:
+    """The part: forces add up, moments are taken about the origin of the marker; or why there is none."""
+    total, moment, acts = vec.zero(view.graph), vec.zero(view.graph), False
+    here = view.position(quantity.on)
+    for load in force.loads(view):
+        if not isinstance(load, MarkerLoad):
+            return f"acts along the coordinate {load.coordinate!r}"
+        if load.marker.body == quantity.on.body:
+            acts = True
+            arm = vec.sub(view.position(load.marker), here)
+            total = vec.add(total, load.force)
+            moment = vec.add(moment, vec.add(load.torque, vec.cross(arm, load.force)))
+    if not acts:
+        return f"exerts nothing on {quantity.on.label.partition('.')[0]}"
+    if quantity.part == "size":
+        return beyond_zero(vec.dot(total, total), sqrt)
+    found = moment if quantity.part.startswith("m") else total
+    if quantity.axes is not None:
+        found = vec.transpose_times(view.rotation(quantity.axes), found)
+    return found["xyz".index(quantity.part[-1])]
+
+
+# -- entries of loads --------------------------------------------------------------------------------------------------
+
+
+AnyLoad = TypeVar("AnyLoad", bound=MarkerLoad | CoordinateLoad)
+
+
+def with_entries(load: AnyLoad, values: Iterator[Expr]) -> AnyLoad:
+    """A load with its entries replaced by the next values."""
+    made: MarkerLoad | CoordinateLoad
+    if isinstance(load, CoordinateLoad):
+        made = CoordinateLoad(load.coordinate, next(values))
+    else:
+        x = [next(values) for _ in range(6)]
+        made = MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    return cast("AnyLoad", made)
+
+
+def entries_of(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
+    """Force and torque of a load on a marker, or the one value of a load along a coordinate."""
+    return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]
+
+
+# -- momentum ----------------------------------------------------------------------------------------------------------
+
+# All vectors are in ground axes.  Sums over the bodies of m r x v + I w and its like (Goldstein, *Classical Mechanics*,
+# sec. 1.2; Orin, Goswami, Lee, *Autonomous Robots* 35, 2013, for the centroidal quantities).
+
+
+class Momentum:
+    """The sums over all bodies of a tree, each made once when asked for."""
+
+    def __init__(self, poses: Poses, twists: Sequence[Twist]) -> None:
+        self.graph, self.poses, self.links, self.twists = poses.graph, poses, poses.links, twists
+
+    @cached_property
+    def mass(self) -> Expr:
+        """Total mass (kg)."""
+        total = self.graph.zero
+        for link in self.links:
+            total = total + link.mass
+        return total
+
+    @cached_property
+    def _share(self) -> Expr:
+        """One over the total mass, which depends on parameters only."""
+        return 1.0 / self.mass
+
+    def _centre(self, k: int) -> Vec3:
+        """Centre of mass of a link."""
+        pose = self.poses.link(k)
+        return vec.add(pose.position, vec.times(pose.rotation, self.links[k].com))
+
+    @cached_property
+    def centre(self) -> Vec3:
+        """Centre of mass (m)."""
+        total = vec.zero(self.graph)
+        for k, link in enumerate(self.links):
+            total = vec.add(total, vec.scale(link.mass, self._centre(k)))
+        return vec.scale(self._share, total)
+
+    def _momentum_of(self, k: int) -> Vec3:
+        """Linear momentum of a link."""
+        link, (angular, linear) = self.links[k], self.twists[k]
+        velocity = vec.add(linear, vec.cross(angular, link.com))
+        return vec.times(self.poses.link(k).rotation, vec.scale(link.mass, velocity))
+
+    @cached_property
+    def linear(self) -> Vec3:
+        """Linear momentum (kg m/s)."""
+        total = vec.zero(self.graph)
+        for k in range(len(self.links)):
+            total = vec.add(total, self._momentum_of(k))
+        return total
+
+    @cached_property
+    def velocity(self) -> Vec3:
+        """Velocity of the centre of mass (m/s)."""
+        return vec.scale(self._share, self.linear)
+
+    @cached_property
+    def angular(self) -> Vec3:
+        """Angular momentum about the centre of mass (kg m^2/s)."""
+        total = vec.zero(self.graph)
+        for k, link in enumerate(self.links):
+            spin = vec.times(self.poses.link(k).rotation, vec.times(link.inertia, self.twists[k][0]))
+            arm = vec.sub(self._centre(k), self.centre)
+            total = vec.add(total, vec.add(spin, vec.cross(arm, self._momentum_of(k))))
+        return total
+
+    def angular_about(self, point: Vec3) -> Vec3:
+        """Angular momentum about a point of ground (kg m^2/s)."""
+        return vec.add(self.angular, vec.cross(vec.sub(self.centre, point), self.linear))
+
+    @cached_property
+    def inertia(self) -> Mat3:
+        """Inertia about the centre of mass (kg m^2)."""
+        o = vec.zero(self.graph)
+        total: Mat3 = (o, o, o)
+        for k, link in enumerate(self.links):
+            own = rotate_symmetric(self.poses.link(k).rotation, link.inertia)
+            arm = vec.sub(self._centre(k), self.centre)
+            total = add_matrices(total, add_matrices(own, shift_tensor(link.mass, arm)))
+        return total
+
+    def inertia_about(self, point: Vec3) -> Mat3:
+        """Inertia about a point (kg m^2)."""
+        return add_matrices(self.inertia, shift_tensor(self.mass, vec.sub(self.centre, point)))
+
+    def jacobian(self, n: int) -> tuple[tuple[Expr, ...], ...]:
+        """Velocity of the centre of mass for each generalized velocity, (3, n).
+
+        What moves with a joint is the part of the tree beyond it: its mass and first moment are summed inwards.
+        """
+        masses = [link.mass for link in self.links]
+        moments = [vec.scale(link.mass, link.com) for link in self.links]  # about the link's origin, link axes
+        columns = [vec.zero(self.graph)] * n
+        for k in reversed(range(len(self.links))):
+            link: Link = self.links[k]
+            rotation = self.poses.link(k).rotation
+            for c, (angular, linear) in enumerate(link.columns):
+                push = vec.add(vec.scale(masses[k], linear), vec.cross(angular, moments[k]))
+                columns[link.first + c] = vec.scale(self._share, vec.times(rotation, push))
+            if link.parent != GROUND:
+                masses[link.parent] = masses[link.parent] + masses[k]
+                carried = vec.add(link.up(moments[k]), vec.scale(masses[k], link.position))
+                moments[link.parent] = vec.add(moments[link.parent], carried)
+        return tuple(tuple(column[i] for column in columns) for i in range(3))
+
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 

@@ -1,4 +1,4 @@
-"""Stage kinematics: contacts between groups -> which shapes are near each other, and how velocities move them.
+"""Contacts between groups -> which shapes are near each other, and how velocities move them.
 
 The twist of a body about the origin of the ground is the sum of the same columns for all bodies that a velocity moves,
 so that one column for each velocity says the motion of all (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
@@ -13,8 +13,7 @@ from typing import Any
 from ..forces.force import Force
 from ..frames import GROUND
 from ..graph import vectors as vec
-from ..graph.core import Expr
-from ..graph.substitute import symbols_of
+from ..graph.core import Expr, symbols_of
 from .kinematics import Kinematics
 
 

@@ -1,4 +1,4 @@
-"""Stage kinematics, constraints that close and open: Switched -> their equations, and loads of multipliers for them.
+"""Switched -> their equations, and loads of multipliers for them.
 
 While closed, w = C'' + 2 b C' + b^2 C = 0 of an equation of positions, C' + b C of one of velocities, whose error dies
 away at the rate b (J. Baumgarte, Comput. Methods Appl. Mech. Eng. 1 (1972), 1-16).  The multiplier l acts as -C_q^T l.
@@ -12,22 +12,17 @@ from typing import NamedTuple
 
 from ..describe.mechanism import Switched
 from ..forces import CoordinateLoad, MarkerLoad
-from ..forces.branches import where
-from ..forces.force import Force, Load, View
+from ..forces.force import Force, Load, View, where
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, reachable
 from ..graph.differentiate import jacobian
 from ..graph.rounding_bounds import vanishing
-from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .constraint_equations import couple
 from .kinematics import ForceTerms, Kinematics
-from .loops import differentiate_constraints
-from .undefined_rows import refuse_rows_of_time
+from .loops import couple, differentiate_constraints, refuse_rows_of_time, refuse_unusable
 from .wrenches import JointWrenches, Row6
-from .written_equations import refuse_unusable
 
 #: Operations whose results are numbers whatever numbers they are given.
 FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}

@@ -1,4 +1,4 @@
-"""Stage kinematics: Mechanism -> Topology, the spanning tree and the joints that close loops.
+"""Mechanism -> Topology, the spanning tree, the joints that close loops, the layout of q and v, its length.
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
 coordinates the user did not name (and does not drive, and whose angular velocity they did not give) before one they
@@ -9,13 +9,27 @@ are always cut, joints that cannot be cut (a point on a curve) never.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from itertools import combinations
 
+import numpy as np
+
+from ..base.limits.numbers import HAIR, NO_LENGTH
 from ..constraints import CoordinateDriver
 from ..describe.checks import UNHELD
 from ..describe.mechanism import JointSpec, Mechanism
 from ..errors import ModelError
 from ..frames import GROUND
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jacobian
+from ..graph.evaluate import compile_evaluator
+from ..graph.rounding_bounds import settled_vector, size_of
+from ..graph.vectors import Vec3
+from ..joints import QuaternionSlot
+from ..joints.joint import parameter_rates
+from ..joints.rods import Distance, RevoluteSpherical
 from ..records import dataclass
 
 #: Joints of a loop above which equations count more than lengths of chains: forces and multipliers of long loops are
@@ -202,3 +216,175 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
                 depths = _Depths(joints, branches)
                 improved = True
     return Topology(tuple(branches), tuple(sorted(set(range(len(joints))) - tree)))
+
+
+# -- layout of coordinates ---------------------------------------------------------------------------------------------
+
+
+def acceleration_name(velocity: str) -> str:
+    """``theta_dot`` -> ``theta_ddot``; ``ball_wx`` -> ``ball_wx_dot``."""
+    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
+
+
+@dataclass(frozen=True)
+class StateLayout:
+    """Names and kinds of the tree's coordinates and velocities.
+
+    ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``quaternion_slots`` says where
+    Euler parameters are, the other velocities being the rates of the other coordinates in the same order.  ``given`` is
+    q' of given equations where it is not v itself.
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    velocity_names: tuple[str, ...]
+    velocity_kinds: tuple[str, ...]
+    parent: tuple[int, ...]
+    quaternion_slots: tuple[QuaternionSlot, ...] = ()
+    given: tuple[Expr, ...] = ()
+
+    def rates(self, graph: Graph, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[Expr, ...]:
+        """q' = N(q) v."""
+        if self.given:
+            return self.given
+        if not self.quaternion_slots:
+            return tuple(v)
+        turning = {k for slot in self.quaternion_slots for k in range(slot.velocity, slot.velocity + 3)}
+        plain = iter([x for k, x in enumerate(v) if k not in turning])
+        starts = {slot.coordinate: slot.velocity for slot in self.quaternion_slots}
+        result: list[Expr] = []
+        while len(result) < len(q):
+            i = len(result)
+            if i in starts:
+                result += parameter_rates(q[i : i + 4], v[starts[i] : starts[i] + 3])
+            else:
+                result.append(next(plain))
+        return tuple(result)
+
+
+@dataclass(frozen=True)
+class MotionSymbols:
+    """The symbols of the motion: coordinates, velocities, accelerations, time; and q' in terms of them."""
+
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    t: Expr
+    rates: tuple[Expr, ...]
+    clock: Mapping[Expr, Expr]  #: t' = 1, and the rates of the inputs
+    in_order: bool = True  #: whether velocities are rates of coordinates, or angular velocities: not so if given
+
+    @cached_property
+    def along(self) -> dict[Expr, Expr]:
+        """The direction of d/dt: q' = N v, v' = a, t' = 1, and the rates of the inputs."""
+        flow = dict(zip(self.q, self.rates, strict=True)) | dict(zip(self.v, self.a, strict=True))
+        return {**flow, **self.clock}
+
+    def slopes(self, values: Sequence[Expr], rates: Sequence[Expr]) -> dict[tuple[int, int], Expr]:
+        """Derivatives by v of the rates of functions of q: df/dq N."""
+        if self.rates == self.v:
+            return jacobian(list(values), list(self.q))
+        return jacobian(list(rates), list(self.v))
+
+
+def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
+    """The coordinates and velocities of the tree, in its order."""
+    if mechanism.lagrangian is not None:
+        names = mechanism.lagrangian.coordinates
+        kinds = ("angle",) * len(names)
+        return StateLayout(names, kinds, tuple(n + "_dot" for n in names), kinds, tuple(range(-1, len(names) - 1)))
+    if mechanism.given is not None:
+        given, n = mechanism.given, len(mechanism.given.velocities)
+        rates = () if given.rates == tuple(map(mechanism.graph.symbol, given.velocities)) else given.rates
+        angles, turns = ("angle",) * len(given.coordinates), ("angle",) * n
+        return StateLayout(given.coordinates, angles, given.velocities, turns, tuple(range(-1, n - 1)), given=rates)
+    names_list: list[str] = []
+    kinds_list: list[str] = []
+    velocity_names: list[str] = []
+    velocity_kinds: list[str] = []
+    parent: list[int] = []
+    quaternion_slots: list[QuaternionSlot] = []
+    last = {GROUND: -1}  # the velocity next to a body towards ground
+    for branch in topology.branches:
+        spec = mechanism.joints[branch.joint]
+        quaternion_slots += [
+            QuaternionSlot(len(names_list) + i, len(velocity_names) + j) for i, j in spec.joint.quaternion_slots
+        ]
+        names_list += spec.coordinates
+        kinds_list += [coordinate.kind for coordinate in spec.joint.coordinates]
+        above = last[branch.parent]
+        for name, velocity in zip(spec.velocities, spec.joint.velocities, strict=True):
+            parent.append(above)
+            above = len(velocity_names)
+            velocity_names.append(name)
+            velocity_kinds.append(velocity.kind)
+        last[branch.body] = above
+    return StateLayout(
+        tuple(names_list),
+        tuple(kinds_list),
+        tuple(velocity_names),
+        tuple(velocity_kinds),
+        tuple(parent),
+        tuple(quaternion_slots),
+    )
+
+
+# -- the length scale --------------------------------------------------------------------------------------------------
+
+
+PAIRS = 12  #: joints of a body up to which all distances between them count, beyond it those from the first to all
+
+
+def length_scale(mechanism: Mechanism) -> Expr:
+    """Root mean square of the lengths of rods and of the distances between joints on one body.
+
+    Where there is none, of the distances from joints to centres of mass; 1 if there is none of these either.  A length
+    that is nothing beside the radius of gyration of the bodies, as what rounding in a file leaves of a 0, is none.
+    Minimum-norm corrections compare lengths with angles; measured in this length, neither units nor frames of bodies
+    matter.
+    """
+    graph = mechanism.graph
+    points: dict[int, list[Vec3]] = {}
+    squares = []
+    for spec in mechanism.joints:
+        for marker in (spec.predecessor, spec.successor):
+            points.setdefault(marker.body, []).append(marker.frame.position)
+        if isinstance(spec.joint, Distance | RevoluteSpherical):
+            squares.append(spec.joint.length * spec.joint.length)
+    for places in points.values():
+        pairs = combinations(places, 2) if len(places) <= PAIRS else ((places[0], x) for x in places[1:])
+        squares += [_square(a, b) for a, b in pairs]
+    squares = [x for x in squares if not x.is_zero]
+    if not squares:
+        bodies = [k for k, places in points.items() if k >= 0 and not mechanism.bodies[k].mass.is_zero and places]
+        squares = [_square(mechanism.bodies[k].com, x) for k in bodies for x in points[k]]
+        squares = [x for x in squares if not x.is_zero]
+    if not squares:
+        return graph.one
+    total = graph.zero
+    for square in squares:
+        total = total + square
+    size = graph.apply("sqrt", total / float(len(squares)))
+    least = max(NO_LENGTH, HAIR * _radius_of_gyration(mechanism, size))
+    return graph.apply("select", graph.apply("lt", size, least), 1.0, size)  # parameters may make all of them 0
+
+
+def _radius_of_gyration(mechanism: Mechanism, size: Expr) -> float:
+    """That of all bodies with the declared parameters, each about its own centre.
+
+    0 without masses or values, and where parameters given late may change it, unless ``size`` is a hair beside it.
+    """
+    entries = [x for b in mechanism.bodies for x in (b.mass, b.inertia[0][0], b.inertia[1][1], b.inertia[2][2])]
+    if not entries or any(p.value is None for p in mechanism.parameters):
+        return 0.0
+    numbers = compile_evaluator([size, *entries], [p.name for p in mechanism.parameters])
+    declared, *found = numbers([p.value for p in mechanism.parameters])
+    mass, inertia = sum(found[::4]), sum(found) - sum(found[::4])
+    radius = float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0
+    return radius if declared < HAIR * radius or all(x.node[0] == "const" for x in entries) else 0.0
+
+
+def _square(a: Vec3, b: Vec3) -> Expr:
+    """The square of a distance, exactly 0 where it is rounding of the places."""
+    apart = settled_vector(vec.sub(a, b), size_of(a, b))
+    return vec.dot(apart, apart)

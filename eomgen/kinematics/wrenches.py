@@ -1,4 +1,4 @@
-"""Stage kinematics: Kinematics -> the wrenches that joints and constraints must exert, body by body.
+"""Kinematics -> loads on links, wrenches that joints and constraints must exert, energies.
 
 Newton's and Euler's equations of each body (Shabana, Computational Dynamics, ch. 6: constraint forces), and the
 virtual work of each constraint equation in a displacement of each body alone: ``dC = D . (dr, dtheta)``, so that a
@@ -8,23 +8,78 @@ moment about the body's origin).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from ..describe.mechanism import JointSpec
+from ..describe.mechanism import Body, JointSpec
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute
 from ..graph.differentiate import jacobian
-from ..graph.spatial import Twist
-from ..graph.substitute import substitute
+from ..graph.spatial import Twist, Wrench
+from ..graph.tensors import add_matrices, shift_tensor, symmetric
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .closing_gradients import COMMON, closing_gradients
-from .constraint_equations import couple
+from .closing import COMMON, closing_gradients
 from .kinematics import Kinematics
+from .loops import couple
 from .motion import MarkerMotion
 from .tree import Poses
+
+# -- loads -------------------------------------------------------------------------------------------------------------
+
+
+def applied_wrenches(kinematics: Kinematics) -> list[Wrench]:
+    """Force elements' wrench on each link, about its origin in link axes."""
+    graph, poses = kinematics.graph, kinematics.poses
+    total: list[Wrench] = [(vec.zero(graph), vec.zero(graph)) for _ in kinematics.links]
+    for terms in graph.marked(kinematics.forces):
+        for load in graph.marked(terms.marker_loads):
+            if load.marker.body == GROUND:
+                continue
+            k = poses.link_of[load.marker.body]
+            rotation = poses.link(k).rotation
+            push = vec.transpose_times(rotation, load.force)
+            turn = vec.transpose_times(rotation, load.torque)
+            arm = poses.marker_in_link(load.marker).position
+            total[k] = vec.add(total[k][0], vec.add(turn, vec.cross(arm, push))), vec.add(total[k][1], push)
+    return total
+
+
+def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
+    """Force elements along coordinates, those of cut joints through their y_q."""
+    graph, loop = kinematics.graph, kinematics.loop_coordinates
+    total = [graph.zero] * len(kinematics.v)
+    place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
+    for terms in graph.marked(kinematics.forces):
+        for load in terms.coordinate_loads:
+            if load.coordinate in place:
+                j = place[load.coordinate]
+                total[j] = total[j] + load.value
+            else:
+                row = loop.jacobian[loop.names.index(load.coordinate)]
+                total = [f + load.value * entry for f, entry in zip(total, row, strict=True)]
+    return total
+
+
+def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
+    """Inertias of drives on coordinates of the tree, by the index of the velocity."""
+    found: dict[int, Expr] = {}
+    for spec in kinematics.mechanism.joints:
+        if spec.armature is not None and spec.coordinates[0] in kinematics.velocity_labels:
+            found[kinematics.velocity_labels.index(spec.coordinates[0])] = spec.armature
+    return found
+
+
+def drives_cut_joint(kinematics: Kinematics) -> bool:
+    """Whether a drive's inertia is on a cut joint, where it couples the coordinates of the tree through y_q.
+
+    A loop can close without any row (two hinges on one axis), and its cut joint still turn a drive.
+    """
+    loop = kinematics.loop_coordinates.names
+    return any(spec.armature is not None and spec.coordinates[0] in loop for spec in kinematics.mechanism.joints)
+
 
 Row6 = tuple[Expr, ...]  # force, moment
 
@@ -330,3 +385,140 @@ def _take(total: list[list[Expr]], body: int, wrench: Row6) -> None:
 def find_wrenches(kinematics: Kinematics) -> JointWrenches | None:
     """The parts of joint reactions of a mechanism with bodies."""
     return None if kinematics.mechanism.bare or not kinematics.mechanism.bodies else JointWrenches(kinematics)
+
+
+# -- reactions on the graph --------------------------------------------------------------------------------------------
+
+# What every body needs less what the constraint equations exert on it is summed from the tips of the tree to ground
+# (Featherstone, RBDA, sec. 5.3), as :mod:`~eomgen.analysis.reactions` does on numbers.
+
+
+def carried_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) -> dict[str, Row6]:
+    """Wrench (force, moment) that P exerts on S at S, along the axes of S, of each joint.
+
+    Components along the directions in which a joint is free contain what acts along its coordinates.
+
+    Parameters
+    ----------
+    wrenches : JointWrenches
+    multipliers : mapping
+        Of each constraint row by its label, with M v' + h + C_q^T l = 0; also of rows that vanish identically.
+    """
+    kinematics, poses = wrenches.kinematics, wrenches.kinematics.poses
+    count = len(wrenches.mechanism.bodies)
+    sixes = [wrenches.needed[6 * k : 6 * k + 6] for k in range(count + len(wrenches.cut))]
+    total = [list(six) for six in sixes[:count]]
+    for label, multiplier in multipliers.items():
+        for body, row in wrenches.on_bodies.get(label, {}).items():
+            total[body] = [x + multiplier * d for x, d in zip(total[body], row, strict=True)]
+    found: dict[str, Row6] = {}
+    for branch in reversed(kinematics.topology.branches):
+        spec = wrenches.specs[branch.joint]
+        here, at = total[branch.body], wrenches.origins[branch.body]
+        moved = _about(here, at, poses.marker(spec.successor).position)
+        found[spec.name] = tuple(-x for x in moved) if branch.reversed else moved
+        if branch.parent != GROUND:
+            base = total[branch.parent]
+            lifted = _about(here, at, wrenches.origins[branch.parent])
+            total[branch.parent] = [x + y for x, y in zip(base, lifted, strict=True)]
+    for joint, load in zip(wrenches.cut, sixes[count:], strict=True):
+        loaded = list(load)
+        for label, gradient in joint.rows:
+            if label in multipliers:
+                loaded = [x - multipliers[label] * d for x, d in zip(loaded, gradient, strict=True)]
+        found[joint.spec.name] = tuple(loaded)
+    turned: dict[str, Row6] = {}
+    for spec in wrenches.specs:
+        if spec.name in found:
+            axes, wrench = poses.marker(spec.successor).rotation, found[spec.name]
+            force = vec.transpose_times(axes, (wrench[0], wrench[1], wrench[2]))
+            turned[spec.name] = (*force, *vec.transpose_times(axes, (wrench[3], wrench[4], wrench[5])))
+    return turned
+
+
+def _about(wrench: list[Expr], start: Vec3, end: Vec3) -> Row6:
+    """A wrench about ``start``, about ``end`` instead."""
+    force: Vec3 = (wrench[0], wrench[1], wrench[2])
+    moment = vec.add((wrench[3], wrench[4], wrench[5]), vec.cross(vec.sub(start, end), force))
+    return (*force, *moment)
+
+
+# -- energies ----------------------------------------------------------------------------------------------------------
+
+# The methods that work with spatial inertias share these; Lagrange's method derives its equations from energies of its
+# own.
+
+
+def kinetic_energy(kinematics: Kinematics) -> Expr:
+    """T = sum of twist . (inertia twist) / 2 over the bodies (J), each in its link's axes about its origin."""
+    total = kinematics.graph.zero
+    for link, (omega, v) in total.graph.marked(zip(kinematics.links, kinematics.twists, strict=True)):
+        turning, linear = link.spatial.times(omega, v)
+        total = total + (vec.dot(omega, turning) + vec.dot(v, linear))
+    return 0.5 * total
+
+
+def potential_energy(kinematics: Kinematics) -> Expr:
+    """V of gravity on the first moments, g in link axes carried outwards, and of the springs (J)."""
+    graph = kinematics.graph
+    total = graph.zero
+    heights: list[tuple[Expr, Vec3]] = []
+    for link in graph.marked(kinematics.links):
+        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
+        height, pull = height + vec.dot(pull, link.position), link.down(pull)
+        heights.append((height, pull))
+        total = total - (link.spatial.mass * height + vec.dot(pull, link.spatial.moment))
+    for terms in kinematics.forces:
+        if terms.potential is not None:
+            total = total + terms.potential
+    return total
+
+
+# -- inertial terms ----------------------------------------------------------------------------------------------------
+
+# In both the equations of a tree are linear: with the twist (w, v) of a body, the rates (alpha, A) of its origin less
+# gravity, and its mass m, first moment m c and inertia I about the origin, the joints need the wrench
+#
+#     force = m A + alpha x mc + w x (w x mc),   moment = I alpha + w x I w + mc x A
+#
+# (C. G. Atkeson, C. H. An, J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+# Int. J. Robotics Research 5(3) (1986), 101-119, eq. 8 to 14).  All is in the axes of the body that the user described.
+
+
+MOTION = 12  #: numbers of the motion of one body
+
+
+def inertial_terms(kinematics: Kinematics) -> list[Expr]:
+    """Per body, in the order of the mechanism: w, v, alpha, A less gravity (12); m, m c, I xx yy zz xy xz yz (10)."""
+    graph, links = kinematics.graph, kinematics.links
+    twists: list[Twist] = []
+    for link, (angular, linear) in zip(links, kinematics.twists, strict=True):
+        turned = vec.times(link.frame.rotation, angular)
+        shift = vec.cross(link.frame.position, turned)
+        twists.append((turned, vec.add(vec.times(link.frame.rotation, linear), shift)))
+    rates = kinematics.total_derivative([x for angular, linear in twists for x in (*angular, *linear)])
+    falls: list[Vec3] = []  # gravity in link axes
+    motions: dict[int, list[Expr]] = {}
+    for k, link in enumerate(links):
+        falls.append(link.down(kinematics.mechanism.gravity if link.parent == GROUND else falls[link.parent]))
+        angular, linear = twists[k]
+        alpha, change = (_three(rates, 6 * k + at) for at in (0, 3))
+        fall = vec.times(link.frame.rotation, falls[k])
+        lifted = vec.sub(vec.add(change, vec.cross(angular, linear)), fall)
+        motions[link.body] = [*angular, *linear, *alpha, *lifted]
+    still = [graph.zero] * MOTION
+    return [x for k, body in enumerate(kinematics.mechanism.bodies) for x in (*motions.get(k, still), *_inertia(body))]
+
+
+def _three(values: list[Expr], at: int) -> Vec3:
+    return values[at], values[at + 1], values[at + 2]
+
+
+def _inertia(body: Body) -> list[Expr]:
+    """m, m c, I about the origin; as given where they were given so."""
+    moment = body.moment if body.moment is not None else vec.scale(body.mass, body.com)
+    about = body.inertia_origin
+    if about is None:
+        about = add_matrices(symmetric(body.inertia), shift_tensor(body.mass, body.com))
+    diagonal = (about[0][0], about[1][1], about[2][2])
+    return [body.mass, *moment, *diagonal, about[0][1], about[0][2], about[1][2]]

@@ -23,7 +23,7 @@ cdef cnp.ndarray doubles(object value, str label, object error, str name=None, i
 
 
 cdef cnp.ndarray converted(object value, str label, object error, str name, int n):
-    """Real numbers, by the rule of as_real in eomgen's runtime/room.py."""
+    """Real numbers, by the rule of as_real in eomgen's runtime/argument_checks.py."""
     cdef cnp.ndarray found
     cdef int kind
     try:

@@ -1,8 +1,4 @@
-"""Stage numeric: poses and motions of bodies, tables of shapes -> the sum of what all pairs of shapes exert, by body.
-
-The graph's evaluator and the ``numpy`` target use :class:`PairSum` as it is; the C target writes the same loops.  All
-vectors are in ground axes.
-"""
+"""Poses and motions of bodies, tables of shapes -> the sum of what all pairs of shapes exert."""
 
 from __future__ import annotations
 
@@ -12,7 +8,51 @@ from typing import Any
 import numpy as np
 
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from .pair_vectors import across, cross, dot, flat, parts, product, times
+
+# -- vectors of many shapes --------------------------------------------------------------------------------------------
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> Any:
+    """Products of vectors (n, 3, ...)."""
+    return (a * b).sum(axis=1)
+
+
+def parts(poses: np.ndarray) -> tuple[Any, Any, Any, Any]:
+    """Position, rotation, velocity and angular velocity of poses (n, POSE, ...)."""
+    rotation = poses[:, 3:12].reshape(len(poses), 3, 3, *poses.shape[2:])
+    return poses[:, 0:3], rotation, poses[:, 12:15], poses[:, 15:18]
+
+
+def times(m: Any, a: Any) -> Any:
+    """Matrices (n, 3, 3, ...) times vectors (n, 3, ...)."""
+    return m[:, :, 0] * a[:, None, 0] + m[:, :, 1] * a[:, None, 1] + m[:, :, 2] * a[:, None, 2]
+
+
+def product(m: Any, n: Any) -> Any:
+    """Products of matrices (n, 3, 3, ...)."""
+    return m[:, :, 0, None] * n[:, None, 0] + m[:, :, 1, None] * n[:, None, 1] + m[:, :, 2, None] * n[:, None, 2]
+
+
+def flat(m: np.ndarray) -> np.ndarray:
+    """Matrices (n, 3, 3, ...) as rows of nine numbers."""
+    return m.reshape(len(m), 9, *m.shape[3:])
+
+
+def cross(a: Any, b: Any) -> np.ndarray:
+    """Cross products of vectors whose first axis is x, y, z."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors (n, 3, ...)."""
+    return cross(a.swapaxes(0, 1), b.swapaxes(0, 1)).swapaxes(0, 1)
+
+
+# -- sums --------------------------------------------------------------------------------------------------------------
+
+# The graph's evaluator and the ``numpy`` target use :class:`PairSum` as it is; the C target writes the same loops.  All
+# vectors are in ground axes.
+
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18

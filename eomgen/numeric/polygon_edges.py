@@ -1,4 +1,4 @@
-"""Stage numeric: two convex polygons in the plane -> the edges and corners that matter to their contact.
+"""Two convex polygons in the plane -> the edges and corners that matter to their contact.
 
 The law of a pair of polygons reads these few numbers (:mod:`~eomgen.forces.contact_polygons` says why these), so that
 its text is the same for any number of corners.  They are found here by loops, and in C by those of

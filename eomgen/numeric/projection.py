@@ -1,4 +1,4 @@
-"""Stage numeric: constraint rows and what they have to give -> the least changes that do it."""
+"""Constraint rows and what they have to give -> the least changes that do it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage numeric: a function of one number -> where it is 0, and where it is least.
+"""A function of one number -> where it is 0, and where it is least.
 
 Each search yields the places at which it wants the value, so that many of them can be asked for together.
 """

@@ -1,4 +1,4 @@
-"""Numeric, splines: points of a table -> slopes at the points, and from these the pieces of a cubic.
+"""Points of a table -> slopes at the points, and from these the pieces of a cubic.
 
 C. de Boor, *A Practical Guide to Splines* (1978), chapter IV: the interpolating spline by its slopes, a tridiagonal
 system.  The monotone slopes are those of F. N. Fritsch and J. Butland, A method for constructing local monotone

@@ -1,4 +1,4 @@
-"""Stage numeric: tables and functions of the user -> their values and derivatives at floats or arrays.
+"""Tables and functions of the user -> their values and derivatives at floats or arrays.
 
 Every evaluator is called with the arguments and then one order of derivative for each argument.  The graph's evaluator
 and the ``numpy`` target use them as they are; the C target writes the same arithmetic.

@@ -1,4 +1,4 @@
-"""Printing: SymPy expressions -> formulas in the order in which textbooks print them: LaTeX, text, MathML."""
+"""SymPy expressions -> formulas in the order in which textbooks print them: LaTeX, text, MathML."""
 
 from .formula import Formulas as Formulas
 from .formula import Order as Order

@@ -1,4 +1,4 @@
-"""Printing, formulas: a SymPy expression -> the tree that is printed, factors and terms in a textbook's order."""
+"""A SymPy expression -> the tree that is printed, factors and terms in a textbook's order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Printing, writers: a formula -> LaTeX, text or MathML, and how wide it is."""
+"""A formula -> LaTeX, text or MathML, and how wide it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage reading: what was derived -> every quantity of the equations by name, as graph expressions and as SymPy.
+"""What was derived -> every quantity of the equations by name, as graph expressions and as SymPy.
 
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """

@@ -1,4 +1,4 @@
-"""Stage reading, display: equations -> what notebooks and terminals show of them, and views with values put in."""
+"""Equations -> what notebooks and terminals show of them, and views with values put in."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UnavailableError, at_odds
-from ..runtime.near_names import find_lacking
+from ..runtime.argument_checks import find_lacking
 from .readable import Readable
 from .writes_quantities import Derived
 

@@ -1,4 +1,4 @@
-"""Stage reading, formats: equations of motion -> files for other programs, written by SymPy's printers.
+"""Equations of motion -> files for other programs, written by SymPy's printers.
 
 Each file holds the named intermediates, M and f of M(q) v' = f, in the symbols of the model.
 """
@@ -17,7 +17,7 @@ from sympy.printing.mathematica import MCodePrinter
 
 from ..errors import UnavailableError
 from ..printing.formula import DIGITS
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import unknown
 from ..targets import FORMATS
 from .readable import Readable
 from .writers import COLUMNS, equations_text, latex_lines

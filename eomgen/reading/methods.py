@@ -1,4 +1,4 @@
-"""Stage reading, methods: what one method of derivation has and others have not, as expressions."""
+"""What one method of derivation has and others have not, as expressions."""
 
 from __future__ import annotations
 
@@ -15,19 +15,17 @@ from ..equations.free_bodies import FreeBodies
 from ..errors import ExpressionError, UnavailableError, UsageError, at_odds, ill_typed
 from ..frames import GROUND
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, reachable, substitute, symbols_of
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.shown import quoted
 from ..graph.spatial import Wrench
-from ..graph.substitute import substitute, symbols_of
-from ..graph.symmetric import solve_symmetric
-from ..graph.traverse import reachable
+from ..graph.tensors import solve_symmetric
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
-from ..kinematics.state import acceleration_name
+from ..kinematics.topology import acceleration_name
 from ..kinematics.wrenches import JointWrenches
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import unknown
 from .quantities import Quantities, Row, Rows, require_bodies
 
 # -- names of unknowns -------------------------------------------------------------------------------------------------

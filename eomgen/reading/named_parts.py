@@ -1,4 +1,4 @@
-"""Stage reading, named parts: SymPy matrices that are sums with named parts -> groups and blocks of them."""
+"""SymPy matrices that are sums with named parts -> groups and blocks of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import sympy
 
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import unknown
 
 # -- named parts -------------------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Stage reading, linearization: the embedded equations near a state -> x' = A x + B u as expressions."""
+"""The embedded equations near a state -> x' = A x + B u as expressions."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from ..base.limits.numbers import LEAST, SINGULAR
 from ..equations.reduction import eliminate
 from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UnavailableError
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, substitute, symbols_of
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
-from ..graph.substitute import substitute, symbols_of
-from ..graph.symmetric import solve_symmetric
-from ..numeric.partitions import partition
+from ..graph.tensors import solve_symmetric
+from ..numeric.ranks import partition
 from .methods import put_in
 from .quantities import Quantities, Row, Rows
 

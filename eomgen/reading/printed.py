@@ -1,4 +1,4 @@
-"""Stage reading, printed: equations of motion M(q) v' = f -> the formulas that a display shows, in order."""
+"""Equations of motion M(q) v' = f -> the formulas that a display shows, in order."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import sympy
 
 from ..base.notation import Notation, dotted, raised
 from ..frames import GROUND
-from ..graph.core import Expr
-from ..graph.substitute import symbols_of
-from ..kinematics.state import acceleration_name
+from ..graph.core import Expr, symbols_of
+from ..kinematics.topology import acceleration_name
 from ..printing import PAGE, Formulas, Order, number, text, width
 from ..printing.formula import (
     COORDINATE,

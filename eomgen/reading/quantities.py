@@ -1,4 +1,4 @@
-"""Stage reading: Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions."""
+"""Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from ..errors import UnavailableError
 from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr
-from ..graph.count import count
+from ..graph.core import Expr, substitute, symbols_of
 from ..graph.differentiate import gradient, vjp
-from ..graph.substitute import substitute, symbols_of
+from ..graph.schedule import count
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
-from ..kinematics.energies import potential_energy
 from ..kinematics.mobility import Mobility
+from ..kinematics.wrenches import potential_energy
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -146,7 +145,7 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
     whole, values = joined[: len(expressions)], joined[len(expressions) :]
     if not entries:
         return whole, []
-    from ..graph.sympy_raise import inlined_size
+    from ..graph.sympy_bridge import inlined_size
 
     if inlined_size(whole) <= FEW:
         return whole, []
@@ -183,7 +182,7 @@ class Written(NamedTuple):
 
 def is_short(expressions: Sequence[Expr]) -> bool:
     """Whether expressions are written out whole."""
-    from ..graph.sympy_raise import inlined_size
+    from ..graph.sympy_bridge import inlined_size
 
     several = {x.id: x for x in expressions if x.value is None}
     return inlined_size(expressions) <= min(READABLE * len(several), LONGEST)

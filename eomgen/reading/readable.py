@@ -1,4 +1,4 @@
-"""Stage reading: a derivation -> every quantity of its equations as SymPy, an attribute each."""
+"""A derivation -> every quantity of its equations as SymPy, an attribute each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.notation import Notation
 from ..graph.core import Expr
-from ..kinematics.state import acceleration_name
+from ..kinematics.topology import acceleration_name
 from .methods import (
     BodiesApart,
     block_system,

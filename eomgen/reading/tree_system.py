@@ -1,4 +1,4 @@
-"""Stage reading, tree system: equations of mechanisms with loops -> the parts that they are made of, for display.
+"""Equations of mechanisms with loops -> the parts that they are made of, for display.
 
 With the constraints C v' + gamma = 0 on the tree's M_t v' = f_t + C^T lambda, v' = B v_i' + a holds, and M = B^T M_t B,
 f = B^T (f_t - M_t a) (Shabana, Computational Dynamics, sec. 5.7).  The parts are short where M and f written out are
@@ -13,11 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.operations import operations_with
-from ..graph.core import Expr
-from ..graph.count import count
+from ..graph.core import LEAVES, Expr, reachable, substitute, symbols_of
 from ..graph.rounding_bounds import is_rounding, with_bounds
-from ..graph.substitute import substitute, symbols_of
-from ..graph.traverse import LEAVES, reachable
+from ..graph.schedule import count
 from .quantities import Quantities, Row, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead

@@ -1,4 +1,4 @@
-"""Stage reading, writers: equations of motion -> text of 80 columns, HTML with MathML, or LaTeX."""
+"""Equations of motion -> text of 80 columns, HTML with MathML, or LaTeX."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage reading, base: what a derivation answers -> its quantities in SymPy, with their named parts kept."""
+"""What a derivation answers -> its quantities in SymPy, with their named parts kept."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ from ..base.notation import split_rate
 from ..describe.visit import Undotted
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, at_odds, incomplete
-from ..graph.copies import copied
-from ..graph.core import Expr, Graph
+from ..graph.core import Expr, Graph, copied, symbols_of
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..kinematics.state import acceleration_name
-from ..runtime.near_names import UnknownNameError
+from ..kinematics.topology import acceleration_name
+from ..runtime.argument_checks import UnknownNameError
 from .methods import momentum_names, put_in, read_value, read_values
 from .quantities import Quantities, needed, write
 

@@ -1,4 +1,4 @@
-"""Stage runtime: p and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``."""
+"""P and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``."""
 
 from __future__ import annotations
 

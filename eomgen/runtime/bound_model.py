@@ -1,4 +1,4 @@
-"""Stage runtime: a core (compiled extension or NumPy) with parameters and inputs bound -> BoundModel, its own calls.
+"""A core (compiled extension or NumPy) with parameters and inputs bound -> BoundModel, its own calls.
 
 What every analysis and every run takes.  :class:`~..module.Module` is the same with the calls that load those.
 """
@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
+from .argument_checks import read_numbers
 from .argument_names import both_names
 from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
 from .momenta import Momenta
-from .room import read_numbers
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -82,7 +82,7 @@ class BoundModel(Assembled, Momenta):
         self.constraints = kernels.constraints
         mechanical: Any = kernels
         if self.n_s:
-            from .mechanical import Mechanical
+            from .kernels import Mechanical
 
             mechanical = Mechanical(kernels)
         self.mass_matrix, self.embedded_mass_matrix = mechanical.mass_matrix, mechanical.embedded_mass_matrix
@@ -101,7 +101,7 @@ class BoundModel(Assembled, Momenta):
 
     @cached_property
     def _settled(self) -> dict[tuple[Any, ...], Any]:
-        """What runs with the same arguments have in common; see :mod:`..simulation.settled`."""
+        """What runs with the same arguments have in common; see :mod:`..simulation.compiled`."""
         return {}
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Stage runtime: z = [q; p], coordinates and momenta -> the canonical equations of a model and its Hamiltonian."""
+"""Z = [q; p], coordinates and momenta -> the canonical equations of a model and its Hamiltonian."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..base.algebra import Array, correlated
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import SINGULAR
 from ..errors import UnavailableError, ill_shaped
+from .argument_checks import read_numbers
 from .refusals import refuse_states
-from .room import read_numbers
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Stage runtime: the steps of a run -> where the mobility itself changes on the way.
+"""The steps of a run -> where the mobility itself changes on the way.
 
 At a change point the constraint Jacobian loses rank: a parallelogram lies flat and could go on as an antiparallelogram.
 The steps of the integrator are looked at, whatever times were stored, and between them Hermite's polynomial through

@@ -1,23 +1,99 @@
-"""Stage runtime: states over time -> projected states, residuals, columns that are worked out when asked for."""
+"""States over time -> projected states, residuals, columns that are worked out when they are read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
 
 from ..base.algebra import Array
 from ..errors import too_large
 from ..numeric.projection import largest
+from .argument_checks import unknown
 from .inputs import Forcing
 from .layout import Layout
-from .run_parts import Residuals
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
     from .change_points import ChangePoint
+
+# -- parts of a result -------------------------------------------------------------------------------------------------
+
+
+class Named(list[Array]):
+    """What belongs to each event, by its place or its name.
+
+    It is a list, so that a loop over it meets the arrays; ``in``, ``keys()``, ``items()`` and ``get`` go by name.
+    """
+
+    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
+        super().__init__(values)
+        self.names = tuple(names)
+
+    @classmethod
+    def of(cls, values: Sequence[Array], header: Mapping[str, Any]) -> Named:
+        """What belongs to the events of a run, by the names in its header; without names they are counted."""
+        return cls(values, header.get("event_names") or [f"event_{k}" for k in range(len(values))])
+
+    @overload
+    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
+    @overload
+    def __getitem__(self, key: slice) -> list[Array]: ...
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, str):
+            if key not in self.names:
+                raise unknown("event", key, self.names)
+            key = self.names.index(key)
+        return super().__getitem__(key)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether an event has this name; an array is in it if it is one of those here."""
+        if isinstance(name, str):
+            return name in self.names
+        return any(name is values for values in self)
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return self.names
+
+    def values(self) -> list[Array]:
+        """What belongs to each event."""
+        return list(self)
+
+    def items(self) -> list[tuple[str, Array]]:
+        """Names, and what belongs to them."""
+        return list(zip(self.names, self, strict=True))
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """What belongs to the event of a name, ``default`` if there is none."""
+        return self[name] if name in self.names else default
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (list(self), self.names)
+
+
+class Residuals(NamedTuple):
+    """Largest violation of the constraints over a run, all rows, redundant ones included."""
+
+    raw_position: float = 0.0  #: of the integrator's states (m, rad)
+    raw_velocity: float = 0.0  #: (m/s, rad/s)
+    position: float = 0.0  #: of the stored, projected states
+    velocity: float = 0.0
+    correction_position: float = 0.0  #: largest change of a coordinate by the projection
+    correction_velocity: float = 0.0  #: largest change of a velocity
+
+    @classmethod
+    def of(cls, given: Residuals | Mapping[str, float] | Callable[[], Residuals]) -> Residuals:
+        """Residuals as a run has them: themselves, by name, or a function that evaluates them."""
+        if isinstance(given, Residuals):
+            return given
+        return given() if callable(given) else cls(**given)
+
+
+# -- columns -----------------------------------------------------------------------------------------------------------
+
 
 FEW = 10_000  #: numbers at most of the raw states that are kept with a run, until its residuals are asked for
 NO_RESIDUALS = Residuals()
@@ -152,7 +228,7 @@ def units_of_layout(layout: Layout) -> dict[str, str]:
 def describe(module: BoundModel) -> dict[str, Any]:
     """What the columns of any run of a module are called, where it comes from, and its parameters."""
     known = {**_described(module.layout), "parameters": dict(module._parameters)}
-    from .origin import origin
+    from .identity import origin
 
     return known | {"origin": origin(module)}
 

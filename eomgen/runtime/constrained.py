@@ -14,7 +14,7 @@ from ..base.limits.constraints import STATE as RANK
 from ..base.texts import shown
 from ..errors import UsageError, ill_shaped, no_number
 from ..numeric.scales import Scales
-from .room import as_real, read_number, read_numbers, with_numbers
+from .argument_checks import as_real, read_number, read_numbers, with_numbers
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

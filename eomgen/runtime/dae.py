@@ -1,4 +1,4 @@
-"""Stage runtime: a model as differential-algebraic equations F(t, y, y') = 0, for solvers such as IDA of SUNDIALS.
+"""A model as differential-algebraic equations F(t, y, y') = 0, for solvers such as IDA of SUNDIALS.
 
 The stabilised form of index 2 (C. W. Gear, B. Leimkuhler, G. K. Gupta, Automatic integration of Euler-Lagrange
 equations with constraints, J. Comput. Appl. Math. 12-13 (1985), 77-90): y = [q; v; l; m] with
@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array
 from ..errors import ill_shaped
+from .argument_checks import read_numbers
 from .kernels import into
-from .room import read_numbers
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Stage runtime: the call of a Module that differentiates the inverse dynamics."""
+"""The call of a Module that differentiates the inverse dynamics."""
 
 from __future__ import annotations
 

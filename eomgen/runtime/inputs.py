@@ -35,9 +35,17 @@ from ..errors import (
     untrue,
 )
 from ..numeric.splines import slopes
+from .argument_checks import (
+    as_real,
+    check_names,
+    read_number,
+    read_numbers,
+    require_mapping,
+    require_time_and_state,
+    unknown,
+    without_dots,
+)
 from .layout import Layout
-from .near_names import check_names, require_mapping, require_time_and_state, unknown, without_dots
-from .room import as_real, read_number, read_numbers
 from .tapes import Expression, play_arrays
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods

@@ -1,12 +1,9 @@
-"""Stage runtime: a core, parameters and inputs -> the calls of one model.
-
-A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
-makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
-"""
+"""A core (compiled or NumPy), parameters and inputs -> the calls of one model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -14,14 +11,20 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
+from ..numeric.assembly import ConstraintSystem, CutJoints
+from .argument_checks import fitting, read_numbers
 from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
 from .refusals import Refusal
-from .room import fitting, read_numbers
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
+
+# -- calls -------------------------------------------------------------------------------------------------------------
+
+# A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
+# makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
 
 
 ENERGY = (
@@ -33,7 +36,7 @@ ENERGY = (
 class Kernels:
     """The calls of one model, sharing one set of parameters and inputs.
 
-    Here the velocities are [v; s], first-order states among them; :mod:`.mechanical` leaves these out for users.
+    Here the velocities are [v; s], first-order states among them; :mod:`.kernels` leaves these out for users.
     Kernels that are properties are made anew when asked for: what is kept lives as long as Fail, which refers back.
 
     Parameters
@@ -126,7 +129,7 @@ class Kernels:
 
     def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
         """Names what a failure at a state is due to, as far as it can be told."""
-        from .culprit import find_culprit
+        from .failure import find_culprit
 
         try:
             return find_culprit(self, status, t, x, p, u)
@@ -286,3 +289,96 @@ def into(out: Array | None, result: Array) -> Array:
     if out is not None:
         fitting(out, result.shape)[...] = result
     return result if out is None else out
+
+
+# -- velocities without first-order states -----------------------------------------------------------------------------
+
+# A state is a velocity of unit inertia that no constraint touches, so that its rows and columns are left out.
+
+
+class Mechanical:
+    """The functions of M, h and the constraints of a model that has first-order states.
+
+    Parameters
+    ----------
+    kernels : Kernels
+    """
+
+    def __init__(self, kernels: Kernels) -> None:
+        layout = kernels.layout
+        count = len(layout.states)
+        n, free = layout.n_v - count, layout.n_dof - count
+        self.mass_matrix: Any = MechanicalPart(kernels.mass_matrix, n, n)
+        self.embedded_mass_matrix: Any = MechanicalPart(kernels.embedded_mass_matrix, free, free)
+        self.bias: Any = MechanicalPart(kernels.bias, n)
+        self.constraint_jacobian: Any = MechanicalPart(kernels.constraint_jacobian, None, n)
+        self.inverse_dynamics: Any = MechanicalInverse(kernels, n)
+
+
+class MechanicalPart:
+    """The first rows and columns of a function's result; None: all."""
+
+    def __init__(self, function: Any, *kept: int | None) -> None:
+        self.function, self.kept = function, tuple(slice(None, k) for k in kept)
+
+    def __call__(self, *args: Any, out: Array | None = None, **options: Any) -> Array:
+        """Evaluate; arguments are those of the function."""
+        return into(out, np.array(self.function(*args, **options)[self.kept]))
+
+    def __repr__(self) -> str:
+        return repr(self.function)
+
+
+class MechanicalInverse:
+    """Generalized forces to add, (n_v,), for accelerations a at q and [v; s]."""
+
+    def __init__(self, kernels: Kernels, n: int) -> None:
+        self.layout, self.function, self.n = kernels.layout, kernels.inverse_dynamics, n
+
+    @both_names
+    def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Array:
+        """Evaluate at q (n_q,), [v; s] (n_v + n_s,) and a (n_v,), or with a last axis k.
+
+        Raises
+        ------
+        UsageError
+            The states are missing, on which forces depend.
+        """
+        given, rates = read_numbers("v", v), read_numbers("a", a)
+        whole = self.layout.n_v
+        if given.shape[:1] != (whole,):
+            names = ", ".join(self.layout.states)
+            raise ill_shaped(
+                f"inverse_dynamics of a model with first-order states takes v = [v; s], ({whole},) or ({whole}, k), "
+                f"not {given.shape}: forces depend on the states {names}, which come after the velocities"
+            )
+        if rates.shape[:1] == (self.n,):
+            rates = np.concatenate([rates, np.zeros((whole - self.n, *rates.shape[1:]))])
+        return into(out, np.array(self.function(q, given, rates, p=p, u=u, t=t)[: self.n]))
+
+    def __repr__(self) -> str:
+        return repr(self.function)
+
+
+# -- constraints -------------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=64)
+def constraint_system(kernels: Kernels) -> ConstraintSystem:
+    """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
+    layout = kernels.layout
+    C = kernels.state("constraints", nan=True)
+    slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
+    C_q, none = kernels.state(slopes, nan=True), np.zeros((0, layout.n_q))
+    places = layout.n_h or not layout.given_rates  # rows of given velocities alone say nothing of q
+    y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
+    alignment, zero = kernels.state("alignment", nan=True), np.zeros(layout.n_v)
+
+    def cut(q: Array, t: float) -> tuple[Array, Array]:
+        return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
+
+    joints = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut)
+    aligned = (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None
+    named = layout.place_scales, layout.q, layout.coordinate_kinds, layout.constraint_labels
+    evaluate = (lambda q, t: (C(q, t=t), C_q(q, t=t))) if places else lambda q, t: (np.zeros(0), none)
+    return ConstraintSystem(evaluate, *named, joints, aligned)

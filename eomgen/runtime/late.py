@@ -1,4 +1,4 @@
-"""Stage runtime: a core and a way to make more kernels -> one core, whose rarer kernels are made when first called.
+"""A core and a way to make more kernels -> one core, whose rarer kernels are made when first called.
 
 Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
 exported package has them all from the beginning.

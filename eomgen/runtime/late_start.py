@@ -1,4 +1,4 @@
-"""Stage runtime: initial values that follow from parameters -> their values and slopes at parameters given later."""
+"""Initial values that follow from parameters -> their values and slopes at parameters given later."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Stage runtime: the metadata of a model (model.json) -> names, sizes and the shapes of its kernels."""
+"""The metadata of a model (model.json) -> names, sizes, shapes of its kernels, allowed parameters."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from typing import Any
@@ -12,11 +12,102 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
-from ..errors import bad_data, cannot, ill_shaped
+from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
+from ..errors import ParameterError, Problem, bad_data, cannot, ill_shaped
 from ..numeric.scales import Scales, Space
-from .allowed_parameters import require_allowed
-from .near_names import check_names, plain_name, without_dots
-from .room import read_number, read_numbers
+from .argument_checks import check_names, plain_name, read_number, read_numbers, without_dots
+from .tapes import play_arrays
+
+# -- rules -------------------------------------------------------------------------------------------------------------
+
+
+def broken_rules(rules: Sequence[Any], p: Array) -> Iterator[tuple[str, list[Flaw], list[int], list[int]]]:
+    """Place, flaws of the first run, parameters and runs of every rule that parameters (n_p, k) of k runs break.
+
+    Sets of parameters of which a rule has no finite numbers are not judged by it.
+    """
+    for path, rule, data, used, tape in rules:
+        first: list[Flaw] = []
+        runs: list[int] = []
+        for k, values in _to_look_at(rule, data, tape, p):
+            flaws = RULES[rule](values, *data)
+            if flaws:
+                runs.append(k)
+                first = first or flaws
+        if runs:
+            yield path, first, used, runs
+
+
+def _to_look_at(rule: str, data: Sequence[Any], tape: Any, p: Array) -> Iterator[tuple[int, Array]]:
+    """The numbers of each run that may break a rule."""
+    if rule in POINTS:
+        points = POINTS[rule]()
+        for k in range(p.shape[1]):
+            yield k, _rows(play_arrays(tape, p[:, k], points), points.shape[1])
+        return
+    values = _rows(play_arrays(tape, p, np.empty((0, 1))), p.shape[1])
+    open_ = np.isfinite(values).all(axis=0)
+    if not open_.all():
+        values = np.where(open_, values, 0.0)
+    for k in np.flatnonzero(open_ & ~surely_right(rule, values, data)).tolist():
+        yield k, values[:, k]
+
+
+def _rows(found: Sequence[Any], count: int) -> Array:
+    return np.array([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in found])
+
+
+# -- allowed parameters ------------------------------------------------------------------------------------------------
+
+
+def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
+    """Refuse values of parameters (n_p,), or (n_p, k) of many runs, that the model itself could not declare.
+
+    Values that are not finite are told by whatever computes with them.
+
+    Raises
+    ------
+    ParameterError
+    """
+    columns, problems = p.reshape(len(p), -1), list[Problem]()
+    for k, path, *data in metadata.get("ranges", ()):
+        wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
+        if len(wrong):
+            flaws = judge_range(columns[k, wrong[:1]], *data)
+            problems += told(metadata, path, flaws, [k], p, wrong.tolist())
+    if rules := metadata.get("rules"):
+        for path, flaws, used, runs in broken_rules(rules, columns):
+            problems += told(metadata, path, flaws, used, p, runs)
+    if problems:
+        raise ParameterError(list(dict.fromkeys(problems)))
+
+
+def bounds_of(metadata: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
+    found: dict[str, tuple[float, float]] = {}
+    for k, _, low, high, *_ in metadata.get("ranges", ()):
+        least, most = found.get(metadata["p_names"][k], (-np.inf, np.inf))
+        least = least if low is None else max(least, low)
+        found[metadata["p_names"][k]] = (least, most if high is None else min(most, high))
+    return found
+
+
+def told(
+    metadata: Mapping[str, Any], path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
+) -> list[Problem]:
+    """Flaws of the first of the runs that break a rule, with the values of the parameters that it depends on."""
+    names, values = metadata["p_names"], p.reshape(len(p), -1)[:, runs[0]]
+    given = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
+    where = ""
+    if p.ndim > 1:
+        where = f" in run {runs[0]}" + f" and {len(runs) - 1} more" * (len(runs) > 1)
+    return [
+        Problem(path + flaw.key, f"{flaw.message} with {given}{where}", flaw.remedy, code="EG-RANGE") for flaw in flaws
+    ]
+
+
+# -- the layout --------------------------------------------------------------------------------------------------------
+
 
 ABI = 1  #: layout of the metadata this file reads
 

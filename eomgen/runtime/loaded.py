@@ -1,4 +1,4 @@
-"""Stage runtime: a file that Trajectory.save wrote -> Trajectory."""
+"""A file that Trajectory.save wrote -> Trajectory."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from pathlib import Path
 
 from ..base.files import as_path
 from ..errors import bad_data
-from .arrays import BROKEN, read_arrays
-from .storage import FORMAT, RUNS, Stored
+from .storage import BROKEN, FORMAT, RUNS, Stored, read_arrays
 from .trajectory import Trajectory
 
 

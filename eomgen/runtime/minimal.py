@@ -1,4 +1,4 @@
-"""Stage runtime: x = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
+"""X = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import PartitionError, at_odds, ill_shaped, no_number
+from .argument_checks import read_number, read_numbers
 from .argument_names import both_names
 from .refusals import require_switched
-from .room import read_number, read_numbers
 from .tree_motion import STEP, DependentMotion
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Stage runtime: the calls of a Module that sum over all bodies: centre of mass, momentum, centroidal inertia."""
+"""The calls of a Module that sum over all bodies: centre of mass, momentum, centroidal inertia."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import UsageError, ill_shaped
+from .argument_checks import read_numbers
 from .argument_names import both_names
 from .kernels import into
-from .room import read_numbers
 
 if TYPE_CHECKING:
     from .kernels import Kernels

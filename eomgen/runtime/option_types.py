@@ -1,4 +1,4 @@
-"""Stage runtime, options: the keywords that a call passes on -> their types, which type checkers and editors read."""
+"""The keywords that a call passes on -> their types, which type checkers and editors read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage runtime: Module <-> a pickle, which names the file of the compiled code and holds the values bound.
+"""Module <-> a pickle, which names the file of the compiled code and holds the values bound.
 
 So a pickle is small, is read in milliseconds, and serves processes of one machine (or of machines that share the cache
 and the kind of processor), not for keeping: generate a package for that.

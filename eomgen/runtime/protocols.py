@@ -1,4 +1,4 @@
-"""Stage runtime: the interfaces of cores and kernels, for readers and type checkers; nothing imports it to run."""
+"""The interfaces of cores and kernels, for readers and type checkers; nothing imports it to run."""
 
 from __future__ import annotations
 

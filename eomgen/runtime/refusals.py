@@ -1,4 +1,4 @@
-"""Stage runtime: what a model cannot be asked, and why."""
+"""What a model cannot be asked, and why."""
 
 from __future__ import annotations
 

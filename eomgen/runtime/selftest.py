@@ -1,4 +1,4 @@
-"""Stage runtime: what was recorded when a package was generated -> how far this build is from it, and an exit code."""
+"""What was recorded when a package was generated -> how far this build is from it, and an exit code."""
 
 from __future__ import annotations
 

@@ -1,20 +1,19 @@
-"""Stage runtime: projected states of a run -> named columns, tables, plots, energy balance."""
+"""Projected states of a run -> named columns, tables, plots, energy balance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..errors import cannot, off_range
-from .near_names import find_lacking, plain_name, require, unknown
-from .room import read_numbers
-from .run_parts import Named, Residuals
+from ..errors import cannot, ill_shaped, off_range
+from .argument_checks import find_lacking, plain_name, read_numbers, require, unknown
+from .columns import Named, Residuals
 
 if TYPE_CHECKING:
     import pandas
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
     from .change_points import ChangePoint
     from .option_types import AnimationOptions
     from .protocols import Source
+
+# -- trajectories ------------------------------------------------------------------------------------------------------
 
 
 class Trajectory:
@@ -145,7 +146,7 @@ class Trajectory:
         return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
 
     def _repr_html_(self) -> str:
-        from .notebook import trajectory_html
+        from .drawing import trajectory_html
 
         return trajectory_html(self)
 
@@ -299,7 +300,7 @@ class Trajectory:
         (n_bodies, 4, 4, n_t) array
             In the order of the module's ``body_names``.
         """
-        from .moving import poses
+        from .drawing import poses
 
         return poses(self, model)
 
@@ -311,7 +312,7 @@ class Trajectory:
         UsageError
             There is no such marker or body, or the trajectory was read from a file and no ``model`` is given.
         """
-        from .moving import position
+        from .drawing import position
 
         return position(self, name, model)
 
@@ -362,7 +363,7 @@ class Trajectory:
         UsageError
             Another ending, an unknown name, or too many frames.
         """
-        from .moving import animate
+        from .drawing import animate
 
         return animate(self, file, model, options)
 
@@ -408,3 +409,27 @@ class Trajectory:
         from .plotting import plot
 
         return plot(self, names, ax, x, y, kind)
+
+
+# -- starts of runs ----------------------------------------------------------------------------------------------------
+
+
+#: An end, or start and end (s); texts are expressions of numbers.
+Span: TypeAlias = float | str | Sequence[float | str] | None
+#: Named values, a state, or a run, whose last state it is.
+Start: TypeAlias = Mapping[str, float | str] | ArrayLike | Trajectory | None
+
+
+def last_state(given: Any, names: Sequence[str]) -> Any:
+    """The last state (n_x,) of a run; anything else as it is.
+
+    Raises
+    ------
+    UsageError
+        The run is one of other states.
+    """
+    if not isinstance(given, Trajectory):
+        return given
+    if tuple(given.x_names) != tuple(names):
+        raise ill_shaped(f"initial: the run has states {', '.join(given.x_names)}; the model has {', '.join(names)}")
+    return given.x[:, -1]

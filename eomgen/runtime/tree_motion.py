@@ -1,4 +1,4 @@
-"""Stage runtime: independent values -> the motion of the whole tree, on the branch of a known closed position.
+"""Independent values -> the motion of the whole tree, on the branch of a known closed position.
 
 From that position the independent coordinates are led along a straight line, each point being found by one Newton
 iteration of the kernel ``kinematics``.
@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 from ..base.limits.analyses import FOLLOWED
 from ..errors import EvaluationError, ProjectionError, ill_shaped, no_number, too_large
-from ..numeric.continuation import LONG, STEPS, Continuation
-from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
+from ..numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
 from ..numeric.projection import largest
+from .argument_checks import read_numbers
 from .failure import place
 from .kernels import Kernels
-from .room import read_numbers
 
 STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration is asked for
 EARLY = 1000  #: steps after which a way is refused that is too long at the present rate of the dependent coordinates

@@ -1,4 +1,4 @@
-"""Stage show: a module and states -> pictures and animations of the mechanism.
+"""A module and states -> pictures and animations of the mechanism.
 
 :mod:`~..base.picture_data` reads what the metadata says, :mod:`.scene` makes solids and lines of it and finds the plane
 of a planar mechanism; :mod:`.axes` and :mod:`.browser` draw a scene with matplotlib and k3d.

@@ -1,4 +1,4 @@
-"""Stage show, animate: a trajectory or a mode -> a GIF, MP4 or PNG frames, or a page or widget through k3d."""
+"""A trajectory or a mode -> a GIF, MP4 or PNG frames, or a page or widget through k3d."""
 
 from __future__ import annotations
 

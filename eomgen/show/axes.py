@@ -1,4 +1,4 @@
-"""Stage show, axes: a Scene -> matplotlib axes, flat or in three dimensions, true to scale, with names."""
+"""A Scene -> matplotlib axes, flat or in three dimensions, true to scale, with names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, browser: a Scene over time -> a k3d plot with a bar of play and time, or a page without a network."""
+"""A Scene over time -> a k3d plot with a bar of play and time, or a page without a network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, build: a module and states -> a Scene."""
+"""A module and states -> a Scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, draw: a module at a state -> a picture with matplotlib."""
+"""A module at a state -> a picture with matplotlib."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, explore: a module -> a picture in a notebook with a slider for each coordinate and parameter."""
+"""A module -> a picture in a notebook with a slider for each coordinate and parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, frames: a trajectory -> scenes at even times, and pictures of them one after the other."""
+"""A trajectory -> scenes at even times, and pictures of them one after the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, solids: kinds, sizes and files of meshes -> vertices (n, 3) and triangles (m, 3)."""
+"""Kinds, sizes and files of meshes -> vertices (n, 3) and triangles (m, 3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage show, symbols: what joints, springs, dampers, cylinders, ropes, wheels, gears and cams look like."""
+"""What joints, springs, dampers, cylinders, ropes, wheels, gears and cams look like."""
 
 from __future__ import annotations
 

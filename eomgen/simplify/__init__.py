@@ -1,4 +1,4 @@
-"""Stage simplify: expressions of a graph -> the forms in which a hand would write them, in SymPy.
+"""Expressions of a graph -> the forms in which a hand would write them, in SymPy.
 
 The forms are for reading; compiled code keeps its own.
 """

@@ -1,4 +1,4 @@
-"""Stage simplify: what polynomials are made of, and how long an expression is for a reader."""
+"""What polynomials are made of, and how long an expression is for a reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage simplify: nodes of a graph that are the same function of their symbols -> one of them, the shortest.
+"""Nodes of a graph that are the same function of their symbols -> one of them, the shortest.
 
 What a rotation matrix gives with itself is 0 or 1, many a product is formed twice in different ways, and what does not
 depend on an angle at all is written shorter where that angle is 0.  Whether functions are the same is tried at random
@@ -13,10 +13,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..base.limits.numbers import ALIKE
-from ..graph.core import Expr, Graph
+from ..graph.core import LEAVES, Expr, Graph, operands, reachable, substitute
 from ..graph.rounding_bounds import is_rounding, with_bounds
-from ..graph.substitute import substitute
-from ..graph.traverse import LEAVES, operands, reachable
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone

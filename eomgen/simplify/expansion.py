@@ -1,4 +1,4 @@
-"""Stage simplify: nodes of a graph -> polynomials in atoms, multiplied out as far as that stays short."""
+"""Nodes of a graph -> polynomials in atoms, multiplied out as far as that stays short."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from fractions import Fraction
 from math import gcd, lcm
 from typing import Any
 
-from ..graph.core import Graph
-from ..graph.traverse import reachable
+from ..graph.core import Graph, reachable
 from .atoms import (
     ONE,
     TURNS,

@@ -1,4 +1,4 @@
-"""Stage simplify: a polynomial -> sums of products of sums, short to read."""
+"""A polynomial -> sums of products of sums, short to read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import reduce
 from typing import NamedTuple
 
-from ..graph.traverse import reachable
+from ..graph.core import reachable
 from .atoms import (
     ONE,
     STACKED,

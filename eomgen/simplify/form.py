@@ -1,4 +1,4 @@
-"""Stage simplify: expressions -> the forms in which a hand would write them.
+"""Expressions -> the forms in which a hand would write them.
 
 Several ways to share what is used more than once are tried, from everything written out to a name for each shared part,
 and the shortest is taken.  Each part by itself is multiplied out, its sines and cosines are joined, and it is factored.
@@ -14,8 +14,7 @@ from dataclasses import field
 from typing import Any
 
 from ..base.operations import CONDITION, operations_with
-from ..graph.core import Expr, Graph
-from ..graph.traverse import LEAVES, common_graph, operands, reachable
+from ..graph.core import LEAVES, Expr, Graph, common_graph, operands, reachable
 from ..records import dataclass
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .expansion import Expansion

@@ -1,4 +1,4 @@
-"""Stage simplify: names of intermediates, which are worth their place and which are not."""
+"""Names of intermediates, which are worth their place and which are not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage simplify: factored polynomials -> SymPy expressions."""
+"""Factored polynomials -> SymPy expressions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import sympy
 
 from ..graph.core import Graph
-from ..graph.sympy_raise import as_number, raise_operation
+from ..graph.sympy_bridge import as_number, raise_operation
 from .atoms import SMALL, TURNS, Atoms, Monomial, Number, Poly
 from .factoring import MADE, Factoring
 

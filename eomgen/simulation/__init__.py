@@ -1,1 +1,1 @@
-"""Simulation: a BoundModel and what happens to it over time -> trajectories, their events and sensitivities."""
+"""A BoundModel and what happens to it over time -> trajectories, their events and sensitivities."""

@@ -1,4 +1,4 @@
-"""Simulation: the differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae).
+"""The differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae).
 
 IDA stops at every event, which its own root finding locates, and at the corners of inputs; it starts anew from there
 with consistent values.
@@ -16,18 +16,16 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.runs import ATOL, RTOL
 from ..errors import SimulationError, at_odds, calls_within, cannot, no_choice
+from ..runtime.argument_checks import require, require_steps
 from ..runtime.dae import DaeForm
-from ..runtime.given_start import Span, Start
 from ..runtime.inputs import Forcing
-from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid
-from ..runtime.room import require_steps
-from .bound_run import Run
+from ..runtime.trajectory import Span, Start
+from .bound_run import Crawling, Run
 from .events import GO_ON, UNWATCHED, Events, EventValues, Resets, instant, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
 from .run_arguments import check_step, check_tolerances, find_span, find_state, ordered_times
-from .stalling import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

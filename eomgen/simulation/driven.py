@@ -1,4 +1,4 @@
-"""Simulation: a Module that drivers move entirely -> Trajectory over a span of time, without integration or forces."""
+"""A Module that drivers move entirely -> Trajectory over a span of time, without integration or forces."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 from ..errors import SimulationError, cannot, no_such
 from ..numeric.roots import find_root
-from ..runtime.given_start import Span, Start
 from ..runtime.inputs import Forcing
+from ..runtime.trajectory import Span, Start
 from .events import UNWATCHED, Events, RunEvent
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath
 from .kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from

@@ -25,14 +25,12 @@ from ..base.algebra import Array
 from ..base.limits.analyses import ALIGNED, BLOCKED, EXTREME, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
 from ..base.limits.analyses import ASTRAY as ASTRAY_ACROSS
 from ..errors import EomgenError
-from ..numeric.closure import ClosureSystem, WantedValues, close, closed
-from ..numeric.constraint_system import ConstraintSystem
-from ..numeric.continuation import Continuation
-from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
+from ..numeric.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
+from ..numeric.continuation import ASTRAY, Continuation, Point, Tangent, interpolate
 from ..numeric.projection import largest
 from ..numeric.roots import SECTIONS, carry_out, find_root, search_least
 from ..numeric.scales import Scales
-from ..runtime.constraint_kernels import constraint_system
+from ..runtime.kernels import constraint_system
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -32,12 +32,11 @@ from ..errors import (
     off_range,
     untrue,
 )
+from ..runtime.argument_checks import read_flag, read_number, read_numbers, without_dots
 from ..runtime.constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers, with_closed_rows
 from ..runtime.inputs import derive, drift, moving_inputs, rate_pairs
 from ..runtime.late import eager
 from ..runtime.layout import Layout
-from ..runtime.near_names import without_dots
-from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.tapes import Expression
 from .impact_equations import Sliding, collide, require_distances, strike
 

@@ -15,12 +15,10 @@ from ..base.limits.runs import INSTANT
 from ..base.value_rules import read_count
 from ..errors import SimulationError, cannot, no_such, off_range
 from ..numeric.roots import carry_out, find_root, search_least
-from ..runtime.columns import Columns, describe, units_of
-from ..runtime.given_start import Span, Start
+from ..runtime.columns import Columns, Residuals, describe, units_of
 from ..runtime.inputs import Forcing
 from ..runtime.refusals import refuse_rigid
-from ..runtime.run_parts import Residuals
-from ..runtime.trajectory import Trajectory
+from ..runtime.trajectory import Span, Start, Trajectory
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
 from .run_arguments import find_span, find_state
 from .simulate import simulate

@@ -1,4 +1,4 @@
-"""Simulation: Module and tolerances -> an integrator held ready: state at one time -> state at another."""
+"""Module and tolerances -> an integrator held ready: state at one time -> state at another."""
 
 from __future__ import annotations
 
@@ -11,19 +11,17 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import EvaluationError, SimulationError, UsageError, cannot, ill_shaped, no_number, off_range
+from ..runtime.argument_checks import check_names, read_plain, read_vector, require_steps
 from ..runtime.argument_names import both_names
 from ..runtime.inputs import Forcing
 from ..runtime.late import eager
-from ..runtime.near_names import check_names
 from ..runtime.refusals import refuse_moreau, refuse_rigid
-from ..runtime.room import read_plain, read_vector, require_steps
-from .bound_run import Run
+from .bound_run import Crawling, Run, StallCheck
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
 from .events import Events
 from .integrate import choose_solver
 from .run_arguments import check_method, check_tolerances, declare, own_step
 from .simulate import simulate
-from .stalling import Crawling, StallCheck
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

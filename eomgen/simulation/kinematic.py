@@ -29,15 +29,12 @@ from ..errors import (
     no_number,
     too_large,
 )
-from ..numeric.closure import close
+from ..numeric.assembly import close
 from ..numeric.projection import largest
-from ..runtime.columns import Columns, describe, units_of
-from ..runtime.given_start import Start, last_state
-from ..runtime.near_names import unknown
+from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_room, unknown
+from ..runtime.columns import Columns, Residuals, describe, units_of
 from ..runtime.refusals import refuse_states, require_velocities
-from ..runtime.room import read_flag, read_number, read_numbers, require_room
-from ..runtime.run_parts import Residuals
-from ..runtime.trajectory import Trajectory
+from ..runtime.trajectory import Start, Trajectory, last_state
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Simulation: when shapes of contacts meet -> steps that pass over none, and a warning where they start deep inside."""
+"""When shapes of contacts meet -> steps that pass over none, and a warning where they start deep inside."""
 
 from __future__ import annotations
 

@@ -16,12 +16,10 @@ from ..base.limits.runs import SAME
 from ..base.texts import shown
 from ..base.value_rules import as_count
 from ..errors import EvaluationError, SimulationError, calls_within, cannot, ill_typed, incomplete, off_range, untrue
+from ..runtime.argument_checks import check_names, read_number, require_room, require_steps, unknown
 from ..runtime.columns import Columns
-from ..runtime.given_start import Span, Start
 from ..runtime.inputs import Forcing
-from ..runtime.near_names import check_names, unknown
-from ..runtime.room import read_number, require_room, require_steps
-from ..runtime.trajectory import Trajectory
+from ..runtime.trajectory import Span, Start, Trajectory
 from .bound_run import watch_run
 from .events import Events, is_told_by_the_caller
 from .integrate import Solution

@@ -82,7 +82,7 @@ def _header(
 
 def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
     """The model, options and inputs as they were given."""
-    from ..runtime.origin import inputs_of, plain
+    from ..runtime.identity import inputs_of, plain
 
     given = {name: plain(value) for name, value in options.items() if name != "jac"}
     return {**describe(module), "options": given, "inputs": inputs_of(module, forcing)}

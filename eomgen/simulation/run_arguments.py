@@ -2,26 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import algebra
 from ..base.algebra import Array
+from ..base.limits.constraints import ALIKE
 from ..base.limits.runs import ATOL, LEAST_RTOL, RTOL
 from ..base.texts import shown
-from ..errors import ill_shaped, ill_typed, incomplete, no_choice, no_number, off_range
-from ..runtime.given_start import Span, Start, last_state
+from ..errors import AssemblyError, ill_shaped, ill_typed, incomplete, no_choice, no_number, off_range
+from ..runtime.argument_checks import as_real, read_flag, read_number, read_numbers, read_times, unknown
 from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing
-from ..runtime.near_names import unknown
-from ..runtime.room import as_real, read_flag, read_number, read_numbers, read_times
+from ..runtime.trajectory import Span, Start, last_state
 from .integrate import NAMES
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.inputs import Forcing
+    from ..runtime.layout import Layout
+
+# -- states that fit inputs --------------------------------------------------------------------------------------------
+
+
+#: Assemblies in turn, by secant steps, with inputs that depend on the state.
+ROUNDS = 50
+
+
+def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callable[[Array], Array]) -> Array:
+    """The state (n_x,) that is assembled with the inputs that it gives itself.
+
+    Parameters
+    ----------
+    layout : Layout
+    forcing : Forcing
+    t : float
+    assembled : callable
+        u (n_u,) -> the state assembled with these inputs.
+
+    Raises
+    ------
+    AssemblyError
+        None was found.
+    """
+    places = layout.constraint_inputs
+
+    def assemble(u: Array) -> tuple[Array, Array]:
+        """The state at inputs u, and the inputs at this state."""
+        x = assembled(u)
+        found = forcing(t, x)
+        forcing.require_finite()
+        return x, found
+
+    u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
+    forcing.require_finite()
+    secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
+    for _ in range(ROUNDS):
+        x, found = assemble(u)
+        gap = (found - u)[places]
+        if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
+            return x
+        if before is not None:  # Broyden's update: the slope that explains the last step
+            move, change = before
+            secant += np.outer(gap - change - secant @ move, move) / (move @ move)
+        move = algebra.lstsq(secant, -gap, rcond=None)
+        if not np.isfinite(move).all() or not move.any():
+            break
+        before, u = (move, gap), found.copy()
+        u[places] = found[places] - gap + move
+    names = ", ".join(layout.u[i] for i in places)
+    given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
+    raise AssemblyError(
+        f"the inputs {names} change with the state that the constraints give, and no state that fits both was found at "
+        f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
+        "give initial values nearer to such a state, or write the inputs in t",
+        [],
+        code="EG-CONTRADICTION",
+    )
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
 
 
 # -- tolerances and limits of steps ------------------------------------------------------------------------------------
@@ -190,8 +254,6 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
 
 def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None) -> Array:
     if forcing is not None and forcing.constrained:
-        from .led_state import find_led_state
-
         return find_led_state(module.layout, forcing, t, lambda u: _find_state(module.bind(None, u), initial, t, None))
     if initial is None:
         return module.x0(t=t) if t else module._declared_start.copy()

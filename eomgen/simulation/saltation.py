@@ -34,8 +34,7 @@ from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, 
 from ..runtime.derivative_calls import output_derivatives
 from ..runtime.inputs import Forcing
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
-from .sensitivity_result import EventSlopes
-from .sensitivity_start import Differentiated, InputSlopes, assembly_rows, keep_consistent
+from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, assembly_rows, keep_consistent
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Simulation: a run -> the run and its derivatives by parameters, inputs and initial values.
+"""A run -> the run and its derivatives by parameters, inputs and initial values.
 
 Forward sensitivities: S' = J S + df/dp beside x' = f (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
 Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
@@ -16,23 +16,22 @@ from ..base.algebra import Array, Indices
 from ..base.limits.analyses import SINGULAR
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..errors import NoDerivativeError, SimulationError
+from ..runtime.argument_checks import check_names, read_names, read_number, require_steps, unknown
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
-from ..runtime.given_start import Span, Start
 from ..runtime.inputs import Forcing
 from ..runtime.late_start import start_slopes
-from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
-from ..runtime.room import read_number, require_steps
-from .bound_run import Run
+from ..runtime.trajectory import Span, Start
+from .bound_run import Crawling, Run, StallCheck, describe_crawl
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .integrate import Solution, choose_solver, integrate, require_end
 from .meetings import limited
 from .recording import record
 from .run_arguments import DEFAULTS, check_tolerances, find_span, find_state, longest_step, ordered_times
 from .saltation import Saltation, Variational
-from .sensitivity_result import Sensitivities
 from .sensitivity_start import (
+    Sensitivities,
     SlopesNow,
     held_names,
     keep_consistent,
@@ -41,7 +40,6 @@ from .sensitivity_start import (
     start_sensitivity,
 )
 from .simulate import simulate
-from .stalling import Crawling, StallCheck, describe_crawl
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

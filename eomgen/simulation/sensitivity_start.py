@@ -1,16 +1,9 @@
-"""How an assembled initial state changes with parameters and with the values it was assembled from.
-
-Values that are held stay (or change by one, for a sensitivity to an initial value); the constraints give the rest by
-implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
-
-At a change point two branches cross.  Let l be the direction in which the constraints lose rank there, l^T C_q = 0.  A
-change of p with l^T C_p not zero opens the crossing, and the mechanism turns back or changes over: the motion is no
-smooth function of p.
-"""
+"""How an assembled initial state changes with parameters and values; the result of sensitivities."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,20 +11,127 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
+from ..base.files import whole_file
 from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
 from ..base.limits.impacts import OPENS
 from ..base.names import place_of_marker
-from ..errors import NoDerivativeError, at_odds, cannot, ill_placed, incomplete, untrue
+from ..errors import NoDerivativeError, at_odds, cannot, ill_placed, ill_typed, incomplete, untrue
 from ..numeric.projection import minimum_norm
+from ..runtime.argument_checks import unknown
 from ..runtime.change_points import scaled_jacobians
+from ..runtime.columns import Named
 from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing, Table, rate_places
 from ..runtime.layout import Layout
+from ..runtime.storage import table_path
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
+
+# -- the result --------------------------------------------------------------------------------------------------------
+
+
+class EventSlopes(NamedTuple):
+    """What happened at one event, and its derivatives by the k names.
+
+    The states' derivatives go with the event: they are those of the state at the event, whenever that is, as a
+    Poincare section takes them.  Those at a fixed time are in ``Sensitivities.dx``.
+    """
+
+    name: str
+    t: float  #: time (s)
+    before: Array  #: (n_x,) state right before
+    after: Array  #: (n_x,) state right after, the same without a reset
+    dt: Array  #: (k,) of the time
+    d_before: Array  #: (n_x, k)
+    d_after: Array  #: (n_x, k)
+
+
+class Sensitivities:
+    """A trajectory and its derivatives: ``s["theta", "k"]`` is d theta / d k over time, (n_t,).
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    t : (n_t,) array
+    names : tuple of str
+        What is differentiated by: parameters, inputs (a constant added to them), initial values.
+    dx : (n_x, k, n_t) array
+        Derivatives of the states, along the constraints.
+    dy : (n_y, k, n_t) array
+        Derivatives of the outputs.
+        Both at fixed times; at an event that changes the state there are two columns, before and after.
+    held : tuple of str
+        Coordinates and rates that keep their initial values when something else changes.
+    events : tuple of EventSlopes
+        In the order in which they happened.
+    event_times : list of (m, k) arrays
+        Derivatives of ``trajectory.t_events``, also by name: ``s.event_times["floor"][0]``.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        names: tuple[str, ...],
+        dx: Array,
+        dy: Array,
+        held: Sequence[str],
+        events: Sequence[EventSlopes] = (),
+    ) -> None:
+        self.trajectory, self.t, self.names = trajectory, trajectory.t, names
+        self.dx, self.dy, self.held, self.events = dx, dy, tuple(held), tuple(events)
+        watched = trajectory.t_events.names if len(trajectory.t_events) else ()
+        times = [[event.dt for event in self.events if event.name == name] for name in watched]
+        self.event_times = Named([np.array(found).reshape(-1, len(names)) for found in times], watched)
+        self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
+        self._rows |= dict(zip(trajectory.x_names, dx, strict=True))
+
+    def __getitem__(self, key: tuple[str, str]) -> Array:
+        if not (isinstance(key, tuple) and len(key) == 2):
+            raise ill_typed(f"write sensitivities[state or output, parameter], not {key!r}")
+        what, name = key
+        if what not in self._rows:
+            raise unknown("state or output", what, self._rows)
+        if name not in self.names:
+            raise unknown("parameter that was differentiated by", name, self.names)
+        return np.asarray(self._rows[what][self.names.index(name)])
+
+    def save(self, path: str | Path) -> Path:
+        """Write all derivatives: t, names, x_names, y_names, dx and dy to ``.npz`` (added if there is no ending), or
+        columns ``d(theta)/d(k)`` to ``.csv``.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        target = table_path(path, "sensitivities are")
+        if target.suffix == ".npz":
+            x_names, y_names = self.trajectory.x_names, self.trajectory.metadata["y_names"]
+            with whole_file(target) as file:
+                np.savez(file, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)
+            return target
+        columns = {f"d({row})/d({name})": self[row, name] for row in self._rows for name in self.names}
+        table = np.column_stack([self.t, *columns.values()])
+        head = ",".join(["t", *columns])
+        with whole_file(target) as file:
+            np.savetxt(file, table, delimiter=",", header=head, comments="", fmt="%.17g", encoding="utf-8")
+        return target
+
+    def __repr__(self) -> str:
+        return f"<Sensitivities of {self.trajectory.name} to {', '.join(self.names)}: {len(self.t)} points>"
+
+
+# -- the start ---------------------------------------------------------------------------------------------------------
+
+# Values that are held stay (or change by one, for a sensitivity to an initial value); the constraints give the rest by
+# implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
+#
+# At a change point two branches cross. Let l be the direction in which the constraints lose rank there, l^T C_q = 0. A
+# change of p with l^T C_p not zero opens the crossing, and the mechanism turns back or changes over: the motion is no
+# smooth function of p.
 
 
 # -- inputs ------------------------------------------------------------------------------------------------------------
@@ -152,7 +252,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     UsageError
         A name is none of them.
     """
-    from ..runtime.near_names import read_names, unknown
+    from ..runtime.argument_checks import read_names, unknown
 
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []

@@ -1,4 +1,4 @@
-"""Simulation: Module, span, initial values, parameters, inputs -> Trajectory, through SciPy's integrators."""
+"""Module, span, initial values, parameters, inputs -> Trajectory, through SciPy's integrators."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ from ..errors import (
     calls_within,
     cannot,
 )
-from ..runtime.given_start import Span, Start
+from ..runtime.argument_checks import check_names, read_flag, require_room, require_steps
 from ..runtime.inputs import Forcing
-from ..runtime.near_names import check_names
 from ..runtime.option_types import Number, SolverOptions
-from ..runtime.room import read_flag, require_room, require_steps
-from .bound_run import Run, watch_run
-from .compiled import can_run, integrate_compiled
+from ..runtime.trajectory import Span, Start
+from .bound_run import Crawling, Run, watch_run
+from .compiled import can_run, integrate_compiled, settle
 from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, told_by_the_caller, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .recording import record, warn_of_limits
@@ -39,8 +38,6 @@ from .run_arguments import (
     ordered_times,
     own_step,
 )
-from .settled import settle
-from .stalling import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -184,7 +181,7 @@ def simulate(
         method, last = declared["method"] if method is None else method, float(declared["end"])
         watched = Events(module.layout, events)
         if controllers is not None:
-            from .controllers import ControlledEvents
+            from .events import ControlledEvents
 
             watched = ControlledEvents(module.layout, events, controllers)
         forcing = Forcing(module.layout, inputs)

@@ -1,9 +1,7 @@
 """Solids of uniform density: one short class a type; :data:`SOLIDS` is the literal table of all of them."""
 
-from .bounded import Box, Ellipsoid, Sphere
 from .properties import MassProperties, combine, point
-from .round import Cone, Cylinder, Rod, Tube
-from .solid import Solid
+from .solid import Box, Cone, Cylinder, Ellipsoid, Rod, Solid, Sphere, Tube
 
 SOLIDS: dict[str, type[Solid]] = {
     solid.type_name: solid for solid in (Box, Cylinder, Tube, Sphere, Rod, Cone, Ellipsoid)

@@ -1,4 +1,4 @@
-"""Stage describe, meshes: an STL file -> volume, centre of mass and inertia of the solid it bounds, by trimesh."""
+"""An STL file -> volume, centre of mass and inertia of the solid it bounds, by trimesh."""
 
 from __future__ import annotations
 

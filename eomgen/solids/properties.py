@@ -1,4 +1,4 @@
-"""Stage describe, mass properties: mass, centre of mass inertia as expressions; turning, shifting, adding them."""
+"""Mass, centre of mass inertia as expressions; turning, shifting, adding them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage verification: a compiled module or a model -> how far independent ways to the same figures differ."""
+"""A compiled module or a model -> how far independent ways to the same figures differ."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage verification, bench: a module and the equations it was made from, and all that several checks look at."""
+"""A module and the equations it was made from, and all that several checks look at."""
 
 from __future__ import annotations
 

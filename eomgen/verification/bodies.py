@@ -1,4 +1,4 @@
-"""Stage verification, bodies: poses of the bodies at nearby positions -> their velocities, momenta and accelerations.
+"""Poses of the bodies at nearby positions -> their velocities, momenta and accelerations.
 
 Everything here follows from the description of the bodies (mass, centre of mass, inertia) and from where they are: no
 velocity, acceleration, Jacobian or mass matrix of the derivation enters.

@@ -1,4 +1,4 @@
-"""Stage verification, cases: a module -> random states on its constraints, and what its calls give there."""
+"""A module -> random states on its constraints, and what its calls give there."""
 
 from __future__ import annotations
 

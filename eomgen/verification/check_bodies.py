@@ -1,4 +1,4 @@
-"""Stage verification, bodies: generated code against joints and Newton's and Euler's equations of every body."""
+"""Generated code against joints and Newton's and Euler's equations of every body."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from ..base.algebra import Array
 from ..base.limits.numbers import EPS, TINY
 from ..describe.mechanism import JointSpec
 from ..forces import ReactionFriction
-from ..forces.joint_reactions import reaction_symbol
+from ..forces.friction import reaction_symbol
 from ..frames import GROUND, Marker
-from ..graph.core import Expr
-from ..graph.substitute import substitute, symbols_of
+from ..graph.core import Expr, substitute, symbols_of
 from ..joints import Continuous, Prismatic, Revolute
 from ..kinematics import Kinematics
 from . import bodies

@@ -1,4 +1,4 @@
-"""Stage verification, kernels: generated code against its graph, derivatives against differences."""
+"""Generated code against its graph, derivatives against differences."""
 
 from __future__ import annotations
 

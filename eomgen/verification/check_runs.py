@@ -1,4 +1,4 @@
-"""Stage verification, check runs: the generated steppers over single steps and short runs.
+"""The generated steppers over single steps and short runs.
 
 The reference is SciPy's DOP853 with tight tolerances on the plain right-hand side (E. Hairer, S. P. Norsett, G. Wanner,
 Solving Ordinary Differential Equations I, 2nd ed. 1993, sec. II.3 and II.10): the error of one step of a method of
@@ -20,12 +20,12 @@ from ..base.limits.analyses import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, 
 from ..base.limits.constraints import ACCEPTED
 from ..base.operations import operations_with
 from ..errors import EomgenError, SimulationError
-from ..graph.traverse import reachable
-from ..runtime.near_names import require
+from ..graph.core import reachable
+from ..runtime.argument_checks import require
+from ..simulation.compiled import step
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
 from ..simulation.simulate import simulate
-from ..simulation.steppers import step
 from .bench import Bench
 from .cases import Case
 from .finding import RIGID, Comparison, Finding, size_of
@@ -272,7 +272,7 @@ def _conservative(bench: Bench) -> bool:
 
 
 def _symbols(bench: Bench) -> set[str]:
-    from ..graph.substitute import symbols_of
+    from ..graph.core import symbols_of
 
     terms = bench.terms
     return symbols_of([terms.kinetic, terms.potential, *terms.bias])

@@ -1,4 +1,4 @@
-"""Stage verification, digits: expressions -> their values with 50 digits, and how far rounding can have moved each."""
+"""Expressions -> their values with 50 digits, and how far rounding can have moved each."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from ..base.limits.analyses import NUDGE, PAIR_ROUNDING
 from ..base.limits.numbers import EPS
 from ..base.operations import OPERATIONS, Operation
 from ..errors import MissingDependencyError
-from ..graph.core import Expr
-from ..graph.pair_calls import PairCall
-from ..graph.traverse import common_graph, reachable
+from ..graph.core import Expr, common_graph, reachable
+from ..graph.pairs import PairCall
 
 # -- values by mpmath --------------------------------------------------------------------------------------------------
 

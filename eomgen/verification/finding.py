@@ -1,4 +1,4 @@
-"""Stage verification: what one check came to, from differences beside their limits, and the table of all of them."""
+"""What one check came to, from differences beside their limits, and the table of all of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage verification, identities: a module alone -> what must hold between its own results, whatever the model is."""
+"""A module alone -> what must hold between its own results, whatever the model is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage verification, states: the symbols of a model at a state in many digits, and at states nearby."""
+"""The symbols of a model at a state in many digits, and at states nearby."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage verification, truth: a state -> the equations of motion there, found again without the derivation.
+"""A state -> the equations of motion there, found again without the derivation.
 
 Of bodies: d'Alembert's principle in Newton's and Euler's equations of every body, with velocities and accelerations
 from differences of where the bodies are.  Of a bare Lagrangian: Lagrange's equations by differences of L.  Of given

@@ -1,4 +1,4 @@
-"""Stage verification, variants: the same mechanism described differently -> how far its accelerations differ.
+"""The same mechanism described differently -> how far its accelerations differ.
 
 Each change is a function of a Mechanism.  Coordinates keep their names and meaning, so the same state gives the same
 accelerations, by whatever method, target, frames of bodies and cuts of loops they were derived.
@@ -22,7 +22,7 @@ from ..equations import METHODS
 from ..errors import EomgenError, ToolchainError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
-from ..graph.copies import copied
+from ..graph.core import copied
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics.topology import Topology, find_topology
 from ..runtime.bound_model import BoundModel

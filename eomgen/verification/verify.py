@@ -1,4 +1,4 @@
-"""Stage verification, verify: a module, or a model and its module -> everything that was compared, in one table.
+"""A module, or a model and its module -> everything that was compared, in one table.
 
 The order is: what the module says of itself; then, where the equations it was made from are there, the graph, the free
 bodies, constraints, derivatives and runs; then what concerns the model as it was described.
@@ -133,7 +133,7 @@ def _with_equations(
     why = _only_in_c(equations)
     if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs, variants", why)]
-    from ..equations.digits_kept import FREE, note_lost_digits, smallest_share
+    from ..equations.positive import FREE, note_lost_digits, smallest_share
     from .bench import Bench
 
     bench, found = Bench(module, equations, cases), []

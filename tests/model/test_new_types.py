@@ -18,8 +18,7 @@ from eomgen.elements.element_type import element, key
 from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
 from eomgen.forces import FORCES, View
-from eomgen.forces.paths import PathForce
-from eomgen.forces.routes import LINE
+from eomgen.forces.paths import LINE, PathForce
 from eomgen.frames import Marker
 from eomgen.graph import vectors as vec
 from eomgen.graph.core import Expr, Graph

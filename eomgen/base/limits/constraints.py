@@ -1,6 +1,6 @@
 """Limits: when constraints count as closed, rows as dependent, a change point as passed.  One error model for all.
 
-Rows and coordinates are scaled so that entries of the Jacobian J are about 1 (:mod:`eomgen.kinematics.row_scales`).
+Rows and coordinates are scaled so that entries of the Jacobian J are about 1, by the sizes of rows and coordinates.
 Then C and J are known to EXACT, a few roundings of terms of size 1.  Along a direction of singular value s, relative to
 the largest, this tells the position to EXACT / s, velocities of size V to V EXACT / s^2, since J turns with the
 position, and accelerations to V^2 EXACT / s^3.  In mechanisms of hundreds of rows, or far from their origin, sums are

@@ -31,9 +31,9 @@ from ...compilation.compiler import Options
 from ...describe.units import read_unit
 from ...errors import ModelError, Problem, bad_file, no_choice
 from ...layer import read_layer
-from ...runtime.allowed_parameters import bounds_of
 from ...runtime.bound_model import BoundModel
 from ...runtime.inputs import Forcing
+from ...runtime.layout import bounds_of
 from ...targets import FMI_VERSIONS
 from ..c import emit_c
 from ..files import number_texts, read_template, render

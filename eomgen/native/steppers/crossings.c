@@ -1,5 +1,5 @@
 /* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again.
-   Python's loop does the same: simulation/event_crossings.py. */
+   Python's loop does the same: simulation/integrate.py. */
 #include <math.h>
 #include <string.h>
 

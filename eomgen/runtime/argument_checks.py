@@ -1,0 +1,381 @@
+"""Names and numbers as a user gives them -> arrays, or errors that say what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import nullcontext
+from importlib import import_module
+from math import isfinite
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..base.algebra import Array
+from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
+from ..base.names import undotted
+from ..base.texts import shown
+from ..base.value_rules import as_count, read_count
+from ..errors import (
+    MissingDependencyError,
+    UnavailableError,
+    UsageError,
+    at_odds,
+    ill_shaped,
+    ill_typed,
+    no_number,
+    too_large,
+)
+
+# -- numbers, sizes and durations --------------------------------------------------------------------------------------
+
+
+#: What Python or NumPy would make a float of, or NaN, though it is no real number.
+UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))
+#: Numbers that are read without a look at each.
+PLAIN = frozenset((float, int, bool, np.float64))
+DEEPEST = 64  #: lists in lists, as in NumPy
+
+
+def require_room(what: str, numbers: float, remedy: str) -> None:
+    """Refuse what would keep more numbers than ``MOST_NUMBERS``, before any of them is made.
+
+    Raises
+    ------
+    UsageError
+    """
+    if numbers > MOST_NUMBERS:
+        raise too_large(
+            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call can keep at most "
+            f"{MOST_NUMBERS:.3g}; {remedy}"
+        )
+
+
+def require_steps(name: str, step: float, start: float, end: float) -> None:
+    """Refuse steps of limited size that are too many for a run, or too small for its times.
+
+    Raises
+    ------
+    UsageError
+    """
+    latest = max(abs(start), abs(end))
+    if abs(end - start) > MOST_STEPS * step or (start != end and latest + step == latest):
+        raise UsageError(
+            f"{name} = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end",
+            code="EG-ENDLESS",
+        )
+
+
+def as_real(given: Any) -> Array | None:
+    """What is given as an array of floats (float64), itself if it is one; None if these are no real numbers.
+
+    Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
+    in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none, nor is what fails to
+    convert, whatever it raises.  The compiled layer has the same rule in C, eomgen/native/_numbers.pxi.
+    """
+    try:
+        if type(given) is np.ndarray:
+            if given.dtype == np.float64:
+                return given
+            if given.dtype.kind in "biuf" and given.itemsize <= 8:
+                return given.astype(float)
+        elif type(given) in (list, tuple) and PLAIN.issuperset(map(type, given)):
+            return np.array(given, dtype=float)
+        elif has_masked(given):
+            return None
+        array = np.asarray(given)
+        kind = array.dtype.kind
+        if kind not in "biufO":
+            return None
+        if kind == "O" and any(isinstance(one, UNREAL) or has_masked(one) for one in array.flat):
+            return None
+        with np.errstate(over="ignore") if array.itemsize > 8 else nullcontext():
+            return array.astype(float, copy=False)
+    except MemoryError:
+        raise
+    except Exception:  # of an object's own __array__, __float__, ...
+        return None
+
+
+def has_masked(given: Any, depth: int = 0) -> bool:
+    """Whether NumPy would read the value under a masked entry, or NaN, in an array or in lists of these."""
+    if isinstance(given, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(given))
+    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
+        return False
+    return any(has_masked(one, depth + 1) for one in given)
+
+
+def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
+    """Real numbers as an array of floats, refused where `width` numbers for each column (n, k) would not fit.
+
+    Raises
+    ------
+    UsageError
+    """
+    shape = np.shape(given) if isinstance(given, np.ndarray) else ()
+    if len(shape) > 1:
+        require_room(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
+    return _floats(what, given, f"{what} must hold real numbers")
+
+
+def read_vector(what: str, given: Any, n: int, error: Callable[[str], Exception] = ill_shaped) -> Array:
+    """An array of n floats.
+
+    Raises
+    ------
+    error
+    """
+    found = as_real(given)
+    if found is None:
+        raise error(f"{what} must hold real numbers, ({n},), not {shown(given)}")
+    if found.shape != (n,):
+        raise error(f"{what} must have shape ({n},), not {found.shape}")
+    return found
+
+
+def fitting(
+    out: Any, shape: tuple[int, ...], what: str = "out", error: Callable[[str], Exception] = ill_shaped
+) -> Array:
+    """The array that takes a result, if it can."""
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64:
+        given = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
+        raise error(f"{what} must be a float64 array of shape {shape}, not {given}")
+    if not out.flags.writeable:
+        raise error(f"{what} is read-only")
+    if out.size and any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
+        raise error(f"{what} has strides {out.strides}: several of its entries are one number in memory")
+    return out
+
+
+def read_times(what: str, given: Any, per_time: int) -> Array:
+    """Times as an array of floats (n,), refused where a row of `per_time` numbers for each would not fit.
+
+    Raises
+    ------
+    UsageError
+    """
+    try:
+        length = len(given)
+    except Exception:  # one number, or what is no list of times
+        length = 0
+    require_room(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
+    return np.array(_floats(what, given, f"{what} must be a list of times in seconds"))
+
+
+def read_number(what: str, given: Any) -> float:
+    """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
+
+    Raises
+    ------
+    UsageError
+    """
+    return read_plain(what, read_text(what, given) if isinstance(given, str) else given)
+
+
+def read_plain(what: str, given: Any) -> float:
+    """One finite real number, as compiled code takes it, which reads no texts.
+
+    Raises
+    ------
+    UsageError
+    """
+    if type(given) is float:
+        result = given
+    else:
+        found = as_real(given)
+        if found is None or found.ndim:
+            raise no_number(f"{what} must be a number, not {shown(given)}")
+        result = float(found)
+    if not isfinite(result):
+        raise no_number(f"{what} must be finite, not {result}")
+    return result
+
+
+def read_text(what: str, given: str) -> float:
+    """The value of an expression of numbers as text: ``"10*pi/180"``.
+
+    Raises
+    ------
+    UsageError
+        Texts are read where eomgen is: a generated package has no parser.
+    """
+    try:
+        from ..describe.expressions import constant
+    except ImportError:
+        raise no_number(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
+    return constant(given, what)
+
+
+def with_numbers(what: str, given: Any, depth: int = 0) -> Any:
+    """Lists and tuples of numbers with the values of the texts in them; anything else as it is.
+
+    Raises
+    ------
+    UsageError
+        A text that is no number.
+    """
+    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
+        return given
+    return [read_text(what, one) if isinstance(one, str) else with_numbers(what, one, depth + 1) for one in given]
+
+
+def read_flag(what: str, given: Any) -> bool:
+    """True or False.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(given, (bool, np.bool_)):
+        raise ill_typed(f"{what} must be True or False, not {shown(given)}")
+    return bool(given)
+
+
+def _floats(what: str, given: Any, wanted: str) -> Array:
+    found = as_real(with_numbers(what, given))
+    if found is None:
+        raise ill_typed(f"{wanted}, not {shown(given)}")
+    return found
+
+
+def read_axis(label: str, given: Any) -> Array:
+    """Values of one axis from (low, high, count) or from the values themselves."""
+    what = f"{label}: give (low, high, count) or two or more rising or falling values"
+    if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
+        count = read_count(f"{label}: the third of (low, high, count)", given[2], 2, 10_000_000)
+        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
+    values = as_real(given)
+    if values is None:
+        raise ill_typed(f"{what}, not {shown(given)}")
+    steps = np.diff(values) if values.ndim == 1 else np.empty(0)
+    if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise ill_typed(f"{what}, not {shown(given)}")
+    return values
+
+
+# -- names -------------------------------------------------------------------------------------------------------------
+
+
+_SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
+
+
+class UnknownNameError(UsageError, KeyError, code="EG-NAME-UNKNOWN"):
+    """A key that does not exist; also a KeyError, so that mappings behave as expected."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+def without_dots(given: Mapping[Any, Any], instances: Mapping[str, str]) -> dict[Any, Any]:
+    """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``, which must not be given beside it."""
+    found = {plain_name(name, instances): value for name, value in given.items()}
+    if len(found) < len(given):
+        twice = [name for name in given if plain_name(name, instances) != name and plain_name(name, instances) in given]
+        raise at_odds(f"{', '.join(map(repr, twice))} is given under both of its names; give it once")
+    return found
+
+
+def plain_name(name: object, instances: Mapping[str, str]) -> Any:
+    """The name as the model has it; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
+    return undotted(name, instances) if isinstance(name, str) else name
+
+
+def unknown(what: str, name: object, allowed: Iterable[str], place: str = "") -> UnknownNameError:
+    """The error for an unknown name, with near misses or, if there are none, what there is."""
+    return UnknownNameError(f"{place}{': ' * bool(place)}no {what} {name!r}; {_hint(name, allowed)}")
+
+
+def find_lacking(one: object, kind: str, name: str) -> Any:
+    """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
+
+    Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
+
+    Raises
+    ------
+    UnavailableError
+        With near misses, an AttributeError too; a property that raised one raises its own again.
+    """
+    if name.startswith("_"):
+        raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
+    if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
+        return own.__get__(one, type(one))
+    public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
+    answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
+    meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
+    raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}")
+
+
+def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
+    choice = list(dict.fromkeys(allowed))
+    if near := import_module("..base.names", __package__).closest(name, choice, 3):
+        return f"did you mean {' or '.join(near)}?"
+    if not choice:
+        return "there are none"
+    first = ", ".join(choice[:most])
+    return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
+
+
+def check_names(
+    what: str, given: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()
+) -> None:
+    """Raise :class:`UnknownNameError` for the first name not allowed; `further` ones are suggested too."""
+    for name in given:
+        if name not in allowed:
+            raise unknown(what, name, [*allowed, *further])
+
+
+def read_names(what: str, given: Any) -> tuple[str, ...]:
+    """One name or several as a tuple of texts.
+
+    Raises
+    ------
+    UsageError
+    """
+    if isinstance(given, str):
+        return (given,)
+    try:
+        names = tuple(given)
+    except TypeError:
+        names = (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise ill_typed(f"{what} must be a name or a list of names, not {shown(given)}")
+    return names
+
+
+def require_mapping(what: str, given: Any) -> None:
+    """Refuse what does not give values by name.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(given, Mapping):
+        raise ill_typed(f"{what} must be a mapping of names to values, not {shown(given)}")
+
+
+def require(module: str, extra: str, purpose: str) -> ModuleType:
+    """Import an optional package, or say in one line what to install."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        if error.name is not None and error.name.partition(".")[0] != package:
+            raise  # the package is there and something it needs is not
+        raise MissingDependencyError(f"{purpose} needs {package}: pip install {extra}") from error
+
+
+def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
+    """Refuse a function that cannot be called as f(t, x); one that shows no signature is left to its first call."""
+    from inspect import signature
+
+    try:
+        taken = signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        taken.bind(0.0, None)
+    except TypeError:
+        given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
+        remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
+        raise ill_typed(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None
