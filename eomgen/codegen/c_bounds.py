@@ -1,4 +1,4 @@
-"""what a call of a C function costs at most: operations, and bytes on the stack."""
+"""What a call of a C function costs at most: operations, and bytes on the stack."""
 
 from __future__ import annotations
 

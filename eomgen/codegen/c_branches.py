@@ -1,4 +1,4 @@
-"""pairs of statements of alike branches -> C statements over the type ``both`` of eomgen_real.h."""
+"""Pairs of statements of alike branches -> C statements over the type ``both`` of eomgen_real.h."""
 
 from __future__ import annotations
 

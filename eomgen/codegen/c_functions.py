@@ -1,4 +1,4 @@
-"""the functions a program calls -> C files of their own: tables as constants, native sources as they are.
+"""The functions a program calls -> C files of their own: tables as constants, native sources as they are.
 
 The arithmetic is that of :mod:`eomgen.numeric.user_functions`.  Everything is re-entrant: tables are constant.
 """

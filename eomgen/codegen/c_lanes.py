@@ -1,4 +1,4 @@
-"""the straight-line functions of a model once more, for several states side by side (lanes).
+"""The straight-line functions of a model once more, for several states side by side (lanes).
 
 The right-hand side of closed loops has lanes where it is made of straight-line blocks: lanes that need more, such as
 pivoting, are left to the function of one state (eomgen_straight.h).

@@ -1,4 +1,4 @@
-"""the segments of a block -> C99 functions, one for each kind, that go through tables of places."""
+"""The segments of a block -> C99 functions, one for each kind, that go through tables of places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""the terms of a right-hand side -> a C function of the Taylor coefficients of the motion.
+"""The terms of a right-hand side -> a C function of the Taylor coefficients of the motion.
 
 Coefficients are made order by order.  A product has a_0 b_k + a_k b_0 and a sum over lower orders; these sums come
 first, all together and in vector registers, so that little is left to wait for each other.

@@ -1,4 +1,4 @@
-"""a straight-line block -> C99 functions in static single assignment.
+"""A straight-line block -> C99 functions in static single assignment.
 
 Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.  The text is written over the type
 ``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).  A value that is used

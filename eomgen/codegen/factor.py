@@ -1,4 +1,4 @@
-"""mass matrix on the graph + its branch-induced pattern -> straight-line L^T D L solution on the graph.
+"""Mass matrix on the graph + its branch-induced pattern -> straight-line L^T D L solution on the graph.
 
 R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5: M = L^T D L with L unit lower triangular and
 L[i, j] non-zero only where j lies on the path from i to ground, so that branches never fill in.  No square roots, one

@@ -1,4 +1,4 @@
-"""loops whose state is far from any change point -> the shortest straight-line form.
+"""Loops whose state is far from any change point -> the shortest straight-line form.
 
 All motions are v = B y with the preferred velocities y: B follows from the rows by orthogonal combinations
 (:mod:`.linear_algebra`), block by block, so that every leg of a platform is paid for by itself.  With weights

@@ -1,4 +1,4 @@
-"""a right-hand side by articulated bodies with multipliers -> its derivatives along directions.
+"""A right-hand side by articulated bodies with multipliers -> its derivatives along directions.
 
 Implicit differentiation of r1 = M a + h + C_q^T l = 0 and r2 = C_q a + gamma = 0 at the projected state: the changes
 (da, dl) along a direction solve the same system as (a, l) do, so that the pivots of bodies and of rows are used again

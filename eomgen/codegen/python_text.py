@@ -1,4 +1,4 @@
-"""a straight-line block -> Python functions of NumPy operations, for one state or k states at once.
+"""A straight-line block -> Python functions of NumPy operations, for one state or k states at once.
 
 Every operation means what :mod:`eomgen.graph.evaluate` makes of it on arrays.
 """

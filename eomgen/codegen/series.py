@@ -1,4 +1,4 @@
-"""the right-hand side -> terms whose Taylor coefficients along the motion follow from each other.
+"""The right-hand side -> terms whose Taylor coefficients along the motion follow from each other.
 
 Each operation has a recurrence for its coefficient of order k, from lower ones and its operands' up to k:
 A. Griewank, A. Walther, Evaluating Derivatives, 2008, section 13.2; A. Jorba, M. Zou, Exp. Mathematics 14, 2005.

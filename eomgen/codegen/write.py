@@ -1,4 +1,4 @@
-"""the files of a package -> a folder that holds them, and none that an earlier generation left."""
+"""The files of a package -> a folder that holds them, and none that an earlier generation left."""
 
 from __future__ import annotations
 

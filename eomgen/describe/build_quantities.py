@@ -1,4 +1,4 @@
-"""Their entries -> Parameter, Input and Output, values in SI units."""
+"""Parameters, inputs and outputs: their entries -> Parameter, Input and Output, values in SI units."""
 
 from __future__ import annotations
 

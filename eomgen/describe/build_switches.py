@@ -1,4 +1,4 @@
-"""Their keys -> a state 1 or 0, events, and the constraint apart.
+"""Constraints that close and open: their keys -> a state 1 or 0, events, and the constraint apart.
 
 A constraint of that kind is no equation of the mechanism; it acts by a force while its state is 1.
 """

@@ -1,4 +1,4 @@
-"""Keys by the table of fields, names, connection to ground."""
+"""Checks without kinematics: keys by the table of fields, names, connection to ground."""
 
 from __future__ import annotations
 

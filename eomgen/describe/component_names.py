@@ -1,4 +1,4 @@
-"""Those that it declares, and the same as one of its instances has them."""
+"""Names of a component: those that it declares, and the same as one of its instances has them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Its keys -> expressions, markers, coordinates, bodies."""
+"""One entry of a section of elements: its keys -> expressions, markers, coordinates, bodies."""
 
 from __future__ import annotations
 

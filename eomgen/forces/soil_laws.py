@@ -1,4 +1,4 @@
-"""DOC"""
+"""Laws of soil: sinkage with unloading, shear that builds up with displacement, and published numbers of soils."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DOC"""
+"""Expressions -> their derivatives (forward, reverse, sparse Jacobians), as expressions of the same graph."""
 
 from __future__ import annotations
 

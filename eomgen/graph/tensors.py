@@ -1,4 +1,4 @@
-"""DOC"""
+"""Matrices and inertia tensors of expressions with few operations; solutions of symmetric systems."""
 
 from __future__ import annotations
 

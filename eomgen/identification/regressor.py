@@ -1,4 +1,4 @@
-"""DOC"""
+"""States and accelerations -> the matrix Y by which a tree's forces are linear in inertial parameters."""
 
 from __future__ import annotations
 

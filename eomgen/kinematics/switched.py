@@ -1,4 +1,4 @@
-"""Switched -> their equations, and loads of multipliers for them.
+"""Constraints that close and open: Switched -> their equations, and loads of multipliers for them.
 
 While closed, w = C'' + 2 b C' + b^2 C = 0 of an equation of positions, C' + b C of one of velocities, whose error dies
 away at the rate b (J. Baumgarte, Comput. Methods Appl. Mech. Eng. 1 (1972), 1-16).  The multiplier l acts as -C_q^T l.

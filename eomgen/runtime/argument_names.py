@@ -1,4 +1,4 @@
-"""P and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``."""
+"""Arguments: p and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Z = [q; p], coordinates and momenta -> the canonical equations of a model and its Hamiltonian."""
+"""The state z = [q; p], coordinates and momenta -> the canonical equations of a model and its Hamiltonian."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def origin(module: BoundModel) -> dict[str, Any]:
             "eomgen": facts.get("eomgen"),
             "python": sys.version.partition(" ")[0],
             "numpy": np.__version__,
-            "compiler": getattr(module.core, "compiler", None),
+            "compiler": None if facts.get("target") == "numpy" else getattr(module.core, "compiler", None),
         },
     }
 

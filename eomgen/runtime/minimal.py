@@ -1,4 +1,4 @@
-"""X = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
+"""States x = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DOC"""
+"""Data of a picture and poses over frames -> solids and lines, each fixed to a body or following it, in colours."""
 
 from __future__ import annotations
 

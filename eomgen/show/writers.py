@@ -1,4 +1,4 @@
-"""DOC"""
+"""Frames -> GIF, MP4, or PNG files in a folder, with few colours where a format has few."""
 
 from __future__ import annotations
 

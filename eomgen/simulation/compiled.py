@@ -1,4 +1,8 @@
-"""DOC"""
+"""Right-hand side, corners of the inputs -> times and states, through the module's own steppers.
+
+The whole loop runs in C, events and inputs included; Python looks in every few milliseconds, for the progress line and
+for an interrupt.
+"""
 
 from __future__ import annotations
 

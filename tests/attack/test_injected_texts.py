@@ -99,7 +99,7 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[
 
 # -- C ----------------------------------------------------------------------------------------------------------------
 #: The literals of the metadata: harmless characters, and all others as escapes of three digits.
-METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
+METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:\[\]-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
 
 
 def code_of(text: str) -> list[str]:
@@ -148,9 +148,8 @@ class NoTexts(ast.NodeTransformer):
         return ast.Constant("") if isinstance(node.value, str) else node
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
-def test_python_packages_hold_the_texts_as_strings_only(packages: Any, target: str) -> None:
-    nasty, plain = packages(target)
+def test_python_packages_hold_the_texts_as_strings_only(packages: Any) -> None:
+    nasty, plain = packages("cython")
     changed = [file for file in nasty if nasty[file] != plain[file]]
     assert {"__init__.py", "model.json", "README.md"} <= set(changed)
     for file in changed:
