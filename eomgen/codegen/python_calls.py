@@ -74,7 +74,7 @@ def describe_calls(program: Program) -> list[Call]:
         Call("canonical.expand(z)", _shape(s.n_x), "x = [q; v] of z"),
         Call("canonical.hamiltonian(z)", "number", "H = p v - L (J)"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
-        Call("simulate(span, initial=None)", "Trajectory", "a run; needs SciPy"),
+        Call("simulate(span, initial=None)", "Trajectory", "a run; SciPy where its methods or functions are asked for"),
         Call("linearize(x=None, t=0.0)", "Linearization", "A, B, C, D along the constraints, eigenvalues"),
         Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
         Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),

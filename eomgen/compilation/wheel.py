@@ -58,10 +58,11 @@ def require_wheel(target: str) -> None:
     """
     able = [name for name, row in TARGETS.items() if row.module and row.package]
     if target not in able:
-        about = TARGETS[target].about if target in TARGETS else "package of another kind"
-        raise cannot(
-            f"--wheel is for target {' or '.join(able)}; target {target} makes a {about}: generate it without --wheel"
-        )
+        row = TARGETS.get(target)
+        session = row is not None and not (row.package or row.whole)
+        what = "is for a session" if session else f"makes a {row.about if row else 'package of another kind'}"
+        remedy = "write --target cython --wheel"
+        raise cannot(f"--wheel is for target {' or '.join(able)}; target {target} {what}: {remedy}")
     try:
         version = metadata.version("setuptools")
     except metadata.PackageNotFoundError:

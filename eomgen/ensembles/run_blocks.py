@@ -74,7 +74,7 @@ class Statistics:
             states, times = block.samples, np.repeat(plan.t_eval[:, None], cases.count, axis=1)
         grains = []
         values = [with_outputs(module, cases, plan, states[:, j], t) for j, t in enumerate(times)]
-        for start in range(0, cases.count, GRAIN):
+        for start in range(0, max(cases.count, 1), GRAIN):
             parts = [summarise(x[:, start : start + GRAIN]) for x in values]
             grains.append({name: np.stack([part[name] for part in parts], axis=-1) for name in parts[0]})
         return {name: np.stack([grain[name] for grain in grains]) for name in grains[0]}
