@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, Protocol
 from ..base.value_rules import Allowed
 from ..frames import Marker
 from ..graph.core import Expr, Graph
-from ..graph.vectors import Mat3, Vec3
 from .kinds import Field, Fields
 
 
@@ -34,19 +33,6 @@ class Meaning(NamedTuple):
     kind: str
     level: int | None = None
     measure: str = ""
-
-
-class BodyData(Protocol):
-    """Mass, centre of mass and inertia of a body, in its axes."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def mass(self) -> Expr: ...
-    @property
-    def com(self) -> Vec3: ...
-    @property
-    def inertia(self) -> Mat3: ...
 
 
 class Entry(Protocol):

@@ -187,11 +187,6 @@ def _plain(text: str) -> str:
     return text.replace("$", "").replace("`", "'")
 
 
-def expressions_of(element: Any) -> list[tuple[str, Expr]]:
-    """Fields of an element that are expressions, with their names."""
-    return [(name, x) for name, x in vars(element).items() if isinstance(x, Expr)]
-
-
 # -- motion and constraints --------------------------------------------------------------------------------------------
 
 
@@ -339,9 +334,6 @@ def _determinant(rows: list[list[Expr]]) -> Expr:
 
 
 # -- force elements ----------------------------------------------------------------------------------------------------
-
-
-MANY_FORCES = 12  #: force elements from which those of one type share one sentence
 
 
 def forces(author: Author) -> list[Section]:

@@ -46,8 +46,6 @@ BED_CELL = "cell"  #: class of the cells, whose states belong to no pair
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
-#: Parts that meet surfaces and have no states.
-STATELESS = ("rim", "sole", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres and ellipsoids meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet

@@ -302,11 +302,6 @@ def pair_call(graph: Graph, operation: str) -> PairCall | None:
     return found[0] if found is not None and isinstance(found[0], PairCall) else None
 
 
-def has_pair_sums(graph: Graph) -> bool:
-    """Whether there are sums over pairs among the nodes."""
-    return any(isinstance(function, PairCall) for function, _ in graph.calls.values())
-
-
 def pairs_of_bodies(graph: Graph) -> int:
     """How many blocks of six by six the derivatives of all sums have by the motion of bodies."""
     sums = {call.function.element: call.function for call, _ in graph.calls.values() if isinstance(call, PairCall)}

@@ -379,43 +379,6 @@ def _builders() -> dict[Any, Build]:
 # -- to SymPy ----------------------------------------------------------------------------------------------------------
 
 
-def raise_inline(
-    exprs: Sequence[Expr], symbols: Callable[[str], Any] = sympy.Symbol, limit: int = 100_000
-) -> list[Any]:
-    """SymPy expressions with everything written out.
-
-    Parameters
-    ----------
-    exprs : sequence of Expr
-        Expressions of one graph.
-    symbols : callable, optional
-        Name -> the SymPy symbol (or ``q(t)``) that stands for it.
-    limit : int, optional
-        Largest :func:`inlined_size` that is written out.
-
-    Returns
-    -------
-    list of sympy.Expr
-        One per expression.  SymPy orders sums and products its own way, so values agree up to rounding.
-
-    Raises
-    ------
-    ValueError
-        Written out, the expressions would exceed ``limit``; use :func:`raise_named`.
-    """
-    graph = common_graph(exprs)
-    if graph is None:
-        return []
-    size = inlined_size(exprs)
-    if size > limit:
-        raise ValueError(f"written out, these are {size} operations, over the limit of {limit}; use raise_named")
-    roots = [x.id for x in exprs]
-    made: dict[int, Any] = {}
-    for i in reachable(graph, roots):
-        made[i] = _raised(graph, i, made, symbols)
-    return [as_number(made[i]) for i in roots]
-
-
 def raise_named(
     exprs: Sequence[Expr], symbols: Callable[[str], Any] = sympy.Symbol, prefix: str = "z", limit: int = 50
 ) -> tuple[list[tuple[Any, Any]], list[Any]]:

@@ -173,11 +173,6 @@ class Placement:
         """The outer frame in this one."""
         return Placement(self.rotation.T, -(self.rotation.T @ self.position))
 
-    @property
-    def is_identity(self) -> bool:
-        """Nothing is turned or moved, to the last bit."""
-        return bool(np.array_equal(self.rotation, np.eye(3)) and not self.position.any())
-
     def reference(self, body: str) -> str | dict[str, object]:
         """This frame in a body, as a model file writes a marker."""
         placed = self.placed()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -74,8 +74,6 @@ RECORD = 2 + SPOT
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 COLUMNS = 2  #: distances count beside columns
 NEVER = 1e300  #: (s) where no shapes come towards each other
-
-Narrow = Callable[[Sequence[Any]], Sequence[Any]]
 
 
 class PairSum:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from fractions import Fraction
 from functools import reduce
 from typing import NamedTuple
@@ -194,21 +194,6 @@ def readable_content(values: list[Number]) -> Number:
 def _whole_root(n: int) -> int:
     root = int(n**0.5 + 0.5)
     return root if root * root == n else 0
-
-
-def sums_in(polys: Iterable[Poly], atoms: Atoms) -> dict[int, int]:
-    """How often each factored sum is used, its uses inside others included."""
-    count: dict[int, int] = {}
-    stack = list(polys)
-    while stack:
-        poly = stack.pop()
-        for monomial in poly:
-            for atom, _ in monomial:
-                if atoms.table[atom].kind == "factor":
-                    count[atom] = count.get(atom, 0) + 1
-                    if count[atom] == 1:
-                        stack.append(dict(atoms.table[atom].what))
-    return count
 
 
 # -- exact quotients ---------------------------------------------------------------------------------------------------

@@ -135,7 +135,7 @@ def good_values(module: Any) -> dict[str, Any]:
         "inputs": dict(zip(module.u_names, module.u, strict=True)), "names": [*module.p_names[:1], first],
         "gaps": {first: 0.5}, "lock": [first], "hold": [first], "unknowns": list(module.p_names[:1]),
         "over": {first: (0.0, 0.5, 3)}, "of": first, "method": None, "step": None, "store": None,
-        "resume": None, "progress": False, "form": "minimal", "independent": [first], "weights": {first: 2.0}, "points": 10,
+        "progress": False, "form": "minimal", "independent": [first], "weights": {first: 2.0}, "points": 10,
         "most": 3, "limits": True, "partial": True, "closed": True, "within": (0.0, 1.0), "actuated": [first],
         "options": dict(OPTIONS), "count": 2, "threads": 1, "block": 1, "keep_events": 2, "max_steps": 1000,
         "reduce": "states", "samples": 3, "states": 1, "named": start, "led": {first: [start[first], start[first] + 0.01]},
