@@ -177,7 +177,7 @@ class Columns:
         q, v = self.x[: layout.n_q], self.x[layout.n_q :]
         y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
         angles = layout.loop_angles
-        y[0, angles] = np.unwrap(y[0, angles], axis=-1)
+        y[0, angles] = self._unwrapped(y[0, angles], angles)
         parameters = [k for k, kind in enumerate(layout.loop_kinds) if kind == "parameter"]
         for k in range(0, len(parameters), 4):  # e and -e are one rotation: the nearer one goes on
             four = parameters[k : k + 4]
@@ -185,6 +185,20 @@ class Columns:
             turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
             y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_loop_coordinates, -1)
+
+    def _unwrapped(self, found: Array, angles: Array) -> Array:
+        """Angles of cut joints (k, n_t), whose turns count along the steps of the run, whatever times are stored."""
+        t, x, u = (self.t[:0],) * 3 if self._steps is None or not len(angles) else self._steps()
+        if not len(t):
+            return np.unwrap(found, axis=-1)
+        n = self.module.layout.n_q
+        kernel = self.module.kernels.motion("loop_coordinates")
+        between = kernel(x[:n], x[n:], np.zeros_like(x[n:]), u=u if u.size else None, t=t)[0, angles]
+        forward = 1.0 if t[-1] >= t[0] else -1.0
+        order = np.argsort(forward * np.concatenate([t, self.t]), kind="stable")
+        turned = np.empty((len(angles), len(order)))
+        turned[:, order] = np.unwrap(np.concatenate([between, found], axis=-1)[:, order], axis=-1)
+        return turned[:, len(t) :]
 
     @property
     def has_energies(self) -> bool:

@@ -242,3 +242,20 @@ def test_a_run_and_its_file_say_where_they_come_from(target: str, tmp_path: Path
     assert header["origin"] == facts["origin"]
     assert header["inputs"] == facts["inputs"]
     assert header["count"] == 2
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0, 2.0], [2.0]])
+def test_a_cut_joint_counts_its_turns_along_the_run_whatever_is_stored(times: list[float]) -> None:
+    m = eg.Model("turning")
+    crank, rod, slider = (m.body(name, mass=1, inertia={"zz": 0.1}) for name in ("crank", "rod", "slider"))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.prismatic("S", m.ground, slider, axis="x", coordinate="s")
+    m.revolute("C", slider, rod.at(0.6, 0, 0), coordinate="c")
+    m.revolute("P", crank.at(0.2, 0, 0), rod)
+    m.independent("theta")
+    m.initial(theta=0.3, theta_dot=10)
+    m.guess(c=-0.1)
+    module = m.compile(target="numpy")
+    run = module.simulate(2.0, t_eval=times)
+    assert run["P"][-1] == pytest.approx(module.simulate(2.0)["P"][-1], abs=1e-7)
+    assert run["P"][-1] == pytest.approx(run["c"][-1] - run["theta"][-1], abs=1e-9)  # both ends turn about z
