@@ -38,7 +38,7 @@ LITERAL, LINE = 4000, 112
 #: A block of more inputs has no comment with their names.
 NAMED = 100
 #: All that could end a literal, begin an escape, a trigraph or a comment, be read as code, or is no plain character.
-UNSAFE = re.compile(r"[^]A-Za-z0-9 _.,:[-]")
+UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:-]")
 
 
 def emit_c(program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True) -> SourceSet:

@@ -99,7 +99,7 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[
 
 # -- C ----------------------------------------------------------------------------------------------------------------
 #: The literals of the metadata: harmless characters, and all others as escapes of three digits.
-METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:\[\]-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
+METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
 
 
 def code_of(text: str) -> list[str]:

@@ -43,6 +43,10 @@ class Compared:
         self.equations = eg.load_example(name).derive(method)
         self.module: Any = self.equations.compile(target="numpy")
         self.x = random_state(self.module, seed)
+        if self.module.metadata["constraint_labels"] and self.module.n_q == self.module.n_v:
+            q = self.x[: self.module.n_q]  # one more Newton step: gamma may be that of the residual alone
+            C = self.module.constraints(q)
+            self.x[: len(q)] = q - np.linalg.pinv(self.module.constraint_jacobian(q)[: len(C)]) @ C
         self.values = state_values(self.module, self.x)
         n = self.module.n_q + self.module.n_v
         self.q, self.v = self.x[: self.module.n_q], self.x[self.module.n_q : n]
@@ -82,8 +86,7 @@ def compare_constraints(c: Compared) -> None:
     C_q = module.constraint_jacobian(c.q)
     agree(c.shown("constraint_jacobian"), C_q)
     agree(c.shown("velocity_constraints"), module.velocity_constraints(c.x), np.abs(C_q * c.v).max(initial=0.0))
-    # velocities are on the constraints to 1e-10, so gamma, which is quadratic in them, is known to 1e-20
-    agree(c.shown("gamma"), -C_q @ c.a, max(np.abs(C_q * c.a).max(initial=0.0), 1e-20 / CLOSE))
+    agree(c.shown("gamma"), -C_q @ c.a, np.abs(C_q * c.a).max(initial=0.0))
     B = c.shown("velocity_transformation")
     agree(B @ c.v[c.free] + c.shown("velocity_offset"), c.v)
     agree(B @ c.a[c.free] + c.shown("acceleration_offset"), c.a, np.abs(c.a).max())
