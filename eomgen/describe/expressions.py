@@ -50,7 +50,9 @@ _HINTS = {
     "{": "braces are not allowed in an expression",
     ":": "neither ':=', lambda nor slices have a place in an expression",
     "&": "write 'and'",
-    "|": "write 'or'",
+    "|": "write 'or', or abs(a)",
+    "^": "write ** for powers",
+    "\u00b0": "write deg(30) for 30 degrees",
 }
 _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
 _COMPARISONS: dict[type[ast.cmpop], tuple[str, bool, bool]] = {  # operation, operands exchanged, negated
@@ -75,8 +77,8 @@ _REFUSED: dict[type[ast.AST], str] = {
 
 def allowed() -> str:
     """What an expression may hold, for messages."""
-    start = "allowed are numbers, names, + - * / **, comparisons, and, or, not, 'a if c else b' and the functions "
-    return start + " ".join(function_words())
+    start = "allowed are numbers such as 1.5 (no units), names, + - * / ** between them, comparisons, and, or, not, "
+    return f"{start}'a if c else b' and the functions {' '.join(function_words())}"
 
 
 def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
@@ -112,7 +114,6 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
     if foreign:
-        _refuse_slip(text)
         mark = foreign.group()
         raise ExpressionError(
             f"{mark!r} is not allowed in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
@@ -128,8 +129,6 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     try:
         tree = parse_statement(line[start:].rstrip() + "\n")
     except SyntaxError as error:
-        if "never closed" not in error.msg:
-            _refuse_slip(text)
         column = (error.offset or 1) + start
         remedy = _UNFINISHED if "never closed" in error.msg else allowed()
         raise ExpressionError(f"not a valid expression ({error.msg})", column, remedy, text) from None
@@ -137,20 +136,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text, code="EG-TOO-LARGE") from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
-        _refuse_slip(text)
         raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
-    if isinstance(body[0].value, ast.Tuple):
-        _refuse_slip(text)
     return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
-
-
-def _refuse_slip(text: str) -> None:
-    """Raise ExpressionError if a text that is no expression has a slip that is known, such as a decimal comma."""
-    from .typing_slips import find_slip  # rarely needed
-
-    slip = find_slip(text)
-    if slip is not None:
-        raise ExpressionError(slip.message, slip.column, slip.remedy, text)
 
 
 def names_in(text: str) -> list[str]:
@@ -268,7 +255,6 @@ class _Walker:
 
     def call(self, node: ast.Call, depth: int) -> Expr:
         if not isinstance(node.func, ast.Name):
-            _refuse_slip(self.text)
             raise self.fault(node, "only the listed functions can be called")
         name = node.func.id
         if name in QUANTITIES and name not in self.words:

@@ -149,10 +149,6 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     return fault_of_name(name, symbol=True)
 
 
-#: Constants of other programs, in small letters -> what to write, where no name of the model is meant.
-CONSTANTS = {"pi": "write pi", "e": "write exp(1)", "inf": "numbers are finite; leave out a limit that there is not"}
-
-
 def listing(known: Iterable[str], limit: int = 20) -> str:
     """The names joined by commas, cut after ``limit``; ``"none"`` if there are none."""
     names = list(known)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import keyword
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from ..base.names import joined
 from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from ..errors import ExpressionError
 from ..frames import Marker
@@ -13,7 +12,7 @@ from ..graph.core import Expr, Graph, symbols_of
 from .description import Faults
 from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity
-from .names import ACCELERATIONS, COM, CONSTANTS, QUANTITIES, TOTALS, fault_of_name, nearest
+from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
@@ -168,9 +167,8 @@ class Scope:
             self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
-            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level)]
+            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level), "pi"]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
-            remedy = joined(CONSTANTS.get(name.lower(), ""), remedy)
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy, "EG-NAME-UNKNOWN")
         elif LEVELS[kind] > self.level:
             self._refuse(name, kind)

@@ -1,8 +1,7 @@
-"""Words of other programs: each is answered by a name that there is, in the place where it is written."""
+"""A name that is not known is answered by the nearest one, in the place where it is written."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -32,26 +31,14 @@ def held() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("kind", "word", "meant"),
     [
-        ("Model", "hinge", "revolute"), ("Model", "PinJoint", "revolute"), ("Model", "pivot", "revolute"),
-        ("Model", "piston", "prismatic"), ("Model", "ram", "prismatic"), ("Model", "telescope", "prismatic"),
-        ("Model", "PrismaticJoint", "prismatic"), ("Model", "glue", "weld"), ("Model", "fixed_joint", "weld"),
-        ("Model", "gimbal", "spherical"), ("Model", "BallJoint", "spherical"), ("Model", "add_body", "body"),
-        ("Model", "RigidBody", "body"), ("Model", "Particle", "body"), ("Model", "add_spring", "spring"),
-        ("Model", "shock_absorber", "damper"), ("Model", "hindge", "revolute"), ("Model", "freejoint", "free"),
-        ("Model", "simulate", "compile"), ("Model", "sensor", "output"), ("Model", "hard_stop", "stop"),
-        ("Module", "run", "simulate"), ("Module", "solve", "simulate"), ("Module", "mass", "mass_matrix"),
-        ("Module", "rnea", "inverse_dynamics"), ("Module", "crba", "mass_matrix"), ("Module", "nle", "bias"),
-        ("Module", "aba", "rhs"), ("Module", "forward_kinematics", "poses"), ("Module", "ik", "assemble"),
-        ("Module", "natural_frequencies", "modes"), ("Module", "steady_state", "equilibrium"), ("Module", "nq", "n_q"),
-        ("Module", "monte_carlo", "simulate_many"), ("Module", "render", "draw"), ("Module", "integrte", "simulate"),
-        ("Trajectory", "time", "t"), ("Trajectory", "y", "x"), ("Trajectory", "movie", "animate"),
-        ("Trajectory", "df", "to_pandas"), ("Trajectory", "positions", "q"), ("Trajectory", "show", "plot"),
-        ("Trajectory", "export", "save"), ("Trajectory", "sample", "at"), ("Trajectory", "energy", "energies"),
-        ("Equations", "M", "mass_matrix"), ("Equations", "L", "lagrangian"), ("Equations", "forcing", "force"),
-        ("Equations", "latex", "explain"), ("eomgen", "modle", "Model"), ("Equations", "simulate", "compile"),
+        ("Model", "revolut", "revolute"), ("Model", "PrismaticJoint", "prismatic"), ("Model", "BODY", "body"),
+        ("Model", "add_spring", "spring"), ("Model", "gravty", "gravity"), ("Module", "mass_matrx", "mass_matrix"),
+        ("Module", "lineraize", "linearize"), ("Module", "simulate_mny", "simulate_many"), ("Module", "X0", "x0"),
+        ("Trajectory", "to_panda", "to_pandas"), ("Equations", "massmatrix", "mass_matrix"),
+        ("eomgen", "modle", "Model"),
     ],
 )  # fmt: skip
-def test_names_of_other_programs_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
+def test_names_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
     with pytest.raises(AttributeError, match=rf"has no attribute '{word}'; did you mean '?{meant}\b"):
         getattr(held[kind], word)
 
@@ -59,54 +46,40 @@ def test_names_of_other_programs_in_python(held: dict[str, Any], kind: str, word
 @pytest.mark.parametrize(
     ("text", "meant"),
     [
-        ("links: {a: {mass: 1}}", "bodies"), ("sensors: {a: t}", "outputs"), ("constants: {a: 1}", "parameters"),
-        ("actuators: {}", "forces"), ("ic: {}", "initial"), ("bodies: {a: {weight: 1}}", "mass"),
-        ("bodies: {a: {mass: 1, cog: [0, 0, 0]}}", "com"), ("bodies: {a: {mass: 1, geometry: []}}", "display"),
-        ("bodies: {a: {mass: 1}}\njoints: {A: {type: hinge, between: [ground, a]}}", "revolute"),
-        ("bodies: {a: {mass: 1}}\njoints: {A: {type: piston, between: [ground, a]}}", "prismatic"),
-        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, parent: [ground, a]}}", "between"),
-        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, between: [world, a]}}", "ground"),
-        ("bodies: {a: {mass: 1}}\nforces: {f: {type: dashpot, between: [ground, a]}}", "damper"),
-        ("bodies: {a: {mass: 1}}\nforces: {f: {type: spring, between: [ground, a], spring_constant: 3}}", "stiffness"),
-        ("simulation: {t_end: 3}", "end"), ("simulation: {tol: 3}", "rtol"),
+        ("bodys: {a: {mass: 1}}", "bodies"), ("paramters: {a: 1}", "parameters"), ("Forces: {}", "forces"),
+        ("bodies: {a: {mas: 1}}", "mass"), ("bodies: {a: {mass: 1, CoM: [0, 0, 0]}}", "com"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolut, between: [ground, a]}}", "revolute"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, betwen: [ground, a]}}", "between"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, between: [grond, a]}}", "ground"),
+        ("bodies: {a: {mass: 1}}\nforces: {f: {type: spring, between: [ground, a], stifness: 3}}", "stiffness"),
+        ("simulation: {ends: 3}", "end"), ("simulation: {rtoll: 3}", "rtol"),
     ],
 )  # fmt: skip
-def test_names_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
+def test_names_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
     (tmp_path / "model.yaml").write_text(f"name: m\n{text}\n")
-    code = "EG-CHOICE" if re.search("type: (hinge|piston|dashpot)", text) else "EG-NAME-UNKNOWN"
+    code = "EG-CHOICE" if "revolut," in text else "EG-NAME-UNKNOWN"
     refuses(f"{code} '{meant}'?", lambda: eg.load(tmp_path / "model.yaml").check())
 
 
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
-        (["simulate"], "run"), (["simulat"], "run"), (["movie"], "view"), (["sweep"], "ensemble"), (["eig"], "modes"),
-        (["codegen"], "generate"), (["gallery"], "examples"), (["import"], "convert"), (["test"], "verify"),
-        (["run", "m.yaml", "--time", "3"], "--end"), (["run", "m.yaml", "--params", "l=1"], "--set"),
-        (["run", "m.yaml", "--movie", "a.gif"], "--animate"), (["run", "m.yaml", "--dt", "1"], "--step"),
-        (["run", "m.yaml", "--output", "a"], "--out"), (["run", "m.yaml", "--tolerance", "1"], "--rtol"),
+        (["rum"], "run"), (["exmples"], "examples"), (["run", "m.yaml", "--ends", "3"], "--end"),
+        (["run", "m.yaml", "--sett", "l=1"], "--set"), (["run", "m.yaml", "--OUT", "a"], "--out"),
     ],
 )  # fmt: skip
-def test_names_of_other_programs_on_the_command_line(words: list[str], meant: str) -> None:
+def test_names_on_the_command_line(words: list[str], meant: str) -> None:
     done = command.run(*words)
     assert done.code == 2
     assert f"id you mean {meant}" in done.err.replace("'", "")
 
 
-@pytest.mark.parametrize(("word", "meant"), [("x0", "initial"), ("tol", "rtol"), ("teval", "t_eval")])
+@pytest.mark.parametrize(("word", "meant"), [("initial_", "initial"), ("methd", "method"), ("teval", "t_eval")])
 def test_an_argument_of_a_run(held: dict[str, Any], word: str, meant: str) -> None:
     refuses(f"EG-NAME-UNKNOWN '{word}' {meant}?", lambda: held["Module"].simulate((0, 1), **{word: 1.0}))
 
 
-def test_the_normal_force_of_a_contact_is_its_force() -> None:
-    m = eg.Model("m")
-    m.prismatic("s", m.ground, m.body("ball", mass=1.0), axis="y")
-    m.output("N", "normal(floor)")
-    refuses("EG-EXPRESSION outputs.N.expression normal 'force'?", m.check)
-
-
 def test_the_name_that_is_written_alike_comes_first() -> None:
-    """Letters before synonyms, among the names that there are; nothing where none is near."""
     words = {"thetta": "theta", "Theta": "theta", "hinge": "hinges", "zzzzz": ""}
     for word, meant in words.items():
         m = eg.Model("m")
@@ -121,7 +94,7 @@ def test_the_name_that_is_written_alike_comes_first() -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "m.hinge('A', m.ground, rod)",
+        "m.revolut('A', m.ground, rod)",
         "m.gravty = (0, 0, 1)",
         "mod.simulat(1.0)",
         "run.tt",
