@@ -6,20 +6,29 @@ cdef extern from "eomgen_solvers.h" nogil:
     #include <stddef.h>
     #include <string.h>
     /* Puts a model's table together: numbers and tables as eom_model has them, in its order. */
+    enum {
+        N_NUMBERS = (int)(offsetof(eom_model, order) / sizeof(int)),
+        N_TABLES = (int)((offsetof(eom_model, quaternion) - offsetof(eom_model, order)) / sizeof(int *)),
+        N_FUNCTIONS = (int)((sizeof(eom_model) - offsetof(eom_model, scales)) / sizeof(eomgen_function))
+    };
     static void eomgen_fill(eom_model *m, const int *numbers, const int *const *tables, const int *quaternion,
                             const short *const *places, const int *areas, const eomgen_function *functions)
     {
         memset(m, 0, sizeof *m);
-        memcpy(&m->n_v, numbers, ((size_t)(&m->n_relaxed - &m->n_v) + 1) * sizeof *numbers);
-        memcpy(&m->order, tables, 7 * sizeof *tables);
+        memcpy(&m->n_v, numbers, N_NUMBERS * sizeof *numbers);
+        memcpy(&m->order, tables, N_TABLES * sizeof *tables);
         m->quaternion = (const int (*)[2])quaternion;
         m->place = (const short (*)[2])places[0], m->relax = (const short (*)[2])places[1];
         memcpy(m->areas, areas, sizeof m->areas);
-        memcpy(&m->scales, functions, sizeof *m - offsetof(eom_model, scales));
+        memcpy(&m->scales, functions, N_FUNCTIONS * sizeof *functions);
     }
     """
+    enum: AREAS
+    enum: N_NUMBERS
+    enum: N_TABLES
+    enum: N_FUNCTIONS
     ctypedef struct eom_model:
-        int n_v
+        int n_v, n_c, n_quaternions, n_places, n_relaxed
     ctypedef struct eom_at:
         const eom_model *m
         double t
@@ -54,6 +63,13 @@ cdef solver[11] SOLVERS = [
 cdef inline double *numbers_at(object address) noexcept:
     """An argument of a callback, whose null is None."""
     return NULL if address is None else <double *><uintptr_t>address
+
+
+cdef int require(str what, tuple lengths, tuple wanted) except -1:
+    """Compare lengths that C cannot know."""
+    if lengths != wanted:
+        raise ValueError(f"{what} must be {wanted}, not {lengths}")
+    return 0
 
 
 cdef int check_numbers(const double *out, int n) noexcept:
@@ -93,6 +109,11 @@ cdef class Functions:
     codes : dict of type to int
         Exceptions of blocks, and the status that each stands for.
 
+    Raises
+    ------
+    ValueError
+        Lengths that do not fit the layout of eom_model, or each other.
+
     Attributes
     ----------
     address : int
@@ -113,6 +134,9 @@ cdef class Functions:
         function = ctypes.CFUNCTYPE(ctypes.c_int, number, *[place] * 5)
         self.blocks, self.codes, self.compute = blocks, codes, precompute
         self.table.n_u, self.table.n_const = sizes["n_u"], sizes["n_const"]
+        for of, n_in, n_out in kernels:
+            if of in blocks:
+                require(f"lengths of kernel {of}", tuple(blocks[of][1:]), (n_in, n_out))
         calls = {of: function(Call(self, *blocks[of])) for of in blocks}
         starts = {of: ctypes.cast(call, place).value for of, call in calls.items()}
         public = [function(Call(self, *blocks[of], True) if of in blocks else Solve(self, of, n_out))
@@ -139,6 +163,9 @@ cdef class Functions:
             self.describe(starts, **equations)
 
     def describe(self, dict starts, numbers, tables, quaternions, places, areas, functions):
+        require("lengths of the table of a model",
+                (len(numbers), len(tables), len(places), len(areas), len(functions)),
+                (N_NUMBERS, N_TABLES, 2, AREAS, N_FUNCTIONS))
         whole = [np.array(table, dtype=np.intc) for table in tables]
         short = [np.array(table, dtype=np.short) for table in places]
         first, second, third = [np.array(table, dtype=np.intc) for table in (numbers, quaternions, areas)]
@@ -149,6 +176,9 @@ cdef class Functions:
             &self.equations, <const int *>pointer(first), <const int **>pointer(of_whole), <const int *>pointer(second),
             <const short **>pointer(of_short), <const int *>pointer(third), <const eomgen_function *>pointer(calls),
         )
+        cdef const eom_model *m = &self.equations
+        require("lengths of tables of a model", (*map(len, tables), len(quaternions), *map(len, places)), (
+            m.n_v, m.n_v, m.n_c, m.n_c + 1, max(tables[3]), m.n_v, m.n_v, m.n_quaternions, m.n_places, m.n_relaxed))
 
     @property
     def address(self):

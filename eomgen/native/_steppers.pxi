@@ -200,6 +200,7 @@ cdef class Stepper:
         cdef Interpolant result = Interpolant.__new__(Interpolant)
         cdef int n = self.run.n
         eomgen_between(self.method, &self.run, self.run.t, self.run.next)  # forms the coefficients
+        tell_raised()
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
         cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)

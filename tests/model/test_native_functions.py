@@ -102,6 +102,34 @@ def test_jacobian_and_targets(sources: Path, given: str) -> None:
     assert abs(numpy.outputs(0, x)[0] - compiled.outputs(0, x)[0]) < 1e-7 * (given != "exact") + 1e-15
 
 
+def test_an_error_of_a_python_function_between_steps_reaches_its_caller(sources: Path) -> None:
+    class Stopped(BaseException):
+        pass
+
+    armed: list[int] = []
+    law = sources / "laws.py"
+    law.write_text("import builtins\n\n\ndef swing(q):\n    return builtins.swing_in_test(q)\n")
+
+    def swing(q: float) -> float:
+        if armed:
+            raise Stopped
+        return math.sin(q)
+
+    builtins.swing_in_test = swing  # type: ignore[attr-defined]
+    try:
+        m = pendulum("-9.81*swing(q)", full(sources, python=law))
+        module = m.compile(target="numpy")
+        solver = module.DOP853(module.rhs, 0.0, [0.4, 0.0], 1.0)
+        solver.step()
+        armed.append(1)
+        with pytest.raises(Stopped):
+            solver.dense_output()  # evaluates three stages more
+        armed.clear()
+        assert module.rhs(0.0, [0.4, 0.0])[1] == pytest.approx(-9.81 * math.sin(0.4))
+    finally:
+        del builtins.swing_in_test  # type: ignore[attr-defined]
+
+
 def sympy_call(name: str, argument: Any, order: int) -> Any:
     return sympy.Function(name)(argument).diff(argument, order)
 
