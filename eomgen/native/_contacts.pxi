@@ -66,6 +66,11 @@ cdef extern from "eomgen_contacts.h" nogil:
         double *acting
         double residual, depth
         int missed, iterations, contacts
+        const eomgen_source *source
+        const double *where
+        double when
+        double law[2]
+        int status, list
     int eomgen_contacts_wide()
     long eomgen_rigid_fixed(const eomgen_rigid *)
     long eomgen_rigid_further(const eomgen_rigid *)
@@ -76,6 +81,11 @@ cdef extern from "eomgen_steppers.h" nogil:
 
 cdef enum:
     ACTING = 14  # numbers of a contact that acts
+
+cdef tuple SOURCES = (  # functions of the model, in the order of eomgen_rigid
+    "mass_matrix", "constraint_jacobian", "velocity_constraints", "constraints", "near_pairs", "motion_axes", "bias_apart",
+    "meeting_time",
+)
 
 ctypedef struct played_inputs:
     eomgen_run run
@@ -101,7 +111,7 @@ cdef int ask_for_inputs(void *stepper, double t, const double *x, double *u) noe
 
 
 cdef class RigidStepper:
-    """Steps of a mechanism with rigid contacts; see simulation/rigid_steps.py.
+    """Steps of a mechanism with rigid contacts; see simulation/moreau.py.
 
     Parameters
     ----------
@@ -152,10 +162,8 @@ cdef class RigidStepper:
         s.rows, s.plain = <const int *>pointer(kept["rows"]), <const int *>pointer(kept["plain"])
         s.balls, s.lists = <const int *>pointer(kept["balls"]), <const int *>pointer(kept["lists"])
         s.moved = <const signed char *>pointer(kept["moved"])
-        s.mass, s.jacobian = source_of(sources, "mass_matrix"), source_of(sources, "constraint_jacobian")
-        s.drift, s.closure = source_of(sources, "velocity_constraints"), source_of(sources, "constraints")
-        s.near, s.axes = source_of(sources, "near_pairs"), source_of(sources, "motion_axes")
-        s.bias, s.meeting = source_of(sources, "bias_apart"), source_of(sources, "meeting_time")
+        for k, name in enumerate(SOURCES):
+            (&s.mass)[<int>k] = source_of(sources, name)
         s.tolerance, s.most, s.begins, s.room = tolerance, most, 1, 0
         s.wide = eomgen_contacts_wide()
         cdef cnp.npy_intp n = s.n_q + 2 * s.n_v
@@ -221,6 +229,19 @@ cdef class RigidStepper:
         cdef cnp.ndarray found = rows(self.s.m, ACTING)
         memcpy(cnp.PyArray_DATA(found), self.s.acting, self.s.m * ACTING * sizeof(double))
         return found
+
+    @property
+    def failure(self):
+        """Of a function that failed: its name, status, time, what it was called with, and inputs; None without one."""
+        if self.s.source == NULL:
+            return None
+        return (SOURCES[self.s.source - &self.s.mass], self.s.status, self.s.when,
+                copy(self.s.where, self.s.n_q + 2 * self.s.n_v), copy(self.s.u, self.s.n_u))
+
+    @property
+    def refused(self):
+        """Of contacts that were refused: their list, pairs that are near, friction and restitution."""
+        return self.s.list, self.s.needed, self.s.law[0], self.s.law[1]
 
     @property
     def residual(self):

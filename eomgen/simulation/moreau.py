@@ -1,4 +1,31 @@
-"""A run with rigid contacts by steps of one size -> Trajectory, with mean forces over the steps."""
+"""A run with rigid contacts by steps of one size -> Trajectory, with mean forces over the steps.
+
+A step takes forces, impacts and friction at once, in C (eomgen/native/contacts).  The scheme is Moreau's midpoint rule
+(J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in Nonsmooth Mechanics and Applications,
+1988, 1-82; V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, section 10.1).  With the
+position q_m = q + h/2 N v half a step on,
+
+    M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C(q+) v+ + C_t = 0,      q+ = q_m + h/2 N v+,
+
+with M, J and C of the middle where nothing else is said, and the laws of rigid contact (eomgen_contacts.h) between
+impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
+touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
+time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
+39 (1996), 2673-2691). Where shapes land, an impact without rebound, they go on with a part of the whole impact,
+friction and what else acts with it, after which they meet in the middle of the next step, where the rest follows: both
+end as the impact at once. What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
+Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
+
+Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
+(J. P. Ryckaert, G. Ciccotti, H. J. C. Berendsen, J. Comput. Phys. 23 (1977), 327-341; H. C. Andersen, J. Comput. Phys.
+52 (1983), 24-34): but for the closing of loops, of order h^3, a step read backwards is the same step, and loops are of
+second order.  C(q+) is not formed: C v+ is aimed at what makes C(q+) v+ + C_t vanish, first at that with which the
+constraints hold for the mean of v and v+, and contacts are solved again until they do not feel the difference.
+
+Contacts are those that are near at q_m.  Before and after it bodies move at constant velocities, v and v+, and
+``meeting_time`` says how long no two shapes that are apart meet, or go far beside their thickness.  A step whose halves
+are longer is done in two.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +38,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.contacts import ITERATIONS, SOLVED
+from ..base.limits.contacts import HALVINGS, ITERATIONS, SOLVED
 from ..base.limits.runs import SAME
 from ..base.texts import shown
 from ..base.value_rules import as_count
-from ..errors import EvaluationError, SimulationError, calls_within, cannot, ill_typed, incomplete, off_range, untrue
+from ..errors import (
+    EvaluationError,
+    SimulationError,
+    UsageError,
+    calls_within,
+    cannot,
+    ill_typed,
+    incomplete,
+    off_range,
+    untrue,
+)
+from ..numeric.pair_sums import RECORD
 from ..runtime.argument_checks import check_names, read_number, require_room, require_steps, unknown
 from ..runtime.columns import Columns
 from ..runtime.inputs import Forcing
+from ..runtime.late import LateCore, eager
 from ..runtime.trajectory import Span, Start, Trajectory
 from .bound_run import watch_run
 from .events import Events, is_told_by_the_caller
 from .integrate import Solution
 from .meetings import deep_start
 from .recording import record
-from .rigid_steps import RigidSteps
 from .run_arguments import check_step, find_span, find_state, ordered_times
 
 if TYPE_CHECKING:
@@ -253,6 +291,139 @@ class ForceSums:
             self.kept.append(rows)
 
 
+# -- steps -------------------------------------------------------------------------------------------------------------
+
+
+TOO_LONG, TOO_MANY, NO_LAW = 1, 5, 6  #: what became of a step: eomgen/native/contacts/eomgen_contacts.h
+#: Kernels that a step calls; the last one where there is one.
+SOURCES = (
+    *("mass_matrix", "near_pairs", "motion_axes", "bias_apart"),
+    *("constraint_jacobian", "velocity_constraints", "constraints", "meeting_time"),
+)
+
+
+class RigidSteps:
+    """The steps of one run.
+
+    Attributes
+    ----------
+    stepper : RigidStepper
+        Tells how well contacts were solved.
+    taken : int
+        Steps, those among them that others were divided into.
+    acting : list of (m, 14) arrays
+        Contacts of steps since the list was emptied: both shapes, normal (3), first direction across it (3), point (3),
+        impulses along the normal and across it (3), which act on the second shape.
+
+    Raises
+    ------
+    UsageError
+        The model has no rigid contacts, or lacks a kernel.
+    """
+
+    def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
+        known = module.metadata.get("rigid_contacts")
+        if not known:
+            raise cannot(
+                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
+                "can be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
+            )
+        self.module, self.taken = module, 0
+        self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
+        self.acting: list[Array] = []
+        layout = module.layout
+        moved = np.zeros((len(known["moved_by"]), layout.n_v))
+        for shape, last in enumerate(known["moved_by"]):
+            while last >= 0:
+                moved[shape, last] = 1.0
+                last = known["parents"][last]
+        space = layout.space
+        plain = (
+            [(k, k) for k in range(layout.n_q)] if space is None else [*zip(space.plain_q, space.plain_v, strict=True)]
+        )
+        tables = {
+            "rows": layout.rows,
+            "plain": np.ravel(plain),
+            "balls": np.ravel([] if space is None else space.quaternion_slots),
+            "lists": np.ravel([(numbers, count) for _, numbers, count in self.lists]),
+            "moved": moved,
+        }
+        facts = {
+            "n_rows": layout.n_c,
+            "n_c": len(layout.rows),
+            "n_h": int(np.count_nonzero(layout.rows < layout.n_h)),
+            "n_spots": sum(numbers for _, numbers, _ in self.lists),
+        }
+        sources, n_work = self._sources()
+        signals, outside = ([], forcing) if forcing.foreign else (forcing.encode(), None)
+        within = forcing.within or (-np.inf, np.inf)
+        core: Any = eager(module.core)
+        self.stepper = core.rigid_stepper(
+            module.kernels.context, sources, n_work, facts, tables, tolerance, iterations, signals, outside, within
+        )
+
+    def _sources(self) -> tuple[dict[str, Any], int]:
+        """Addresses and constants of the kernels, and the most numbers that one works on."""
+        kernels, layout = self.module.kernels, self.module.layout
+        bound, sources, n_work = kernels.context, {}, 0
+        for name in SOURCES:
+            core: Any = kernels.core
+            if name not in core.names:
+                if name != "meeting_time" and 0 not in layout.shape(name):
+                    kernels.timed(name)(0.0, np.zeros(layout.n_x))  # refuses
+                continue
+            core = core.having(name) if isinstance(core, LateCore) and name not in core.core.names else eager(core)
+            context = bound if core is eager(self.module.core) else core.context(bound.p, bound.u, UsageError)
+            sources[name], n_work = (core.address(name), context.c), max(n_work, core.sizes["n_work"])
+        return sources, n_work
+
+    def step(self, t: float, x: Array, h: float, halvings: int = HALVINGS) -> None:
+        """The state x (n_x,) a time h later, in place.
+
+        Raises
+        ------
+        EvaluationError, UsageError, SimulationError
+            A kernel fails, more pairs are near than there is room for, coefficients are out of range, or shapes pass
+            each other in steps that are much shorter.
+        """
+        status = self.stepper.step(t, h, x, x)
+        if status == 0:
+            self.taken += 1
+            self.acting.append(self.stepper.contacts_of_step())
+        elif status != TOO_LONG:
+            raise self._error(status, t + 0.5 * h, x)
+        elif halvings:
+            self.step(t, x, 0.5 * h, halvings - 1)
+            self.step(t + 0.5 * h, x, 0.5 * h, halvings - 1)
+        else:
+            raise SimulationError(
+                f"moreau stopped at t = {t:.6g} s: shapes move so fast that they may pass through each other even in "
+                f"steps of {h:.3g} s; take a smaller step, and see whether the velocities are meant"
+            )
+
+    def _error(self, status: int, t: float, x: Array) -> Exception:
+        """What is wrong in a step with the middle t."""
+        k, near, friction, restitution = self.stepper.refused
+        name, numbers, _ = self.lists[k]
+        if status == TOO_MANY:
+            return SimulationError(
+                f"contacts {name!r}: {near} pairs of shapes are near each other at t = {t:.6g} s, and there is "
+                f"room for {(numbers - 1) // RECORD}; leave out shapes that overlap others of their body, or put "
+                "shapes that never meet into contacts of their own",
+                code="EG-TOO-LARGE",
+            )
+        if status == NO_LAW:
+            return off_range(
+                f"contacts {name!r}: friction is {friction:.6g} and restitution {restitution:.6g}; friction is "
+                "0 or greater, restitution from 0 to 1"
+            )
+        fail, n_q = self.module.kernels.fail, self.module.n_q
+        if self.stepper.failure is None:  # an inertia has no factor
+            return fail.exception("mass_matrix", 2, t, x[:n_q])
+        failed, status, when, where, u = self.stepper.failure
+        return fail.exception(failed, status, when, where[: self.module.layout.inputs(failed)], None, u)
+
+
 # -- the run -----------------------------------------------------------------------------------------------------------
 
 
@@ -312,7 +483,7 @@ def step_rigidly(
     forcing.begin(start, end)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     require_room("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
-    x = find_state(bound, initial, start, forcing)
+    x = np.array(find_state(bound, initial, start, forcing))
     steps = RigidSteps(bound, forcing, tolerance, iterations)
     found = deep_start(bound, start, x, forcing(start, x) if forcing else None)
     if found is not None:
@@ -326,41 +497,39 @@ def step_rigidly(
     times[-1] = end
     states = np.empty((module.n_x, count + 1))
     states[:, 0] = x
-    sums = ForceSums(steps.contacts.lists, count, keep)
-    n_q = module.n_q
-    q, v = x[:n_q].copy(), x[n_q:].copy()
+    sums = ForceSums(steps.lists, count, keep)
     try:
         for k in range(count):
             t = float(times[k])
             try:
-                q, v = steps.step(t, q, v, float(times[k + 1]) - t)
+                steps.step(t, x, float(times[k + 1]) - t)
             except EvaluationError as error:
                 raise SimulationError(f"moreau stopped at t = {t:.6g} s of {end:.6g} s: {error}") from error
-            if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            if not np.isfinite(x).all():
                 raise SimulationError(
                     f"moreau stopped at t = {t:.6g} s of {end:.6g} s: the state is not finite. Velocity-dependent and "
                     "stiff forces are taken explicitly: try a smaller step",
                     code="EG-NOT-FINITE",
                 )
-            states[:n_q, k + 1], states[n_q:, k + 1] = q, v
+            states[:, k + 1] = x
             sums.add(k, steps.acting, float(times[k + 1]) - t)
             if watch is not None:
                 watch(t)
     finally:
         if watch is not None:
             watch.close()
-    steps.finish()
-    if steps.missed and not is_told_by_the_caller():
+    met = steps.stepper
+    if met.missed and not is_told_by_the_caller():
         warnings.warn(
-            f"{steps.missed} of {steps.taken} steps leave a residual of the contact laws of up to {steps.residual:.3g} "
+            f"{met.missed} of {steps.taken} steps leave a residual of the contact laws of up to {met.residual:.3g} "
             f"m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
             f"{iterations}: allow more iterations, or a larger tolerance",
             ContactWarning,
             stacklevel=calls_within() + 1,
         )
     counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken}
-    counts |= {"contact_iterations": steps.iterations, "contacts": steps.most, "missed_steps": steps.missed}
-    counts |= {"contact_residual": steps.residual, "penetration": steps.depth}
+    counts |= {"contact_iterations": met.iterations, "contacts": met.contacts, "missed_steps": met.missed}
+    counts |= {"contact_residual": met.residual, "penetration": met.depth}
     ends = (start, end)
     told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
     dense = partial(_between, times, states)

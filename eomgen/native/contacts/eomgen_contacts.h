@@ -1,4 +1,4 @@
-/* Impulses of rigid contacts, and a step of a mechanism with them (eomgen/simulation/rigid_steps.py says the scheme).
+/* Impulses of rigid contacts, and a step of a mechanism with them (eomgen/simulation/moreau.py says the scheme).
 
    Of each contact the impulse P = (P_n, P_t) and the velocity y = c + W P, less what the normal one is to be, obey
 
@@ -53,9 +53,10 @@ typedef struct {
     const double *c;
 } eomgen_source;
 
-/* What became of a step: one of its halves is too long; a function failed, or an inertia has no factor, which the caller looks
-   into; more contacts are near than there is room for; an input over time has no value. */
-enum { EOMGEN_STEPPED, EOMGEN_TOO_LONG, EOMGEN_LOOK, EOMGEN_MORE_ROOM, EOMGEN_NO_INPUT };
+/* What became of a step: one of its halves is too long; a function failed, or an inertia has no factor (`source` is NULL); more
+   contacts are near than there is memory for; an input over time has no value; a list has `needed` pairs and no room for them;
+   a coefficient of the list is out of range. */
+enum { EOMGEN_STEPPED, EOMGEN_TOO_LONG, EOMGEN_FAILED, EOMGEN_MORE_ROOM, EOMGEN_NO_INPUT, EOMGEN_TOO_MANY, EOMGEN_NO_LAW };
 
 typedef struct {
     int n_q, n_v, n_u, n_rows, n_c, n_h; /* all constraint rows, those that are independent, and holonomic among these */
@@ -81,6 +82,10 @@ typedef struct {
     double *acting;                /* contacts of the step: both shapes, normal, first direction across, point, impulses (3) */
     double residual, depth;
     int missed, iterations, contacts;
+    const eomgen_source *source; /* what failed: the function, its status, and where */
+    const double *where;
+    double when, law[2];         /* coefficients of friction and restitution */
+    int status, list;
 } eomgen_rigid;
 
 int eomgen_contacts_wide(void);

@@ -29,23 +29,26 @@ static void find_ways(const double *record, double ways[9])
     for (int k = 6; planar && k < 9; k++) { ways[k] = 0.0; }
 }
 
-/* Gather the lists into records whose shapes are numbered over all, in place; how many there are, -1 where a list has no room or
-   a coefficient is none. */
-static int gather(const eomgen_rigid *s, double *spots)
+/* Gather the lists into records whose shapes are numbered over all, in place; how many there are, or
+   -EOMGEN_TOO_MANY, -EOMGEN_NO_LAW. */
+static int gather(eomgen_rigid *s, double *spots)
 {
     const double *from = spots;
     int count = 0, shapes = 0;
     for (int l = 0; l < s->n_lists; l++) {
         const int numbers = s->lists[2*l], listed = (int)from[0];
+        s->list = l;
         if (listed > (numbers - 1)/RECORD_OF) {
-            return -1;
+            s->needed = listed;
+            return -EOMGEN_TOO_MANY;
         }
         for (int k = 0; k < listed; k++, count++) {
             double *const record = spots + RECORD_OF*count;
             memmove(record, from + 1 + RECORD_OF*k, RECORD_OF*sizeof(double));
             record[0] += shapes, record[1] += shapes;
             if (!(record[12] >= 0.0) || !(record[13] >= 0.0 && record[13] <= 1.0)) {
-                return -1;
+                memcpy(s->law, record + 12, sizeof s->law);
+                return -EOMGEN_NO_LAW;
             }
         }
         from += numbers, shapes += s->lists[2*l + 1];

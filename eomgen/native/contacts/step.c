@@ -1,8 +1,10 @@
 /* A step of a mechanism with rigid contacts. */
 
-static int call(const eomgen_rigid *s, const eomgen_source *source, double t, const double *x, double *out)
+static int call(eomgen_rigid *s, const eomgen_source *source, double t, const double *x, double *out)
 {
-    return source->call(t, x, s->u, source->c, out, s->w) ? EOMGEN_LOOK : EOMGEN_STEPPED;
+    const int status = source->call(t, x, s->u, source->c, out, s->w);
+    if (status) { s->source = source, s->status = status, s->when = t, s->where = x; }
+    return status ? EOMGEN_FAILED : EOMGEN_STEPPED;
 }
 
 /* Where velocities part*d lead to in unit time. */
@@ -24,7 +26,7 @@ static void move(const eomgen_rigid *s, const double *q, double part, const doub
 }
 
 /* Whether shapes that are apart may meet within h, or go far by their size; x holds the velocities, and 0 behind them. */
-static int passes(const eomgen_rigid *s, double t, double h, double *x, int *failed)
+static int passes(eomgen_rigid *s, double t, double h, double *x, int *failed)
 {
     double found[5];
     memset(x + s->n_q + s->n_v, 0, (size_t)s->n_v*sizeof(double));
@@ -36,7 +38,7 @@ static int passes(const eomgen_rigid *s, double t, double h, double *x, int *fai
 }
 
 /* Inertia and constraints at the middle; `drift` is C_t of the independent rows. */
-static int find_inertia(const eomgen_rigid *s, double t, inertia *at, double *C, double *sizes, double *x, double *drift)
+static int find_inertia(eomgen_rigid *s, double t, inertia *at, double *C, double *sizes, double *x, double *drift)
 {
     const int n = s->n_v;
     int failed = call(s, &s->mass, t, x, at->L);
@@ -47,7 +49,7 @@ static int find_inertia(const eomgen_rigid *s, double t, inertia *at, double *C,
     if (factor_inertia(n, at->L, sizes)) { /* constraints may hold what has no inertia */
         double trace = 0.0, squares = 0.0;
         if (!s->n_c || call(s, &s->mass, t, x, at->L)) {
-            return EOMGEN_LOOK;
+            return EOMGEN_FAILED;
         }
         for (int i = 0; i < n; i++) { trace += at->L[i*n + i]; }
         for (int r = 0; r < s->n_c; r++) { squares += dot(n, C + s->rows[r]*n, C + s->rows[r]*n); }
@@ -58,7 +60,7 @@ static int find_inertia(const eomgen_rigid *s, double t, inertia *at, double *C,
             }
         }
         if (factor_inertia(n, at->L, sizes)) {
-            return EOMGEN_LOOK;
+            return EOMGEN_FAILED;
         }
     }
     if (s->n_c) {
@@ -95,9 +97,9 @@ static int find_contacts(eomgen_rigid *s, double t, const inertia *held, double 
     double fastest;
     int failed = call(s, &s->near, t, s->x_m, spots), count, kept = 0;
     at->m = at->n = 0;
-    count = failed ? 0 : gather(s, spots);
-    if (failed || count < 0) {
-        return EOMGEN_LOOK;
+    count = failed ? -failed : gather(s, spots);
+    if (count < 0) {
+        return -count;
     }
     if (count == 0) {
         return EOMGEN_STEPPED;
@@ -112,7 +114,7 @@ static int find_contacts(eomgen_rigid *s, double t, const inertia *held, double 
         told->depth = fmax(told->depth, spots[RECORD_OF*c + 5]);
     }
     if (call(s, &s->axes, t, s->x_m, axes)) {
-        return EOMGEN_LOOK;
+        return EOMGEN_FAILED;
     }
     find_columns(s, count, spots, axes, at->J);
     across(n_v, count*s->d, at->J, s->x + s->n_q, at->before);
@@ -284,6 +286,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     inertia held;
     meeting at;
     int failed = 0, *const keys = s->numbers;
+    s->source = NULL;
     fixed_sizes(s, sizes);
     for (int k = 0; k < FIXED; k++) { part[k] = next, next += sizes[k]; }
     held.n = n, held.n_c = s->n_c, held.L = part[OF_L], held.Q = part[OF_Q], held.R = part[OF_R];
@@ -307,7 +310,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     }
     if (failed || call(s, &s->bias, middle, x_m, part[OF_BIAS])
         || find_inertia(s, middle, &held, part[OF_C], part[OF_SIZES], x_m, part[OF_DRIFT])) {
-        return EOMGEN_LOOK;
+        return EOMGEN_FAILED;
     }
     for (int r = 0; r < s->n_c; r++) { /* constraints hold for the mean of the velocities at first */
         part[OF_AIM][r] = -2.0*part[OF_DRIFT][r] - dot(n, part[OF_C] + s->rows[r]*n, v);
@@ -334,7 +337,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
         if (s->n_c && !failed) {
             settled = bears(s, &held, &at, t + h, h, part[OF_NEW], round == RIGID_ROUNDS - 1, part[OF_WORK], part[OF_SEEN],
                             part[OF_AIM], part[OF_AWAY], &told, &failed) && settled;
-            memcpy(s->u, part[OF_INPUTS], (size_t)s->n_u*sizeof(double));
+            if (!failed) { memcpy(s->u, part[OF_INPUTS], (size_t)s->n_u*sizeof(double)); }
         }
         if (settled) {
             break;
@@ -363,7 +366,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
         close_all(s, &held, t + h, part[OF_WORK], part[OF_SEEN], part[OF_AWAY], &failed);
     }
     if (failed) {
-        return EOMGEN_LOOK;
+        return EOMGEN_FAILED;
     }
     s->residual = fmax(s->residual, told.residual), s->depth = fmax(s->depth, told.depth);
     s->missed += told.missed, s->iterations = told.iterations > s->iterations ? told.iterations : s->iterations;
