@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .graph import vectors as vec
 from .graph.core import Expr
 from .graph.vectors import Mat3, Vec3
 from .records import dataclass
@@ -15,6 +16,11 @@ class Frame:
 
     rotation: Mat3
     position: Vec3
+
+    def __matmul__(self, inner: Frame) -> Frame:
+        """A frame placed in the axes of this one, in the body."""
+        turned = vec.product(self.rotation, inner.rotation)
+        return Frame(turned, vec.add(self.position, vec.times(self.rotation, inner.position)))
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..base.limits.numbers import ZERO
 from ..elements.dimensions import LENGTH, NONE, REACH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Choice, CoordinateName, Flag, JointReference, Latex, MarkerReference, Scalar
 from ..elements.looks import Contour, LiftCurve, Seen, Wheel
 from ..frames import Frame, Marker

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
-from ..elements.entry import Entry
+from ..elements.element_type import Entry
 from ..elements.looks import Seen
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph

@@ -10,8 +10,7 @@ from abc import abstractmethod
 from typing import ClassVar
 
 from ..elements.dimensions import REACH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import MOTION, Axis, JointReference, MarkerReference, Pair, Scalar
 from ..elements.looks import ROUND_ARROW, Drawn, Seen
 from ..frames import Marker

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 from ..base.value_rules import POSITIVE
 from ..elements.dimensions import LENGTH, NONE
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry, Found
+from ..elements.element_type import ElementType, Entry, Found, table
 from ..elements.kinds import Flag, JointPair, JointReference, Scalar, Two
 from ..elements.looks import PitchCircles, RackAndPinion, Seen
 from ..graph.core import Expr, sin

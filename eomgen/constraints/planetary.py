@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from ..base.value_rules import WHEELS as WHEELS_FIT
 from ..elements.dimensions import LENGTH, NONE
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry, Found
+from ..elements.element_type import ElementType, Entry, Found, table
 from ..elements.kinds import JointReference, Scalar, Wheels
 from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr

@@ -8,8 +8,7 @@ from typing import ClassVar
 
 from ..base.value_rules import POSITIVE, SUPPORT
 from ..elements.dimensions import LENGTH, NONE
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Axis, Choice, Flag, MarkerReference, Scalar, Vector
 from ..elements.looks import Contour, Seen, Wheel
 from ..frames import Marker

@@ -15,27 +15,32 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
-from .body_parts import check_display, read_body_shapes
+from .bodies import check_bodies, check_display, read_body, read_body_shapes
 from .build_cams import check_turns, declare_contacts
-from .build_equations import build_equations, check_energies, declare_equations
 from .build_events import build_events, check_resets
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates, with_locks
-from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
-from .build_states import build_states, declare_states
-from .build_switches import begun_switches, build_switches, declare_switches, events_of_switches, states_of_switches
+from .build_states import (
+    begun_switches,
+    build_states,
+    build_switches,
+    declare_states,
+    declare_switches,
+    events_of_switches,
+    states_of_switches,
+)
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .element_entry import Surroundings, build_elements, own_states
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
+from .given_equations import build_equations, check_energies, declare_equations
 from .input_rates import add_rates
-from .mass_properties import read_body
+from .lagrangian import build_lagrangian, declare_lagrangian
 from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
-from .physical import check_bodies
 from .read_shapes import read_shapes
 from .scope import Namespace
 from .sympy_face import in_order, name_of

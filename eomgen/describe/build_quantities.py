@@ -17,9 +17,9 @@ from .marker_quantities import marker_quantity
 from .mechanism import Input, Output, Parameter
 from .names import QUANTITIES, VELOCITIES
 from .printed_names import take_latex
-from .rewritten_texts import motions_of, names_of
 from .units import Unit, UnitError, read_unit
 from .values import Reader
+from .visit import motions_of, names_of
 
 
 def read_described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:

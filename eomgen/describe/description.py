@@ -229,7 +229,7 @@ def label_of(reference: Mapping[str, Any]) -> str:
     turn = items(reference.get("rpy"))
     if turn is not None and not is_zero(turn):
         text = f"{text[:-1]}, rpy={text_of(turn)})"
-    for key in ("axes", "matrix"):
+    for key in ("axes", "matrix", "on"):
         if key in reference:
             text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label

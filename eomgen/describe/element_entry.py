@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..base.value_rules import Allowed
-from ..elements.element_type import ElementType, Types
-from ..elements.entry import Found, Meaning
+from ..elements.element_type import ElementType, Found, Meaning, Types
 from ..elements.kinds import Field, Fields, Law
 from ..forces import FORCES
 from ..frames import Marker
@@ -68,7 +67,7 @@ class Surroundings(NamedTuple):
 
 
 class ElementEntry:
-    """The reader of :class:`~..elements.entry.Entry`, which says what its methods do."""
+    """The reader of :class:`~..elements.element_type.Entry`, which says what its methods do."""
 
     def __init__(self, around: Surroundings, entry: DescribedEntry) -> None:
         self.around, self.entry, self.reader = around, entry, around.reader

@@ -13,9 +13,9 @@ from ..constraints import CONSTRAINTS
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
 from ..forces import FORCES
 from ..joints import JOINTS
+from .build_functions import PythonTwin
 from .build_mechanism import build
-from .build_native import PythonTwin
-from .components import claim, component_of, named_attachments
+from .components import Component, Instance, add_instance, claim, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items
 from .element_methods import ElementMethods
 from .fields import fields_of
@@ -31,10 +31,10 @@ from .handles import (
     Triple,
     placed_markers,
 )
-from .instance import Component, Instance, add_instance
 from .methods import check_keywords, checked_keywords, keywords_of
 from .names import COM, fault_of_name
-from .sympy_face import function, is_sympy, named, names_of, one_or_several, require_name, symbol
+from .sympy_face import function, named, names_of, one_or_several, require_name, symbol
+from .write_yaml import plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -602,7 +602,7 @@ class Builder(ElementMethods):
         given = [name for group in groups.values() for name in group]
         if twice := sorted({name for name in given if given.count(name) > 1}):
             raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
-        numbers = {n: _plain(value) for group in groups.values() for n, value in group.items() if value is not None}
+        numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
         description = self._description
         made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
         made.values, made.instances = dict(description.values), dict(description.instances)
@@ -630,8 +630,8 @@ class Builder(ElementMethods):
 
     def _references(self, at: Any) -> Any:
         if isinstance(at, Mapping) and "body" not in at:
-            return {name: _plain(References(self).marker(marker)) for name, marker in at.items()}
-        return None if at is None else _plain(References(self).marker(at))
+            return {name: plain(References(self).marker(marker)) for name, marker in at.items()}
+        return None if at is None else plain(References(self).marker(at))
 
     # -- sums over the mechanism --------------------------------------------------------------------------------------
     @property
@@ -759,8 +759,6 @@ class Builder(ElementMethods):
 
     def to_yaml(self) -> str:
         """The model as the text of a model file."""
-        from .write_yaml import yaml_text
-
         return yaml_text(self._description)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -818,8 +816,6 @@ def _component(given: Any) -> Component:
 
         description = describe_yaml_file(given)
     elif isinstance(given, Described):
-        from .write_yaml import plain_description
-
         description = plain_description(given.description)
     else:
         raise ill_typed(f"{given!r} is not a component; give a Model, or the name of a model file")
@@ -828,15 +824,3 @@ def _component(given: Any) -> Component:
     for problem in (*description.problems, *faults.problems):
         raise UsageError(f"add {name}: {problem}", code=problem.code)
     return part
-
-
-def _plain(value: Any) -> Any:
-    """A value as numbers and texts."""
-    if is_sympy(value):
-        from .sympy_text import sympy_text
-
-        return sympy_text(value)
-    if isinstance(value, Mapping):
-        return {key: _plain(part) for key, part in value.items()}
-    listed = None if isinstance(value, str) else items(value)
-    return value if listed is None else [_plain(part) for part in listed]

@@ -18,7 +18,7 @@ from ..base.names import hint
 from ..base.texts import WHOLE, join_surrogates, lone_surrogate
 from ..base.value_rules import ROTATION, word_of_check
 from ..elements import kinds
-from ..elements.entry import Found
+from ..elements.element_type import Found
 from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
 from ..errors import ExpressionError
 from ..frames import GROUND, Frame, Marker
@@ -241,19 +241,20 @@ class Reader:
 
     # -- frames and markers ---------------------------------------------------------------------------------------
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
-        """A placement in a body from ``at`` and ``rpy``."""
+        """A placement in a body from ``at`` and ``rpy``, in the axes of the place ``on``."""
         at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
         given = [key for key in ("rpy", "axes", "matrix") if key in values]
         if len(given) > 1:
             self.faults.add(
                 f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT"
             )
-        if not given:
-            return Frame(self.identity, at)
-        if given[0] == "rpy":
-            return Frame(rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"])), at)
-        read = self.turn_of_axes if given[0] == "axes" else self.turn_of_matrix
-        return Frame(read(f"{path}.{given[0]}", values[given[0]]), at)
+        turn, key = self.identity, given[0] if given else ""
+        if key == "rpy":
+            turn = rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"]))
+        elif key:
+            turn = (self.turn_of_axes if key == "axes" else self.turn_of_matrix)(f"{path}.{key}", values[key])
+        frame = Frame(turn, at)
+        return self.named_frame(f"{path}.on", values["on"]) @ frame if "on" in values else frame
 
     def turn_of_axes(self, path: str, value: Any) -> Mat3:
         """The rotation whose columns are a frame's axes, two of which are given."""

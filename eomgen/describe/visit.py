@@ -2,11 +2,12 @@
 
 The kind of each key says what it holds (:meth:`~eomgen.elements.kinds.Field.map`), so a change states only what it does
 to a scalar, a marker, a coordinate.  What does not have the form of its key stays as it is; the check of the model
-tells it.
+tells it.  Texts are changed by their tokens, never evaluated as code.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -14,10 +15,87 @@ from typing import Any, NamedTuple
 from ..base.names import place_of_marker
 from ..base.names import undotted as undotted_name
 from ..elements.kinds import Field, Fields
+from ..errors import ExpressionError
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, fields_of
 from .marker_quantities import ElementQuantity, MarkerQuantity
-from .rewritten_texts import rewritten
+from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, REACTION_PARTS, WRENCH, WRENCH_PARTS
+
+_MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
+_TOKEN = re.compile(
+    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
+    rf"\(\s*(?P<arguments>{_MARKER}(?:\s*,\s*(?:(?:in|from)\s*=\s*)?{_MARKER})*)\s*\)"
+    rf"|\b(?P<what>{'|'.join((*OF_ELEMENTS, MULTIPLIER))})\(\s*(?P<element>{_MARKER})\s*\)"
+    rf"|\b{REACTION}\(\s*(?P<joint>{_MARKER})\s*(?:,\s*in\s*=\s*(?P<axes>{_MARKER})\s*)?\)"
+    rf"\.(?P<part>{'|'.join(REACTION_PARTS)})\b"
+    rf"|\b{WRENCH}\(\s*(?P<pushing>{_MARKER})\s*,\s*on\s*=\s*(?P<on>{_MARKER})\s*"
+    rf"(?:,\s*in\s*=\s*(?P<along>{_MARKER})\s*)?\)\.(?P<component>{'|'.join(WRENCH_PARTS)})\b"
+    r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
+)
+
+_ATOM = re.compile(r"[A-Za-z0-9_.]+\Z")
+
+Rename = Callable[[str], str]
+Locate = Callable[[MarkerQuantity], str]
+
+
+def rewritten(value: Any, name: Rename, locate: Locate, element: Callable[[ElementQuantity], str] | None = None) -> Any:
+    """A value with every name, motion of a marker (``vx(rod.tip)``) and element (``force(k1)``) replaced.
+
+    Numbers stay, and without ``element`` so do the elements.
+    """
+    if not isinstance(value, str):
+        return value
+
+    def one(found: re.Match[str]) -> str:
+        if found["number"] is not None:
+            return found[0]
+        if found["quantity"] is not None:
+            try:
+                return locate(MarkerQuantity.of(found["quantity"], found["arguments"]))
+            except ExpressionError:  # told where the text is read
+                return found[0]
+        if found["what"] is not None:
+            return found[0] if element is None else element(ElementQuantity(found["what"], found["element"]))
+        if found["joint"] is not None:
+            quantity = ElementQuantity(REACTION, found["joint"], found["part"], found["axes"] or "")
+            return found[0] if element is None else element(quantity)
+        if found["pushing"] is not None:
+            quantity = ElementQuantity(WRENCH, found["pushing"], found["component"], found["along"] or "", found["on"])
+            return found[0] if element is None else element(quantity)
+        return name(found[0])
+
+    return _TOKEN.sub(one, value)
+
+
+def in_brackets(text: str) -> str:
+    """A text so that it can stand in the place of a name."""
+    return text if _ATOM.match(text) else f"({text})"
+
+
+def names_of(value: Any) -> set[str]:
+    """Names in a text, markers aside."""
+    found: set[str] = set()
+
+    def note(name: str) -> str:
+        found.add(name)
+        return name
+
+    rewritten(value, note, str)
+    return found
+
+
+def motions_of(value: Any) -> set[MarkerQuantity]:
+    """Every motion of a marker in a text."""
+    found: set[MarkerQuantity] = set()
+
+    def note(quantity: MarkerQuantity) -> str:
+        found.add(quantity)
+        return str(quantity)
+
+    rewritten(value, lambda name: name, note)
+    return found
 
 
 class Slot(NamedTuple):
@@ -60,7 +138,10 @@ class Visitor:
 
     def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
         """``at`` and ``rpy`` in a body."""
-        return {key: value if key == "axes" else self.vector(value, slot.named(key)) for key, value in placed.items()}
+        made = {key: x if key == "axes" else self.vector(x, slot.named(key)) for key, x in placed.items()}
+        return made | (
+            {"on": self.placement(body, placed["on"], slot)} if isinstance(placed.get("on"), Mapping) else {}
+        )
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         """A reference to a marker: a text, or a mapping of body, at, rpy."""
@@ -112,11 +193,6 @@ def started(name: Any, change: Callable[[str], str], visitor: Visitor, slot: Slo
 
 def _named(name: Any, change: Callable[[str], str]) -> Any:
     return change(name) if isinstance(name, str) else name
-
-
-def copied(description: Description) -> Description:
-    """A copy whose entries can be changed without changing the original's."""
-    return visit(description, Visitor())
 
 
 def visit_entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:

@@ -6,6 +6,7 @@ import numbers
 import os
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..base.texts import comment_text, yaml_quoted
@@ -16,8 +17,7 @@ from .fields import MODEL, SHORT, fields_of
 from .marker_quantities import marker_quantity
 from .sympy_face import free_names, is_sympy, name_of, symbol
 from .visit import undotted
-from .yaml_file import describe_yaml
-from .yaml_nodes import scalar
+from .yaml_file import scalar
 
 
 def with_named_markers(description: Description) -> Description:
@@ -218,17 +218,24 @@ def _text(text: str) -> str:
 
 
 def plain_description(given: Description) -> Description:
-    """A description as the text of its model file reads: numbers, texts, lists and mappings only.
+    """A description without SymPy and arrays, in which markers that expressions speak of have names."""
+    description = with_named_markers(undotted(given))
+    functions = frozenset(entry.name for entry in description.sections["functions"])
+    sections = {
+        section: [replace(entry, values=plain(entry.values, functions)) for entry in entries]
+        for section, entries in description.sections.items()
+    }
+    values, origins = plain(description.values, functions), dict(given.origins)
+    return Description(values=values, sections=sections, instances=dict(given.instances), origins=origins)
 
-    Raises
-    ------
-    UsageError
-        It has values that no model file can hold, such as functions of Python.
-    """
-    result = describe_yaml(yaml_text(given))
-    functions = {entry.name: entry for entry in given.sections["functions"]}
-    for entry in result.sections["functions"]:
-        entry.trusted, entry.folder = functions[entry.name].trusted, functions[entry.name].folder
-    result.lines.clear()
-    result.instances, result.origins = dict(given.instances), dict(given.origins)
-    return result
+
+def plain(value: Any, functions: Names = frozenset()) -> Any:
+    """A value as numbers, texts, lists and mappings; functions of Python stay."""
+    if is_sympy(value):
+        from .sympy_text import sympy_text
+
+        return sympy_text(value, functions)
+    if isinstance(value, Mapping):
+        return {name_of(key): plain(part, functions) for key, part in value.items()}
+    listed = None if isinstance(value, str) else items(value)
+    return value if listed is None else [plain(part, functions) for part in listed]

@@ -673,11 +673,19 @@ class FrameAxes(Field):
     read = by("turn_of_axes")
 
 
+class Placement(Field):
+    """A position [x, y, z] or {at, rpy}."""
+
+    schema, defines = define("placement", lambda: any_of(ref("vector"), table_schema(MARKER)))
+    read = by("named_frame")
+
+
 MARKER: Fields = {
     "at": Vector("position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "rpy": Vector("fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
     "axes": FrameAxes("two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy", dimension=NONE),
     "matrix": Rotation("3 x 3, its axes as columns in body axes, instead of rpy", dimension=NONE),
+    "on": Placement("place in the body of axes in which these are, instead of those of the body", dimension=LENGTH),
 }
 PLACED: Fields = {"body": Name("a body or ground", required=True), **MARKER}
 
@@ -685,8 +693,7 @@ PLACED: Fields = {"body": Name("a body or ground", required=True), **MARKER}
 class Markers(Field):
     """A mapping of marker names to [x, y, z] or {at, rpy}."""
 
-    schema, _own = define("markers", _mapping(ref("placement"), propertyNames=ref("name")))
-    defines = _own | define("placement", lambda: any_of(ref("vector"), table_schema(MARKER)))[1]
+    schema, defines = define("markers", _mapping(ref("placement"), propertyNames=ref("name")))
     parts = MARKER
 
     def part(self, words: Sequence[str]) -> Field | None:

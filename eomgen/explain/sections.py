@@ -9,7 +9,7 @@ from typing import Any
 import sympy
 
 from ..base.inline_pictures import trimmed_png
-from ..describe.build_switches import CLOSES, OPENS
+from ..describe.build_states import CLOSES, OPENS
 from ..describe.mechanism import JointSpec, Switched
 from ..describe.placement import axis_word
 from ..errors import EomgenError, UnavailableError

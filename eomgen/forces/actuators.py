@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..elements.dimensions import FORCE, PUSH
-from ..elements.element_type import ElementType, element, key, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, element, key, table
 from ..elements.kinds import LAW, Choice, MarkerReference, Scalar, Value, Vector
 from ..elements.looks import CYLINDER, ROUND_ARROW, Pull, Seen
 from ..frames import Marker

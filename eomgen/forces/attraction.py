@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..elements.dimensions import Dimension
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import BodyName, Choice, MarkerReference, Scalar
 from ..frames import Frame, Marker
 from ..graph import vectors as vec

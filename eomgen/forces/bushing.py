@@ -8,8 +8,7 @@ from typing import ClassVar, cast
 
 from ..base.value_rules import Allowed
 from ..elements.dimensions import ENERGY, TIME
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Matrix6
 from ..elements.looks import RUBBER, Drawn, Seen
 from ..frames import Marker

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Fields, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Marker

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..frames import Frame, Marker

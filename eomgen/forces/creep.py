@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Choice, Pair, Scalar
 from ..frames import Marker
 from ..graph import vectors as vec

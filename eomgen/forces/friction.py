@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 
 from ..base.value_rules import NOT_NEGATIVE
 from ..elements.dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, STIFFNESS
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Fields, Scalar
 from ..graph.core import Expr, Graph, sqrt
 from ..records import dataclass

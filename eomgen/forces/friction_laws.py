@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..base.limits.contacts import AT_REST
 from ..base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import NONE, RATE, REACH
-from ..elements.entry import Entry
+from ..elements.element_type import Entry
 from ..elements.kinds import LAW, Choice, Fields, Scalar
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt

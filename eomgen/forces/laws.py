@@ -6,8 +6,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from ..elements.dimensions import ENERGY, LENGTH, NONE, PUSH, RATE, SPIN, Dimension
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Fields, Scalar
 from ..elements.looks import LAW_BOX, LAW_RING, Seen
 from ..graph.core import Expr, substitute

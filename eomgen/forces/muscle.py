@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 from ..base.value_rules import Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED, TIME
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Scalar
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
-from ..elements.entry import Entry
+from ..elements.element_type import Entry
 from ..elements.kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
 from ..graph.core import Expr, sqrt
 from ..records import dataclass

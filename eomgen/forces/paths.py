@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..elements.element_type import Where
-from ..elements.entry import Entry
+from ..elements.element_type import Entry, Where
 from ..elements.kinds import JointReference, Pair, Via
 from ..elements.looks import Drawn, Points
 from ..frames import Marker, WrapCylinder

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from ..base.limits.contacts import CAUGHT_UP
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
-from ..elements.entry import Entry
+from ..elements.element_type import Entry
 from ..elements.kinds import Choice, Fields, Flag, Radii, Scalar
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt

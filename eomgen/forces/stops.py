@@ -6,8 +6,7 @@ from typing import ClassVar
 
 from ..base.value_rules import POSITIVE
 from ..elements.dimensions import REACH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Scalar
 from ..elements.looks import STOP, Seen
 from ..graph.core import Expr

@@ -9,8 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..base.limits.contacts import NO_SLIP
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
+from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Marker

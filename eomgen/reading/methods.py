@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from ..base.notation import Notation
 from ..describe.expressions import parse
 from ..describe.printed_names import MULTIPLIERS, numbered
-from ..describe.rewritten_texts import rewritten
 from ..describe.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
+from ..describe.visit import rewritten
 from ..equations.free_bodies import FreeBodies
 from ..errors import ExpressionError, UnavailableError, UsageError, at_odds, ill_typed
 from ..frames import GROUND

@@ -238,6 +238,65 @@ initial: {{free_1: 0.2, free_y: 1}}
     assert made.outputs(0, made.x0())[0] == pytest.approx(hook[0], abs=1e-14)
 
 
+def test_an_attachment_turned_by_a_parameter_is_the_joint_by_hand(tmp_path: Path) -> None:
+    """Beside a body without mass welded to the marker, on which the joint is placed; written out and read again."""
+    head = """
+name: hung
+gravity: [0, 0, -9.81]
+parameters: {a: 0.3, b: -0.2}
+initial: {free_1: 0.2, free_y: 1}
+outputs: {place: y(s_bob)}
+"""
+    car = "car: {mass: 1, inertia: [1, 1, 1], markers: {m: {at: [1, 2, 3], rpy: [a, b, 2*a]}}}"
+    bob = "bob: {mass: 1, com: [0.2, 0, 0], inertia: [1, 2, 2.5]}"
+    place = "{body: root, at: [0.1, 0.2, 0.3], rpy: [0.1, 0, angle]}"
+    text = f"""
+bodies: {{{car}}}
+joints: {{free: {{type: free, between: [ground, car]}}}}
+components:
+  inner:
+    attachments: [root]
+    parameters: {{angle: 1}}
+    bodies: {{{bob}}}
+    joints: {{pin: {{type: revolute, between: [{place}, bob]}}}}
+  outer: {{attachments: [top], add: {{i: {{component: inner, prefix: "", at: top, parameters: {{angle: 3*a}}}}}}}}
+add: {{s: {{component: outer, at: car.m}}}}
+"""
+    by_hand = f"""
+bodies: {{{car}, root: {{mass: 0}}, s_{bob}}}
+joints:
+  free: {{type: free, between: [ground, car]}}
+  w: {{type: weld, between: [car.m, root]}}
+  s_pin: {{type: revolute, between: [{place.replace("angle", "3*a")}, s_bob]}}
+"""
+    made = load(tmp_path, head + text)
+    assert schema_faults(made.to_yaml()) == []
+    models = [made, load(tmp_path, made.to_yaml(), "again.yaml"), load(tmp_path, head + by_hand, "hand.yaml")]
+    one, again, hand = (m.compile(target="numpy") for m in models)
+    assert one.q_names == hand.q_names
+    assert one.metadata["model_digest"] == again.metadata["model_digest"]
+    x, p = one.x0() + 0.1, [0.7, -0.4]
+    np.testing.assert_allclose(one.rhs(0, x, p=p), hand.rhs(0, x, p=p), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(one.outputs(0, x, p=p), hand.outputs(0, x, p=p), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_function_with_a_python_fallback_in_a_component(tmp_path: Path, target: str) -> None:
+    source = tmp_path / "law.c"
+    source.write_text("double law(double x) { return x * x; }\ndouble slope(double x) { return 2 * x; }\n")
+    part = eg.Model("part")
+    law = part.native(
+        "law", source, derivatives=["slope"], python=lambda x: x * x, python_derivatives=[lambda x: 2 * x]
+    )
+    joint = part.revolute("pin", part.attachment("root"), part.body("rod", mass=1, inertia=(1, 1, 0.5)))
+    part.torque("drive", joint, -law(joint.coordinate))
+    whole = eg.Model("whole")
+    for prefix in ("a_", "b_"):
+        whole.add(part, prefix, at=whole.ground)
+    module = whole.compile(target=target)
+    np.testing.assert_allclose(module.rhs(0, module.x0(a_pin=0.5, b_pin=3.0))[2:], [-0.5, -18.0], rtol=1e-15)
+
+
 ADDING = [
     ("component: link, at: root", "component: lnik, at: root", "EG-NAME-UNKNOWN limb.add.upper.component: 'link'?"),
     ("{l: L}", "{q: L}", "EG-NAME-UNKNOWN :14: components.limb.add.upper.parameters.q: 'q' link"),
