@@ -159,12 +159,15 @@ def _unit(axis: Sequence[float]) -> np.ndarray:
 
 
 def _lock(robot: Robot, options: RobotOptions) -> None:
-    """Turn locked joints into welds at their values."""
+    """Turn locked joints into welds at their values; note joints that options name and the robot has not."""
+    actuated = options.actuate if isinstance(options.actuate, tuple) else ()
+    for path, name in [*(("lock", name) for name in options.lock), *(("actuate", name) for name in actuated)]:
+        if name not in robot.joints:
+            remedy = nearest(name, robot.joints, "joints")
+            robot.problem(f"{path}.{name}", "no such joint", remedy, (robot.file, 1), "EG-NAME-UNKNOWN")
     for name, value in options.lock.items():
         joint, path = robot.joints.get(name), f"lock.{name}"
         if joint is None:
-            remedy = nearest(name, robot.joints, "joints")
-            robot.problem(path, "no such joint", remedy, (robot.file, 1), "EG-NAME-UNKNOWN")
             continue
         if joint.type not in ("revolute", "prismatic", "weld"):
             remedy = "only joints of one degree of freedom can be locked"

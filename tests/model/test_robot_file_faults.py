@@ -111,7 +111,8 @@ def test_options_are_checked(tmp_path: Path) -> None:
     ):
         with refused(said, eg.UsageError):
             eg.load(path, **given)
-    refuses("EG-NAME-UNKNOWN lock.shulder: 'shoulder'?", eg.load, path, lock=["shulder"])
+    for key in ("lock", "actuate"):
+        refuses(f"EG-NAME-UNKNOWN {key}.shulder: 'shoulder'?", eg.load, path, **{key: ["shulder"]})
     eg.load(path).save(tmp_path / "model.yaml")
     refuses("EG-CONFLICT model.yaml floating", eg.load, tmp_path / "model.yaml", floating=True)
 
