@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from .runtime.drawing import explore as _explore
     from .runtime.drawing import report as _report
     from .runtime.minimal import Minimal
-    from .runtime.protocols import JacobianCall
     from .simulation.compiled import step as _step
     from .simulation.dae_solution import Dae
     from .simulation.impact import impact as _impact
@@ -254,7 +253,6 @@ class Module(BoundModel):
         draw = _draw
         draw_branches = _draw_branches
         explore = _explore
-        jacobian: JacobianCall
         minimal: Minimal
         canonical: Canonical
         dae: Dae

@@ -15,7 +15,6 @@ from ..base.limits.constraints import STATE
 from ..base.texts import as_html, as_text, number, without_noise
 from ..errors import AssemblyError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
-from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.kernels import constraint_system
 from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled, require_velocities
@@ -265,7 +264,7 @@ def _states(module: BoundModel, guess: Any) -> Array:
 
 def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:
     """A closed position near the guess that has the held values."""
-    initial = initial_of(module.kernels, t, guess if isinstance(guess, Mapping) else ())
+    initial = Initial(module.kernels, t, guess if isinstance(guess, Mapping) else ())
     if guess is None or isinstance(guess, Mapping):
         named = {name: value for name, value in (guess or {}).items() if name not in module.layout.states}
         values = {name: read_number(name, value) for name, value in named.items()}

@@ -23,8 +23,8 @@ from ..base.notation import Notation
 from ..base.texts import as_html, as_text, html_text, number
 from ..errors import EomgenError, cannot, off_range
 from ..runtime.argument_checks import read_numbers
-from ..runtime.assembled import initial_of
 from ..runtime.drawing import load_show
+from ..runtime.initial import Initial
 from .equilibrium import equilibrium
 from .linear import linearize
 from .linearization import Linearization, symmetric_modes, uncertainty
@@ -269,7 +269,7 @@ def modes(
     if x is None:
         x = equilibrium(module, t=t).x
     if isinstance(x, Mapping):
-        at_rest = not initial_of(module.kernels, t, x).sort(x).rates
+        at_rest = not Initial(module.kernels, t, x).sort(x).rates
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):

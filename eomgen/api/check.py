@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from ..derivation import Derivation
     from ..describe.model import Builder
 
-#: Functions that the assembly of a state calls, and those for values of outputs.
+#: Functions that the assembly of a state calls, and those for values of outputs and markers.
 OF_STARTS = (
     *("constraints", "constraint_jacobian", "coordinate_slopes", "velocity_constraints", "alignment"),
     *("loop_coordinates", "loop_coordinate_jacobian", "poses", "scales"),
 )
-OF_OUTPUTS = ("motion_outputs", "output_derivatives")
+OF_OUTPUTS = ("motion_outputs", "output_derivatives", "inertial_terms")
 
 
 @np.errstate(all="ignore")

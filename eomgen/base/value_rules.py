@@ -497,4 +497,24 @@ def surely_right(rule: str, values: Array, data: Sequence[Any]) -> Any:
         return values[0] != 0.0
     if rule in (RISING, BELOW):
         return values[0] < values[1]
+    if rule == BODIES:
+        return _possible_bodies(values, *data)
     return np.zeros(values.shape[-1], dtype=bool)
+
+
+@np.errstate(all="ignore")
+def _possible_bodies(values: Array, bodies: Sequence[Sequence[Any]]) -> Any:
+    """Whether inertias pass :func:`fault_of_inertia` whatever the sizes of the bodies are, of k sets each."""
+    at, right = 0, np.isfinite(values).all(axis=0)
+    values = np.where(right, values, 0.0)
+    for _, has_axis, count, judged in bodies:
+        tensor, n = values[at + 1 : at + 10].T.reshape(-1, 3, 3), values[at + 10 : at + 13].T
+        at += 10 + 3 * (has_axis + count)
+        if judged and has_axis:
+            moment = (n[:, None, :] @ tensor @ n[:, :, None])[:, 0, 0]
+            right &= moment >= -DIGITS * np.abs(tensor).max(axis=(1, 2))
+        elif judged:
+            a, b, c = algebra.eigvalsh(tensor).T
+            size = np.maximum(np.abs(a), np.abs(c))
+            right &= (a >= -DIGITS * size) & ((b <= MOMENT * size) | (c <= (1 + TRIANGLE) * (a + b)))
+    return right

@@ -23,7 +23,7 @@ from ..graph.evaluate import compile_evaluator, evaluate
 from ..graph.schedule import record_tape
 from ..joints.joint_types import Cylindrical, Free, Planar, Prismatic, Translational
 from ..kinematics import Kinematics
-from ..kinematics.constraint_functions import row_groups, row_velocities
+from ..kinematics.constraint_functions import row_groups, row_scales, row_velocities
 from ..kinematics.mobility import Mobility, initial_values
 from ..kinematics.near_pairs import describe_contacts
 from ..kinematics.topology import acceleration_name
@@ -204,6 +204,9 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             docs[item.name] = item.doc
     rows, n, forces = mobility.independent_rows, len(velocities), [terms.force for terms in kinematics.forces]
     used = symbols_of([*c.values, *c.velocity])
+    starts = [*c.aligned, *loop.values, *loop.rates, kinematics.length_scale, *row_scales(kinematics)]
+    starts += [*m.initial.values(), *m.initial_outputs.values(), *m.guess.values()]
+    names_of_start = used | symbols_of(starts)
     shapes = [[force.name, shape] for force in m.forces for shape in force.met_shapes()]
     independent = [*independent_places(kinematics, mobility), *range(n, n + len(states))]
     found = {
@@ -271,6 +274,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **_signals(kinematics, equations),
         "input_rates": _input_rates(kinematics),
         "constraint_inputs": [name for name in kinematics.input_names if name in used],
+        "start_parameters": [k for k, name in enumerate(kinematics.parameter_names) if name in names_of_start],
         "contact_shapes": shapes,
         **(describe_contacts(kinematics) if shapes else {}),
         "picture": describe_picture(m),

@@ -330,19 +330,23 @@ def _project_columns(
 ) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
     led = find_forcing(module, plan).constrained
-    if cases.alike and not led:
-        good = np.isfinite(states).all(axis=0)
-        with suppress(EomgenError):  # some cannot be: find out which
-            states[:, good] = module.project(states[:, good], t=times[good], **cases.column(0))
+
+    def bring(columns: list[int]) -> None:
+        part, at, given = states[:, :, columns], times[:, columns], cases.column(columns[0])
+        good = np.asarray(np.isfinite(part).all(axis=0))
+        if not good.any():
             return
-    for k in range(cases.count):
-        good = np.isfinite(states[:, :, k]).all(axis=0)
-        if good.any():
-            try:
-                given = cases.column(k)
-                if led:
-                    given["u"] = forcing_of(module, cases, plan, k).sample(times[good, k], states[:, good, k])
-                states[:, good, k] = module.project(states[:, good, k], t=times[good, k], **given)
-            except EomgenError as error:
-                block.status[k], block.words[k] = FAILED, str(error)
-                states[:, :, k] = np.nan
+        try:
+            if led:
+                given["u"] = forcing_of(module, cases, plan, columns[0]).sample(at[good], part[:, good])
+            part[:, good] = module.project(part[:, good], t=at[good], **given)
+            states[:, :, columns] = part
+        except EomgenError as error:
+            if len(columns) == 1:
+                block.status[columns[0]], block.words[columns[0]] = FAILED, str(error)
+                states[:, :, columns[0]] = np.nan
+            for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
+                bring([k])
+
+    for columns in [[k] for k in range(cases.count)] if led else cases.alike(module.layout):
+        bring(columns)

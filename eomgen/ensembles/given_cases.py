@@ -17,7 +17,7 @@ from ..base.names import place_of_marker
 from ..base.value_rules import read_count
 from ..errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
 from ..runtime.argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
-from ..runtime.assembled import initial_of
+from ..runtime.initial import Initial
 from ..runtime.late_start import fixed_told, late_values, tell_fixed
 from ..runtime.refusals import require_switched
 from ..runtime.trajectory import last_state
@@ -27,6 +27,7 @@ from ..simulation.run_arguments import find_state
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.inputs import Forcing
+    from ..runtime.layout import Layout
 
 
 # -- grids -------------------------------------------------------------------------------------------------------------
@@ -116,9 +117,23 @@ class Cases:
         return Cases(min(stop, self.count) - start, p, u, states, values)
 
     @property
-    def alike(self) -> bool:
-        """Whether parameters and inputs are the same for all."""
-        return self.p.ndim == 1 and self.u.ndim == 1
+    def differ(self) -> bool:
+        """Whether anything differs between the runs."""
+        values = () if self.states is not None else self.values.values()
+        return self.p.ndim > 1 or self.u.ndim > 1 or self.states is not None or any(np.ndim(x) for x in values)
+
+    def alike(self, layout: Layout) -> list[list[int]]:
+        """The runs by what of their parameters and inputs decides where they can start."""
+        p, u = self.p, self.u
+        if not any(place_of_marker(n) or layout.plain(n) in layout.y for n in (*self.values, *layout.initial_outputs)):
+            p, u = p[layout.start_parameters], u[layout.constraint_inputs]
+        if p.ndim == u.ndim == 1:
+            return [list(range(self.count))] * (self.count > 0)
+        rows = np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)])
+        groups: dict[bytes, list[int]] = {}
+        for k, row in enumerate(np.ascontiguousarray(rows.T)):
+            groups.setdefault(row.tobytes(), []).append(k)
+        return list(groups.values())
 
     def column(self, k: int) -> dict[str, Any]:
         """Parameters and inputs of one run, as ``Module.bind`` takes them."""
@@ -170,7 +185,7 @@ def collect_cases(
         known = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y, *filter(place_of_marker, values))
         check_names("coordinate or rate", values, known)
         with suppress(AssemblyError):  # of values, which differ between runs
-            initial_of(module.kernels, 0.0, values).sort(dict.fromkeys(values, 0.0))  # names that no run can take
+            Initial(module.kernels, 0.0, values).sort(dict.fromkeys(values, 0.0))  # names that no run can take
     elif initial is not None:
         states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)
     _require_one_length(lengths)
@@ -207,116 +222,109 @@ def assemble_states(
         Why, for each of these in order.
     """
     with fixed_told():  # for all runs, when their cases were collected
-        x, failed, words = _assemble_all(module, cases, t, forcing_of)
+        x, reasons = _assemble_all(module, cases, t, forcing_of)
     if module.metadata.get("clocks"):
-        for k in np.flatnonzero(~failed).tolist():
+        for k in set(range(cases.count)) - reasons.keys():
             x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
     if module.metadata.get("switched"):
-        return _only_in_agreement(module, cases, t, x, failed, words)
-    return x, failed, words
+        _refuse_disagreement(module, cases, t, x, reasons)
+    failed = np.array([k in reasons for k in range(cases.count)], dtype=bool)
+    return x, failed, [reasons[k] for k in sorted(reasons)]
 
 
-def _only_in_agreement(
-    module: BoundModel, cases: Cases, t: float, x: Array, failed: Mask, words: list[str]
-) -> tuple[Array, Mask, list[str]]:
-    """The same without runs at whose start a constraint declared closed does not hold, or one is half closed."""
+def _refuse_disagreement(module: BoundModel, cases: Cases, t: float, x: Array, reasons: dict[int, str]) -> None:
+    """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
     layout, by_name = module.layout, cases.states is None and bool(module.metadata.get("held_rows"))
-    told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
-    for k in np.flatnonzero(~failed).tolist():
+    for k in set(range(cases.count)) - reasons.keys():
         try:
             require_switched(layout, x[layout.n_x - layout.n_states :, k])
             if by_name:
                 require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
         except UsageError as error:
-            told[k], x[:, k] = str(error), np.nan
-    return x, np.array([k in told for k in range(cases.count)], dtype=bool), [told[k] for k in sorted(told)]
-
-
-def _assemble_all(
-    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
-) -> tuple[Array, Mask, list[str]]:
-    free = not module.n_rows and not module.layout.space
-    failed: Mask = np.zeros(cases.count, dtype=bool)
-    words: list[str] = []
-    if cases.states is not None and free:
-        return np.array(cases.states), failed, words
-    if forcing_of(0).constrained:
-        return _assemble_each(module, cases, lambda k: _assemble_led(module, cases, k, t, forcing_of(k)))
-    varying = cases.p.ndim > 1 or cases.u.ndim > 1 or any(np.ndim(x) for x in cases.values.values())
-    if cases.states is None and (not varying or _is_free(module, cases, free)):
-        late = {name: value for name, value in late_values(module.layout, cases.p).items() if np.ndim(value)}
-        scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in (late | cases.values).items()}
-        x = np.repeat(module.x0(scalars, t=t, **_shared(cases))[:, None], cases.count, axis=1)
-        for name, value in (late | cases.values).items():
-            if np.ndim(value):
-                x[module.x_names.index(name)] = value
-        for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist():  # of what follows from parameters
-            failed[k] = True
-            words.append(f"{module.x_names[int(np.argmin(np.isfinite(x[:, k])))]} is no number at the start")
-        return x, failed, words
-    if cases.states is not None and cases.alike:
-        with suppress(EomgenError):  # some cannot be: find out which
-            return module.project(cases.states, t=t, **cases.column(0)), failed, words
-    if cases.states is None and cases.alike:
-        with suppress(EomgenError):  # some cannot be: find out which
-            return _assemble_alike(module, cases, t), failed, words
-    return _assemble_each(module, cases, lambda k: _assemble_one(module, cases, k, t))
+            reasons[k], x[:, k] = str(error), np.nan
 
 
 @np.errstate(all="ignore")
-def _assemble_alike(module: BoundModel, cases: Cases, t: float) -> Array:
-    """The initial states of runs that differ in their named values alone; each position is found once."""
-    initial = initial_of(module.bind(**cases.column(0)).kernels, t, cases.values)
-    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
-             for k in range(cases.count)]  # fmt: skip
-    alike: dict[tuple[float, ...], list[int]] = {}
-    for k, one in enumerate(given):
-        alike.setdefault(tuple(one.positions.values()), []).append(k)
-    x = np.empty((module.n_x, cases.count))
-    for columns in alike.values():
-        first = given[columns[0]]
-        q = initial.assembled(first.positions)
-        rates = {name: np.array([given[k].rates[name] for k in columns]) for name in first.rates}
-        v = initial.velocities(q, rates if first.positions or rates else None)
-        x[: module.n_q, columns] = q[:, None]
-        x[module.n_q :, columns] = v if v.ndim > 1 else v[:, None]
-    return x
+def _assemble_all(
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, dict[int, str]]:
+    """The states (n_x, k), and why runs have none; what several runs have in common is solved for once."""
+    free = not module.n_rows and not module.layout.space
+    if cases.states is not None and free:
+        return np.array(cases.states), {}
+    if cases.states is None and _is_free(module, cases, free):
+        return _assemble_entries(module, cases, t)
+    x, reasons = np.full((module.n_x, cases.count), np.nan), dict[int, str]()
+    led = forcing_of(0).constrained
 
-
-def _assemble_each(module: BoundModel, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:
-    x, words = np.full((module.n_x, cases.count), np.nan), []
-    failed: Mask = np.zeros(cases.count, dtype=bool)
-    for k in range(cases.count):
+    def assemble(columns: list[int]) -> None:
         try:
-            x[:, k] = assemble(k)
+            if led:
+                x[:, columns] = _assemble_led(module, cases, columns[0], t, forcing_of(columns[0]))[:, None]
+            elif cases.states is not None:
+                x[:, columns] = module.project(cases.states[:, columns], t=t, **cases.column(columns[0]))
+            else:
+                x[:, columns] = _assemble_named(module, cases, columns, t)
         except EomgenError as error:
-            failed[k] = True
-            words.append(str(error))
-    return x, failed, words
+            if len(columns) == cases.count and not (led or cases.differ):
+                raise
+            if len(columns) == 1:
+                reasons[columns[0]] = str(error)
+            for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
+                assemble([k])
+
+    for columns in [[k] for k in range(cases.count)] if led else cases.alike(module.layout):
+        assemble(columns)
+    return x, reasons
+
+
+def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array, dict[int, str]]:
+    """The states where each named value is an entry of them, whatever the others are."""
+    late = {name: value for name, value in late_values(module.layout, cases.p).items() if np.ndim(value)}
+    values = late | cases.values
+    scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in values.items()}
+    shared: dict[str, Any] = {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
+    x = np.repeat(module.x0(scalars, t=t, **shared)[:, None], cases.count, axis=1)
+    for name, value in values.items():
+        if np.ndim(value):
+            x[module.x_names.index(name)] = value
+    unknown = {  # of what follows from parameters
+        k: f"{module.x_names[int(np.argmin(np.isfinite(x[:, k])))]} is no number at the start"
+        for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist()
+    }
+    return x, unknown
+
+
+def _assemble_named(module: BoundModel, cases: Cases, columns: list[int], t: float) -> Array:
+    """The states of runs that differ, as far as starts can tell, in their named values alone."""
+    initial = Initial(module.rebound(**cases.column(columns[0])).kernels, t, cases.values)
+    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
+             for k in columns]  # fmt: skip
+    alike: dict[tuple[float, ...], list[int]] = {}
+    for i, one in enumerate(given):
+        alike.setdefault(tuple(one.positions.values()), []).append(i)
+    x = np.empty((module.n_x, len(columns)))
+    for places in alike.values():
+        first = given[places[0]]
+        q = initial.assembled(first.positions)
+        rates = {name: np.array([given[i].rates[name] for i in places]) for name in first.rates}
+        v = initial.velocities(q, rates if first.positions or rates else None)
+        x[: module.n_q, places] = q[:, None]
+        x[module.n_q :, places] = v if v.ndim > 1 else v[:, None]
+    return x
 
 
 def _assemble_led(module: BoundModel, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
     """The state of one run whose constraints depend on inputs that vary."""
     values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
     given = values if cases.states is None else cases.states[:, k]
-    return find_state(module.bind(**cases.column(k)), given, t, forcing)
-
-
-def _assemble_one(module: BoundModel, cases: Cases, k: int, t: float) -> Array:
-    if cases.states is not None:
-        return module.project(cases.states[:, k], t=t, **cases.column(k))
-    values = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()}
-    return module.x0(values, t=t, **cases.column(k))
+    return find_state(module.rebound(**cases.column(k)), given, t, forcing)
 
 
 def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
     """Whether named initial values are entries of the state, whatever the others are."""
     layout = module.layout
     return free and not (layout.loops or layout.initial_outputs) and all(n in layout.x for n in cases.values)
-
-
-def _shared(cases: Cases) -> dict[str, Any]:
-    return {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
 
 
 def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:

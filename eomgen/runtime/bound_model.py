@@ -17,9 +17,10 @@ from ..base.algebra import Array
 from .argument_checks import read_numbers
 from .argument_names import both_names
 from .assembled import Assembled
-from .kernels import Kernels, Projection, Rows
+from .kernels import Kernels, Projection, Refused, Rows, mechanical
 from .layout import Layout
 from .momenta import Momenta
+from .refusals import refuse_reaction_laws
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -80,18 +81,11 @@ class BoundModel(Assembled, Momenta):
         self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
         self.project = Projection(kernels.state("project"))
         self.constraints = kernels.constraints
-        mechanical: Any = kernels
-        if self.n_s:
-            from .kernels import Mechanical
-
-            mechanical = Mechanical(kernels)
-        self.mass_matrix, self.embedded_mass_matrix = mechanical.mass_matrix, mechanical.embedded_mass_matrix
-        self.bias, self.inverse_dynamics = mechanical.bias, mechanical.inverse_dynamics
-        if self.layout.reaction_laws:
-            from .refusals import RefusedInverse
-
-            self.inverse_dynamics = cast("Motion", RefusedInverse(self.layout))
-        self.constraint_jacobian = mechanical.constraint_jacobian
+        names = ("mass_matrix", "embedded_mass_matrix", "bias", "inverse_dynamics", "constraint_jacobian")
+        vars(self).update(mechanical(kernels) if self.n_s else {name: getattr(kernels, name) for name in names})
+        if layout.reaction_laws:
+            refused = Refused(lambda: refuse_reaction_laws(layout, "inverse_dynamics"))
+            self.inverse_dynamics = cast("Motion", refused)
         self.velocity_constraints = kernels.velocity_constraints
 
     @property
@@ -139,10 +133,15 @@ class BoundModel(Assembled, Momenta):
             An unknown name or a wrong shape.
         """
         layout = self.layout
+        return self.rebound(
+            layout.values("parameter", layout.p, p, self.p), layout.values("input", layout.u, u, self.u)
+        )
+
+    def rebound(self, p: Array, u: Array) -> Self:
+        """The same model with other parameters (n_p,), which are allowed, and inputs (n_u,)."""
         other = object.__new__(type(self))
-        other.core, other.layout, other.equations = self.core, layout, self.equations
-        new_p = layout.values("parameter", layout.p, p, self.p)
-        other._setup(self.core, layout, new_p, layout.values("input", layout.u, u, self.u))
+        other.core, other.layout, other.equations = self.core, self.layout, self.equations
+        other._setup(self.core, self.layout, p, u)
         return other
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,19 @@ from ..base.limits.constraints import (
     STILL,
     UNMOVED,
 )
-from ..errors import AssemblyError, UsageError, calls_within
-from ..numeric.assembly import RESTARTS, ClosureSystem, VelocityEquations, assemble_velocity, close, closed, starts
+from ..base.names import place_of_marker
+from ..base.picture_data import read_picture
+from ..errors import AssemblyError, UsageError, calls_within, cannot
+from ..numeric.assembly import (
+    RESTARTS,
+    ClosureSystem,
+    CutJoints,
+    VelocityEquations,
+    assemble_velocity,
+    close,
+    closed,
+    starts,
+)
 from ..numeric.continuation import follow
 from ..numeric.projection import largest
 from ..numeric.ranks import parts, rank
@@ -305,6 +317,86 @@ class Given(NamedTuple):
     rates: dict[str, float]
 
 
+class Wanted(NamedTuple):
+    """A value besides coordinates and rates that is held: of an output, or of a marker's place or velocity."""
+
+    name: str
+    scale: float  #: typical size
+    of_velocities: bool
+    evaluate: Callable[
+        [Array, float], tuple[float, Array]
+    ]  #: (q, t) -> y, dy/dq by velocities; y = y_v v + y_0: y_0, y_v
+
+
+def find_wanted(kernels: Kernels, name: str, t: float) -> Wanted | None:
+    """The function that an output or a place of a marker is; None if the name is neither.
+
+    Raises
+    ------
+    UsageError
+        An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
+    """
+    if found := place_of_marker(name):
+        return _of_marker(kernels, name, *found)
+    plain = kernels.layout.plain(name)  # tip_x of an instance leg is leg.tip_x too
+    return _of_output(kernels, plain, t) if plain in kernels.layout.y else None
+
+
+def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
+    layout, places = kernels.layout, kernels.layout.place_scales
+    n_q, n_v, k = layout.n_q, layout.n_v, layout.y.index(name)
+    outputs, slopes = kernels.motion("motion_outputs"), kernels.motion("output_derivatives")
+    zero = np.zeros(n_v)
+    # at one position a slope may vanish that counts elsewhere, as sin(q) does at 0
+    tried = [layout.q_reference + turn * np.linspace(0.7, 1.3, n_q) for turn in (0.0, 0.3, -0.2)]
+    found = np.array([[slopes(q, v, zero, t=t)[k] for v in (zero, np.linspace(0.3, 1.1, n_v))] for q in tried])
+    by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(found, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
+    if by_a.any() or not np.allclose(by_v[:, 0], by_v[:, 1]):
+        on = "accelerations" if by_a.any() else "velocities, and not linearly"
+        raise cannot(
+            f"the output {name!r} depends on {on}, so it cannot be given as an initial value; give coordinates"
+        )
+    of_velocities = bool(by_v.any())
+
+    def evaluate(q: Array, t: float) -> tuple[float, Array]:
+        row = slopes(q, zero, zero, t=t)[k]
+        y = float(outputs(q, zero, zero, t=t)[k])
+        if of_velocities:
+            return y, np.asarray(row[n_q : n_q + n_v])
+        return y, np.array([row[:n_q] @ places.rates(q, unit) for unit in np.eye(len(places.q))])
+
+    known = {"m": layout.length, "rad": 1.0}.get(layout.unit(name).removesuffix("/s"))
+    size = float(np.abs(by_v if of_velocities else by_q).max(initial=0.0))
+    return Wanted(name, known or size or 1.0, of_velocities, evaluate)
+
+
+def _of_marker(kernels: Kernels, name: str, what: str, marker: str) -> Wanted:
+    """A coordinate of the place of a marker or of a body's origin, or of its velocity."""
+    layout, axis, of_velocities = kernels.layout, "xyz".index(what[-1]), what.startswith("v")
+    poses, twists = kernels.state("poses"), kernels.motion("inertial_terms")
+    data = read_picture(layout.metadata, kernels.context.p)
+    marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
+    if marker not in data.markers and marker not in layout.bodies:
+        raise unknown("marker or body", marker, (*data.markers, *layout.bodies))
+    own = marker in data.markers
+    body = data.markers[marker].body if own else layout.bodies.index(marker)
+    place = data.markers[marker].position if own else np.zeros(3)
+    if body < 0:
+        kind = "velocity" if of_velocities else "position"
+        raise UnknownNameError(f"{name!r} is a {kind} on the ground, which does not move")
+    motions = np.eye(layout.n_v, layout.n_v + 1)  # each velocity alone, and rest
+
+    def evaluate(q: Array, t: float) -> tuple[float, Array]:
+        pose = poses(q, t=t)[body]
+        every = twists(np.repeat(q[:, None], layout.n_v + 1, axis=1), motions, np.zeros_like(motions), t=t)
+        turning, moving = every[body, :6].reshape(2, 3, -1)
+        rates = pose[axis, :3] @ (moving + np.cross(turning, place, axisa=0, axisb=0, axisc=0))
+        y = rates[-1] if of_velocities else pose[axis, :3] @ place + pose[axis, 3]
+        return float(y), rates[:-1] - rates[-1]
+
+    return Wanted(name, layout.length, of_velocities, evaluate)
+
+
 class Initial:
     """Assembly of one model with one set of parameters at one time.
 
@@ -313,9 +405,16 @@ class Initial:
     kernels : Kernels
     t : float
         Time; matters for driven constraints only.
+    names : iterable of str, optional
+        Of values that may be held; outputs and places of markers can be among them, and those declared are held too.
+
+    Raises
+    ------
+    UsageError
+        An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
     """
 
-    def __init__(self, kernels: Kernels, t: float = 0.0) -> None:
+    def __init__(self, kernels: Kernels, t: float = 0.0, names: Iterable[str] | None = None) -> None:
         self.kernels = kernels
         self.layout = layout = kernels.layout
         self.t = t
@@ -323,23 +422,45 @@ class Initial:
         self._C_q = kernels.state("constraint_jacobian", nan=True)
         self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
+        self.wanted: dict[str, Wanted] = {}
+        if names is not None:
+            found = (find_wanted(kernels, name, t) for name in dict.fromkeys([*names, *layout.initial_outputs]))
+            self.wanted = {one.name: one for one in found if one is not None}
+        if self.wanted:
+            self.layout = copy(layout)
+            self.layout.initial = {**layout.initial, **layout.initial_outputs}
+            self._hold([one for one in self.wanted.values() if not one.of_velocities])
+
+    def _hold(self, wanted: Sequence[Wanted]) -> None:
+        """Take functions of positions among the coordinates that can be held."""
+        cut, n = self.system.cut, len(self.place.q)
+
+        def evaluate(q: Array, t: float) -> tuple[Array, Array]:
+            (y, y_q), found = cut.evaluate(q, t), [one.evaluate(q, t) for one in wanted]
+            return np.append(y, [value for value, _ in found]), np.vstack([y_q.reshape(-1, n), *(x for _, x in found)])
+
+        names, scales = tuple(one.name for one in wanted), np.append(cut.scales, [one.scale for one in wanted])
+        joints = CutJoints(cut.names + names, cut.kinds + ("turn",) * len(names), scales, evaluate)
+        self.system = self.system._replace(cut=joints)
 
     def sort(self, values: Mapping[str, float]) -> Given:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
-        layout = self.layout
+        layout, wanted = self.layout, self.wanted
         rates = layout.v + layout.loop_rates
-        values = without_dots(values, layout.instances)
-        for name in values:
+        given = {name: x for name, x in values.items() if place_of_marker(name)}
+        given |= without_dots({name: x for name, x in values.items() if name not in given}, layout.instances)
+        for name in given:
+            if name in wanted or name in self.coordinates or name in rates:
+                continue
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
-                wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
+                names = ", ".join(n for n in layout.v if not n.endswith("_dot"))
                 what = "angular velocity" if layout.quaternion_slots else "velocities"
-                raise UnknownNameError(f"{name!r} follows from the {what}; give one of {wanted} instead")
-            if name not in self.coordinates and name not in rates:
-                raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
-        positions = {n: x for n, x in values.items() if n in self.coordinates}
-        return Given(self.system.settle(positions), {n: x for n, x in values.items() if n in rates})
+                raise UnknownNameError(f"{name!r} follows from the {what}; give one of {names} instead")
+            raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
+        fast = {n: x for n, x in given.items() if (wanted[n].of_velocities if n in wanted else n in rates)}
+        return Given(self.system.settle({n: x for n, x in given.items() if n not in fast}), fast)
 
     # functions of q
 
@@ -577,9 +698,12 @@ class Initial:
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""
+        if name in self.wanted:
+            y_t, y_q = self.wanted[name].evaluate(q, self.t)
+            return y_q, y_t, self.wanted[name].scale
         layout, zero, k = self.layout, np.zeros(self.layout.n_v), self.layout.loop_rates.index(name)
-        y_t = self.kernels.motion("loop_coordinates")(q, zero, zero, t=self.t)[1]
-        return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], layout.loop_scales[k]
+        rest = self.kernels.motion("loop_coordinates")(q, zero, zero, t=self.t)[1]
+        return self.system.cut.evaluate(q, self.t)[1][k], rest[k], layout.loop_scales[k]
 
     # which values can be held together
 
@@ -619,6 +743,9 @@ class Initial:
         layout = self.layout
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
+        if name in self.wanted and self.wanted[name].of_velocities:
+            row, _, scale = self.rate_equation(q, name)
+            return [row * self.scales.q / scale]
         if name in layout.loop_rates:
             name = layout.loops[layout.loop_rates.index(name)]
         return self.system.gradients(q, name)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.algebra import Array
+from ..base.algebra import Array, Indices
 from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
 from ..numeric.assembly import ConstraintSystem, CutJoints
 from .argument_checks import fitting, read_numbers
 from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
-from .refusals import Refusal
+from .refusals import require_projection, require_velocities
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -73,8 +73,12 @@ class Kernels:
         """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
         if name not in self._derivatives:
             refused = self.layout.given_rates or not self.layout.projects
-            self._derivatives[name] = cast("Timed", Refusal(self.layout)) if refused else self.timed(name)
+            self._derivatives[name] = cast("Timed", Refused(self._refuse)) if refused else self.timed(name)
         return self._derivatives[name]
+
+    def _refuse(self) -> None:
+        require_velocities(self.layout)
+        require_projection(self.layout)
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""
@@ -84,10 +88,15 @@ class Kernels:
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
-        shape = self.layout.shape(name)
-        if name not in self.core.names and 0 in shape:
-            return cast("Timed", Nothing(np.zeros(shape), self.layout.inputs(name)))
-        return cast("Timed", self._make(self.core.timed, name, nan))
+        return cast("Timed", self._make("timed", name, nan))
+
+    def state(self, name: str, nan: bool = False) -> State:
+        """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
+        return cast("State", self._make("state", name, nan))
+
+    def motion(self, name: str) -> Motion:
+        """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
+        return cast("Motion", self._make("motion", name, False))
 
     def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
         """Rows of a timed kernel at one state; the others need not be numbers there."""
@@ -96,33 +105,30 @@ class Kernels:
             self.timed(name)(t, x, u=u)  # tells what is wrong
         return found
 
-    def state(self, name: str, nan: bool = False) -> State:
-        """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
+    def _make(self, kind: str, name: str, nan: bool) -> Any:
         layout = self.layout
-        kernel: object = None
-        if name not in self.core.names:
-            if layout.shape(name)[0] == 0:
-                kernel = Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            elif layout.n_c == 0 and name == "project":
-                kernel = Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
-            elif layout.rank == 0 and name == "embedded_mass_matrix":
-                kernel = Selected(self.state("mass_matrix", nan), layout.independent)
-        return cast("State", self._make(self.core.state, name, nan) if kernel is None else kernel)
+        shape = layout.shape(name)
+        if name in self.core.names:
+            return getattr(self.core, kind)(name, self.context, shape, self.fail, nan, ill_shaped)
+        if 0 in shape:
+            return DERIVED[kind](name, lambda *x, **_: np.zeros((*shape, *batch_of(x, layout.inputs(name)))))
+        if not layout.n_c and name == "project":
+            return DERIVED[kind](name, self._normalised)
+        if not layout.rank and name == "embedded_mass_matrix":
+            every, order = self.state("mass_matrix", nan), np.ix_(layout.independent, layout.independent)
+            return DERIVED[kind](name, lambda x, **given: np.array(every(x, **given)[order]))
+        if name == "energy" and not layout.energy_known:
+            return Refused(lambda: cannot(ENERGY.format(layout.name)))
+        message = f"model {layout.name!r} was generated without the kernel {name!r}"
+        return Refused(lambda: cannot(f"{message}; compile again with kernels=None for all, or name it in kernels"))
 
-    def motion(self, name: str) -> Motion:
-        """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
-        shape = self.layout.shape(name)
-        if name not in self.core.names and 0 in shape:
-            return cast("Motion", lambda q, *_, **__: np.zeros((*shape, *np.shape(q)[1:])))
-        return cast("Motion", self._make(self.core.motion, name, False))
-
-    def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
-        if name not in self.core.names:
-            if name == "energy" and not self.layout.energy_known:
-                return Missing(name, ENERGY.format(self.layout.name))
-            message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
-            return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
-        return maker(name, self.context, self.layout.shape(name), self.fail, nan, ill_shaped)
+    def _normalised(self, x: ArrayLike, **given: Any) -> Array:
+        """The projection of a tree: nothing to do but for the length of Euler parameters."""
+        result = np.array(read_numbers("x", x))
+        batch_of((result,), self.layout.n_x)
+        for i, _ in self.layout.quaternion_slots:
+            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+        return result
 
     def _poses(self, q: Array, t: float, p: Array | None = None) -> Array:
         return self.state("poses", nan=True)(q, t=t, p=p)
@@ -137,30 +143,98 @@ class Kernels:
             return ""
 
 
-class Missing:
-    """A kernel that was not generated: the module can be used without it."""
+class Derived:
+    """A call that is made of kernels, and has the arguments of one.
+
+    Parameters
+    ----------
+    name : str
+        Of that kernel, for messages.
+    find : callable
+        ``find(*arrays, p=, u=, t=)`` -> its result.
+    """
 
     failure: tuple[int, float, Array] | None = None
 
-    def __init__(self, name: str, message: str) -> None:
-        self.name = name
-        self.message = message
+    def __init__(self, name: str, find: Callable[..., Array]) -> None:
+        self.name, self.find = name, find
 
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+
+class DerivedTimed(Derived):
+    """Of time and state."""
+
+    @both_names
+    def __call__(self, t: Any, x: Any, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
+        """Evaluate."""
+        return into(out, self.find(x, p=p, u=u, t=t))
+
+
+class DerivedState(Derived):
+    """Of the state, or the coordinates, alone."""
+
+    @both_names
+    def __call__(self, x: Any, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
+        """Evaluate."""
+        return into(out, self.find(x, p=p, u=u, t=t))
+
+
+class DerivedMotion(Derived):
+    """Of coordinates, velocities and accelerations."""
+
+    @both_names
+    def __call__(
+        self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0
+    ) -> Array:
+        """Evaluate."""
+        return into(out, self.find(q, v, a, p=p, u=u, t=t))
+
+
+DERIVED: dict[str, Any] = {"timed": DerivedTimed, "state": DerivedState, "motion": DerivedMotion}
+
+
+def batch_of(arrays: Sequence[Any], n: int) -> tuple[int, ...]:
+    """The last axis (k,) of n numbers for each of k states, or none of one state; of several arrays n are all theirs.
+
+    Raises
+    ------
+    UsageError
+        The first has another shape.
+    """
+    shape = read_numbers("x", arrays[0]).shape
+    if len(arrays) == 1 and (shape[:1] != (n,) or len(shape) > 2):
+        raise ill_shaped(f"x must have shape ({n},) or ({n}, k), not {shape}")
+    return shape[1:]
+
+
+class Refused:
+    """In place of a call that a model cannot have: says why when it is called.
+
+    Parameters
+    ----------
+    refuse : callable
+        Raises the error, or returns it.
+    """
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, refuse: Callable[[], Any]) -> None:
+        self.refuse = refuse
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
         """Refuse.
 
         Raises
         ------
         UsageError
         """
-        raise cannot(self.message)
+        raise self.refuse()
 
 
 class Rows:
-    """A constraint kernel that gives the independent rows, or all of them."""
+    """A constraint kernel that gives the independent rows, or all of them; of those of C_q the first columns."""
 
-    def __init__(self, every: State, independent: Sequence[int] | np.ndarray[Any, Any]) -> None:
-        self.every, self.independent = every, independent
+    def __init__(self, every: State, independent: Sequence[int] | Indices, width: int | None = None) -> None:
+        self.every, self.independent, self.width = every, independent, width
 
     @both_names
     def __call__(
@@ -182,12 +256,13 @@ class Rows:
         t : float
         rows : {"independent", "all"}
         """
-        if isinstance(rows, str) and rows == "all":
-            return self.every(q, p=p, u=u, out=out, t=t)
-        if not isinstance(rows, str) or rows != "independent":
+        if not isinstance(rows, str) or rows not in ("independent", "all"):
             raise no_choice(f"rows must be 'independent' or 'all', not {rows!r}")
-        result = self.every(q, p=p, u=u, t=t)[self.independent]
-        return into(out, result)
+        if rows == "all" and self.width is None:
+            return self.every(q, p=p, u=u, out=out, t=t)
+        result = self.every(q, p=p, u=u, t=t)
+        result = result if rows == "all" else result[self.independent]
+        return into(out, result if self.width is None else np.ascontiguousarray(result[:, : self.width]))
 
 
 class Projection:
@@ -224,66 +299,6 @@ class Projection:
         return self.kernel(x, p=p, u=u, out=out, t=t)
 
 
-class Constant:
-    """A kernel whose result has no entries, such as the constraints of a tree."""
-
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, value: Array, n_in: int) -> None:
-        self.value, self.n_in = value, n_in
-
-    @both_names
-    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
-        """An empty array, with a last axis for a batch."""
-        shape = read_numbers("x", x).shape
-        if shape[:1] != (self.n_in,) or len(shape) > 2:
-            raise ill_shaped(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
-        expected = self.value.shape + shape[1:]
-        return np.zeros(expected) if out is None else fitting(out, expected)
-
-
-class Nothing(Constant):
-    """A kernel of time and state whose result has no entries."""
-
-    @both_names
-    def __call__(  # type: ignore[override]
-        self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
-    ) -> Array:
-        """An empty array, with a last axis for a batch."""
-        return super().__call__(x, out=out)
-
-
-class Identity(Constant):
-    """The projection of a tree: nothing to do but for the length of Euler parameters."""
-
-    def __init__(self, n_in: int, quaternion_slots: Sequence[int] = ()) -> None:
-        super().__init__(np.zeros(n_in), n_in)
-        self.quaternion_slots = quaternion_slots
-
-    @both_names
-    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
-        """A copy of x."""
-        result = into(super().__call__(x, out=out), read_numbers("x", x))
-        for i in self.quaternion_slots:
-            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
-        return result
-
-
-class Selected:
-    """Rows and columns of a matrix kernel in another order."""
-
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, every: State, order: np.ndarray[Any, Any]) -> None:
-        self.every, self.order = every, order
-
-    @both_names
-    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
-        """The matrix of the chosen coordinates."""
-        result = self.every(x, p=p, u=u, t=t)[np.ix_(self.order, self.order)]
-        return into(out, result)
-
-
 def into(out: Array | None, result: Array) -> Array:
     """A result, in the array that was given for it."""
     if out is not None:
@@ -296,68 +311,35 @@ def into(out: Array | None, result: Array) -> Array:
 # A state is a velocity of unit inertia that no constraint touches, so that its rows and columns are left out.
 
 
-class Mechanical:
-    """The functions of M, h and the constraints of a model that has first-order states.
+def mechanical(kernels: Kernels) -> dict[str, Any]:
+    """The functions of M, h and the constraints of a model that has first-order states, by name."""
+    layout = kernels.layout
+    count = len(layout.states)
+    n, free = layout.n_v - count, layout.n_dof - count
+    M, embedded, bias = kernels.mass_matrix, kernels.embedded_mass_matrix, kernels.bias
+    every, inverse = kernels.constraint_jacobian.every, kernels.inverse_dynamics
 
-    Parameters
-    ----------
-    kernels : Kernels
-    """
-
-    def __init__(self, kernels: Kernels) -> None:
-        layout = kernels.layout
-        count = len(layout.states)
-        n, free = layout.n_v - count, layout.n_dof - count
-        self.mass_matrix: Any = MechanicalPart(kernels.mass_matrix, n, n)
-        self.embedded_mass_matrix: Any = MechanicalPart(kernels.embedded_mass_matrix, free, free)
-        self.bias: Any = MechanicalPart(kernels.bias, n)
-        self.constraint_jacobian: Any = MechanicalPart(kernels.constraint_jacobian, None, n)
-        self.inverse_dynamics: Any = MechanicalInverse(kernels, n)
-
-
-class MechanicalPart:
-    """The first rows and columns of a function's result; None: all."""
-
-    def __init__(self, function: Any, *kept: int | None) -> None:
-        self.function, self.kept = function, tuple(slice(None, k) for k in kept)
-
-    def __call__(self, *args: Any, out: Array | None = None, **options: Any) -> Array:
-        """Evaluate; arguments are those of the function."""
-        return into(out, np.array(self.function(*args, **options)[self.kept]))
-
-    def __repr__(self) -> str:
-        return repr(self.function)
-
-
-class MechanicalInverse:
-    """Generalized forces to add, (n_v,), for accelerations a at q and [v; s]."""
-
-    def __init__(self, kernels: Kernels, n: int) -> None:
-        self.layout, self.function, self.n = kernels.layout, kernels.inverse_dynamics, n
-
-    @both_names
-    def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Array:
-        """Evaluate at q (n_q,), [v; s] (n_v + n_s,) and a (n_v,), or with a last axis k.
-
-        Raises
-        ------
-        UsageError
-            The states are missing, on which forces depend.
-        """
-        given, rates = read_numbers("v", v), read_numbers("a", a)
-        whole = self.layout.n_v
-        if given.shape[:1] != (whole,):
-            names = ", ".join(self.layout.states)
+    def find_inverse(q: Any, v: Any, a: Any, **given: Any) -> Array:
+        states, rates = read_numbers("v", v), read_numbers("a", a)
+        if states.shape[:1] != (layout.n_v,):
             raise ill_shaped(
-                f"inverse_dynamics of a model with first-order states takes v = [v; s], ({whole},) or ({whole}, k), "
-                f"not {given.shape}: forces depend on the states {names}, which come after the velocities"
+                f"inverse_dynamics of a model with first-order states takes v = [v; s], ({layout.n_v},) or "
+                f"({layout.n_v}, k), not {states.shape}: forces depend on the states {', '.join(layout.states)}, which "
+                "come after the velocities"
             )
-        if rates.shape[:1] == (self.n,):
-            rates = np.concatenate([rates, np.zeros((whole - self.n, *rates.shape[1:]))])
-        return into(out, np.array(self.function(q, given, rates, p=p, u=u, t=t)[: self.n]))
+        if rates.shape[:1] == (n,):
+            rates = np.concatenate([rates, np.zeros((count, *rates.shape[1:]))])
+        return np.array(inverse(q, states, rates, **given)[:n])
 
-    def __repr__(self) -> str:
-        return repr(self.function)
+    return {
+        "mass_matrix": DerivedState("mass_matrix", lambda q, **given: np.array(M(q, **given)[:n, :n])),
+        "embedded_mass_matrix": DerivedState(
+            "embedded_mass_matrix", lambda q, **given: np.array(embedded(q, **given)[:free, :free])
+        ),
+        "bias": DerivedTimed("bias", lambda x, t, **given: np.array(bias(t, x, **given)[:n])),
+        "constraint_jacobian": Rows(every, layout.rows, n),
+        "inverse_dynamics": DerivedMotion("inverse_dynamics", find_inverse),
+    }
 
 
 # -- constraints -------------------------------------------------------------------------------------------------------

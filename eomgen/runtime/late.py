@@ -7,12 +7,11 @@ exported package has them all from the beginning.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partialmethod
 from typing import TYPE_CHECKING, Any
 
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED
-from .argument_names import both_names
 
 if TYPE_CHECKING:
     from .protocols import Core
@@ -49,22 +48,14 @@ class LateCore:
             self.further[group] = self.load(group)
         return self.further[group]
 
-    def timed(self, name: str, *options: Any) -> Any:
-        """A kernel of time and state; see :class:`~.protocols.Core`."""
-        return self._make("timed", name, options)
-
-    def state(self, name: str, *options: Any) -> Any:
-        """A kernel of the state alone."""
-        return self._make("state", name, options)
-
-    def motion(self, name: str, *options: Any) -> Any:
-        """A kernel of coordinates, velocities and accelerations."""
-        return self._make("motion", name, options)
-
-    def _make(self, maker: str, name: str, options: tuple[Any, ...]) -> Any:
+    def _make(self, kind: str, name: str, *options: Any) -> Any:
         if name in self.core.names:
-            return getattr(self.core, maker)(name, *options)
-        return LATE[maker](self, maker, name, options)
+            return getattr(self.core, kind)(name, *options)
+        return LateKernel(self, kind, name, options)
+
+    timed = partialmethod(_make, "timed")
+    state = partialmethod(_make, "state")
+    motion = partialmethod(_make, "motion")
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.core, name)
@@ -76,55 +67,30 @@ class LateKernel:
     Parameters
     ----------
     core : LateCore
-    maker : {'timed', 'state', 'motion'}
+    kind : {'timed', 'state', 'motion'}
+        Of its arguments; see :class:`~.protocols.Core`.
     name : str
     options : tuple
         What the maker takes after the name: the context with parameters and inputs, then all else, the error last.
     """
 
-    def __init__(self, core: LateCore, maker: str, name: str, options: tuple[Any, ...]) -> None:
-        self.core, self.maker, self.name, self.options = core, maker, name, options
+    def __init__(self, core: LateCore, kind: str, name: str, options: tuple[Any, ...]) -> None:
+        self.core, self.kind, self.name, self.options = core, kind, name, options
 
     @cached_property
     def kernel(self) -> Any:
         """The kernel itself."""
         core, (context, *rest) = self.core.having(self.name), self.options
-        return getattr(core, self.maker)(self.name, core.context(context.p, context.u, rest[-1]), *rest)
+        return getattr(core, self.kind)(self.name, core.context(context.p, context.u, rest[-1]), *rest)
 
     @property
     def failure(self) -> tuple[int, float, Array] | None:
         """The last failure, as other kernels have it; None before the first call."""
         return self.__dict__["kernel"].failure if "kernel" in self.__dict__ else None
 
-
-class LateTimed(LateKernel):
-    """A kernel of time and state."""
-
-    @both_names
-    def __call__(self, t: Any, x: Any, p: Any = None, u: Any = None, out: Any = None) -> Any:
+    def __call__(self, *args: Any, **options: Any) -> Any:
         """Evaluate."""
-        return self.kernel(t, x, p, u, out)
-
-
-class LateState(LateKernel):
-    """A kernel of the state alone."""
-
-    @both_names
-    def __call__(self, x: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
-        """Evaluate."""
-        return self.kernel(x, p, u, out, t)
-
-
-class LateMotion(LateKernel):
-    """A kernel of coordinates, velocities and accelerations."""
-
-    @both_names
-    def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
-        """Evaluate."""
-        return self.kernel(q, v, a, p, u, out, t)
-
-
-LATE = {"timed": LateTimed, "state": LateState, "motion": LateMotion}
+        return self.kernel(*args, **options)
 
 
 def eager(core: Any) -> Any:

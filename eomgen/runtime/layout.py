@@ -185,6 +185,8 @@ class Layout:
         }
         #: places in u of the inputs on which constraints depend
         self.constraint_inputs = [self.u.index(name) for name in data.get("constraint_inputs", ())]
+        #: places in p of the parameters on which assembled states depend, but for values of outputs and markers
+        self.start_parameters = data.get("start_parameters", [*range(self.n_p)])
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof

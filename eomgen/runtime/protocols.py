@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-
-if TYPE_CHECKING:
-    pass
-
 
 #: Parameters or inputs of a call: an array of all, or values by name, where the others are as bound.
 Given: TypeAlias = ArrayLike | Mapping[str, Any] | None
 
 
 class Timed(Protocol):
-    """A kernel of time and state."""
+    """A kernel of time and state; ``jacobian`` by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     failure: tuple[int, float, Array] | None  #: with NaN for failures: (status, t, x) of the last one
-
-    def __call__(
-        self,
-        t: ArrayLike,
-        x: ArrayLike,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
-
-
-class JacobianCall(Timed, Protocol):
-    """The kernel ``jacobian``, by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     def __call__(
         self,

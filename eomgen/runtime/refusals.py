@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import UnavailableError, no_choice
 
@@ -149,38 +149,3 @@ def require_projection(layout: Layout) -> None:
             f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project; analyses "
             "of such models are not available; derive without baumgarte for analyses"
         )
-
-
-class RefusedInverse:
-    """In place of ``inverse_dynamics`` where forces depend on reactions: says why when it is called."""
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-
-    def __call__(self, *args: Any, **options: Any) -> Any:
-        """Refuse.
-
-        Raises
-        ------
-        UnavailableError
-        """
-        refuse_reaction_laws(self.layout, "inverse_dynamics")
-
-
-class Refusal:
-    """In place of a kernel that a model cannot have: says why when it is called."""
-
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-
-    def __call__(self, *args: Any, **options: Any) -> Any:
-        """Refuse.
-
-        Raises
-        ------
-        UsageError
-        """
-        require_velocities(self.layout)
-        require_projection(self.layout)
