@@ -51,9 +51,9 @@ def compile_sources(
     Parameters
     ----------
     kind : {'model', 'library'}
-        ``model``: for this session, a library that shows its table alone; without the option ``lanes``, lanes and
-        series are left to :func:`compile_lanes`. ``library``: for C programs or ctypes; every function that is not
-        static can be called, and C files that all models share are compiled once.
+        ``model``: for this session, a library that shows its table alone and takes the solvers of ``eomgen._native``;
+        without the option ``lanes``, lanes and series are left to :func:`compile_lanes`. ``library``: for C programs
+        or ctypes; every function that is not static can be called, and C files that all models share are compiled once.
     sources : mapping of str to str
         Texts by file name: C files and headers, ``eomgen.h`` among them.
     name : str
@@ -74,7 +74,8 @@ def compile_sources(
         raise no_choice(f"lanes must be None, 0 or 2 on {platform.machine()}, not {options.lanes}")
     width = lane_width() if options.lanes is None else options.lanes
     widths = _lane_files(sources)
-    sources = {file: text for file, text in sources.items() if widths.get(file, width) == width}
+    unused = {file for file, lanes in widths.items() if lanes != width} | ({SOLVER} if kind == "model" else set())
+    sources = {file: text for file, text in sources.items() if file not in unused}
     deferred = _deferred(sources, name) if kind == "model" and options.lanes is None and not options.native else []
     files = [file for file in sources if file.endswith(".c") and file not in deferred]
     compiler, size = find_compiler(options.compiler), sum(len(sources[file]) for file in files)
@@ -83,7 +84,7 @@ def compile_sources(
     # the functions of two models in one process never meet
     flags += ["-fvisibility=hidden", "-DEOMGEN_OPENED"] if kind == "model" else []
     flags += ["-DEOMGEN_WITHOUT_SERIES"] if deferred else []
-    of_solvers, link = _solver_flags(flags, options, compiler), link_flags(options, compiler)
+    of_solvers, link = solver_flags(flags, options, compiler), link_flags(options, compiler)
     parts = {
         "kind": kind, "name": name, "sources": sources, "files": files, "flags": [flags, of_solvers, link],
         "native": describe_native(compiler, tuple(machine_flags(options, compiler))) if options.native else "",
@@ -127,7 +128,7 @@ def _deferred(files: Iterable[str], name: str) -> list[str]:
     return [*lanes, *(file for file in files if file == f"{name}_series.c")] if lanes else []
 
 
-def _solver_flags(flags: Sequence[str], options: Options, compiler: CompilerInfo) -> list[str]:
+def solver_flags(flags: Sequence[str], options: Options, compiler: CompilerInfo) -> list[str]:
     """Flags of the solvers, none of a model's own: their loops gain by -O2 what straight-line code loses.
 
     Rows are short: with vectors of gcc 12 a Stewart platform takes 1.2 of the time to project, a slider-crank 1.05 for

@@ -47,7 +47,10 @@ def open_core(name: str, file: Path) -> Any:
     native: Any = find_native()
     try:
         require_trusted(file)
-        core = native.Model(_table(file, "eomgen_model_table"), name, str(file), partial(_find_lanes, file))
+        library = ctypes.CDLL(str(file))
+        if hasattr(library, "eomgen_take_solvers") and not library.eomgen_take_solvers(ctypes.c_void_p(native.solvers)):
+            raise ImportError("it was compiled for the solvers of another version of eomgen")
+        core = native.Model(_table(library, "eomgen_model_table"), name, str(file), partial(_find_lanes, file))
     except ToolchainError:
         raise
     except Exception as error:  # of the loader, or a table of another layout
@@ -59,9 +62,9 @@ def open_core(name: str, file: Path) -> Any:
     return keep_module(name, core)
 
 
-def _table(file: Path, name: str) -> int:
+def _table(library: ctypes.CDLL, name: str) -> int:
     """Address of a table in a library, which stays loaded."""
-    table = getattr(ctypes.CDLL(str(file)), name)
+    table = getattr(library, name)
     table.restype = ctypes.c_void_p
     return table() or 0
 
@@ -77,7 +80,7 @@ def _find_lanes(file: Path) -> int:
         if (entry := compile_lanes(file)) is None:
             return 0
         try:
-            return _table(entry.product, "eomgen_late_lanes")
+            return _table(ctypes.CDLL(str(entry.product)), "eomgen_late_lanes")
         except (OSError, AttributeError):
             Cache(entry.directory.parents[1]).discard(entry.key)
             raise

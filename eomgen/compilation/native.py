@@ -72,7 +72,7 @@ def build_native(folder: Path) -> None:
     """Build the module into a folder, in the place of an earlier one; errors are those of :func:`find_native`."""
     import tempfile
 
-    from .build import compile_and_link
+    from .build import compile_and_link, solver_flags
     from .compiler import Options, allowed, compile_flags, find_compiler, is_x86, link_flags, machine_flags, run
 
     if find_spec("Cython") is None:
@@ -82,7 +82,6 @@ def build_native(folder: Path) -> None:
     # for all processors of this kind: wider vectors are chosen when it runs
     plain = [*compile_flags(Options(), compiler, 0, portable=True), "-fvisibility=hidden"]
     wide = [*compile_flags(Options(optimize=2), compiler, 0, portable=True), "-fvisibility=hidden"]
-    short = [*wide, *(["-fno-tree-vectorize"] if compiler.kind == "gcc" else [])]  # rows of solvers, as in models
     wide += ["-ftree-vectorize"] if compiler.kind == "gcc" else []
     bound = ["-O2", "-fPIC", "-fwrapv", "-fvisibility=hidden", "-DNDEBUG", *machine_flags(Options(), compiler)]
     bound += [f'-DEOMGEN_SOURCES="{digest_sources()}"', "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
@@ -94,7 +93,8 @@ def build_native(folder: Path) -> None:
         cython = [sys.executable, "-P", "-m", "cython", "-3", f"{NAME}.pyx"]
         run(cython, Path(private), allowed(0), f"translating {NAME}.pyx")
         files = {Path(path.name): wide for path in sorted(Path(private).glob("*.c"))}
-        files |= {Path(name): plain for name in PLAIN if is_x86()} | {Path(SOLVER): short, Path(f"{NAME}.c"): bound}
+        files |= {Path(name): plain for name in PLAIN if is_x86()}
+        files |= {Path(SOLVER): solver_flags(plain, Options(), compiler), Path(f"{NAME}.c"): bound}
         link = link_flags(Options(), compiler, extension=True)
         made = compile_and_link(Path(private), NAME, files, link, compiler, suffix=product.name.removeprefix(NAME))
         folder.mkdir(parents=True, exist_ok=True)

@@ -22,6 +22,11 @@ cdef extern from "eomgen_solvers.h" nogil:
         memcpy(m->areas, areas, sizeof m->areas);
         memcpy(&m->scales, functions, N_FUNCTIONS * sizeof *functions);
     }
+    static const eom_solvers eom_table = {
+        EOM_LAYOUT, eom_project, eom_rhs, eom_outputs, eom_jacobian, eom_input_jacobian, eom_parameter_jacobian, eom_mass_matrix,
+        eom_embedded_mass_matrix, eom_kinematics, eom_dae_jacobian, eom_inverse_dynamics_derivatives, eom_finish_rhs
+    };
+    #define EOM_SOLVERS (&eom_table.project)
     """
     enum: AREAS
     enum: N_NUMBERS
@@ -29,6 +34,8 @@ cdef extern from "eomgen_solvers.h" nogil:
     enum: N_FUNCTIONS
     ctypedef struct eom_model:
         int n_v, n_c, n_quaternions, n_places, n_relaxed
+    ctypedef struct eom_solvers:
+        int layout
     ctypedef struct eom_at:
         const eom_model *m
         double t
@@ -37,27 +44,17 @@ cdef extern from "eomgen_solvers.h" nogil:
         double *w
     void eomgen_fill(eom_model *, const int *, const int **, const int *, const short **, const int *,
                      const eomgen_function *)
-    int eom_project(const eom_at *, const double *, double *)
-    int eom_rhs(const eom_at *, const double *, double *)
-    int eom_outputs(const eom_at *, const double *, double *)
-    int eom_jacobian(const eom_at *, const double *, double *)
-    int eom_input_jacobian(const eom_at *, const double *, double *)
-    int eom_parameter_jacobian(const eom_at *, const double *, double *)
-    int eom_mass_matrix(const eom_at *, const double *, double *)
-    int eom_embedded_mass_matrix(const eom_at *, const double *, double *)
-    int eom_kinematics(const eom_at *, const double *, double *)
-    int eom_dae_jacobian(const eom_at *, const double *, double *)
-    int eom_inverse_dynamics_derivatives(const eom_at *, const double *, double *)
+    const eom_solvers eom_table
+    ctypedef int (*eom_solver)(const eom_at *, const double *, double *)
+    const eom_solver *EOM_SOLVERS
 
-ctypedef int (*solver)(const eom_at *, const double *, double *) noexcept nogil
-cdef tuple SOLVED = (
+cdef tuple SOLVED = (  # in the order of eom_solvers
     "project", "rhs", "outputs", "jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix",
     "embedded_mass_matrix", "kinematics", "dae_jacobian", "inverse_dynamics_derivatives",
 )
-cdef solver[11] SOLVERS = [
-    eom_project, eom_rhs, eom_outputs, eom_jacobian, eom_input_jacobian, eom_parameter_jacobian, eom_mass_matrix,
-    eom_embedded_mass_matrix, eom_kinematics, eom_dae_jacobian, eom_inverse_dynamics_derivatives,
-]
+
+
+solvers = <uintptr_t>&eom_table  # for the models that a session opens
 
 
 cdef inline double *numbers_at(object address) noexcept:
@@ -242,11 +239,11 @@ cdef class Solve:
     """A kernel that is solved for by the model's functions."""
 
     cdef Functions owner
-    cdef solver solve
+    cdef eom_solver solve
     cdef int n_out
 
     def __init__(self, Functions owner, str name, int n_out):
-        self.owner, self.solve, self.n_out = owner, SOLVERS[<int>SOLVED.index(name)], n_out
+        self.owner, self.solve, self.n_out = owner, EOM_SOLVERS[<int>SOLVED.index(name)], n_out
 
     def __call__(self, double t, x, u, c, out, w):
         cdef double *result = numbers_at(out)

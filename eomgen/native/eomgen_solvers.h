@@ -170,6 +170,7 @@ typedef struct eom_at {
 } eom_at;
 
 /* Public functions that are no straight-line code; x and out as in the model's header. */
+typedef int (*eom_solver)(const eom_at *at, const double *x, double *out);
 EOMGEN_PIECE int eom_project(const eom_at *at, const double *x, double *out);
 EOMGEN_PIECE int eom_rhs(const eom_at *at, const double *x, double *out);
 EOMGEN_PIECE int eom_outputs(const eom_at *at, const double *x, double *out);
@@ -185,6 +186,22 @@ EOMGEN_PIECE int eom_inverse_dynamics_derivatives(const eom_at *at, const double
 /* x' where the straight-line right-hand side is not enough (eomgen_straight.h); sound: whether it has been evaluated
    and holds, next to a singular position perhaps. */
 EOMGEN_PIECE int eom_finish_rhs(const eom_at *at, const double *x, double *out, int sound);
+
+/* The same as a table: models that a session opens are compiled without the solvers and take those of eomgen._native,
+   where both have the same layout. */
+typedef struct {
+    int layout;
+    eom_solver project, rhs, outputs, jacobian, input_jacobian, parameter_jacobian, mass_matrix, embedded_mass_matrix,
+        kinematics, dae_jacobian, inverse_dynamics_derivatives;
+    int (*finish_rhs)(const eom_at *at, const double *x, double *out, int sound);
+} eom_solvers;
+enum { EOM_LAYOUT = (int)sizeof(eom_model) };
+#ifdef EOMGEN_OPENED
+EOMGEN_PIECE extern const eom_solvers *eom_library;
+#define EOM_SOLVER(name) eom_library->name
+#else
+#define EOM_SOLVER(name) eom_##name
+#endif
 
 #ifdef __cplusplus
 }
