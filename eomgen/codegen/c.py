@@ -251,7 +251,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
                 if isinstance(k, Block)
                 else "rhs_or_solved"
                 if straight and k.name == "rhs"
-                else f"EOM_SOLVER({k.name})",
+                else f"eom_{k.name}",
                 "lanes": k.name in in_lanes,
                 "n_in": k.n_in,
                 "n_out": k.n_out,

@@ -198,9 +198,18 @@ typedef struct {
 enum { EOM_LAYOUT = (int)sizeof(eom_model) };
 #ifdef EOMGEN_OPENED
 EOMGEN_PIECE extern const eom_solvers *eom_library;
-#define EOM_SOLVER(name) eom_library->name
-#else
-#define EOM_SOLVER(name) eom_##name
+#define eom_project eom_library->project
+#define eom_rhs eom_library->rhs
+#define eom_outputs eom_library->outputs
+#define eom_jacobian eom_library->jacobian
+#define eom_input_jacobian eom_library->input_jacobian
+#define eom_parameter_jacobian eom_library->parameter_jacobian
+#define eom_mass_matrix eom_library->mass_matrix
+#define eom_embedded_mass_matrix eom_library->embedded_mass_matrix
+#define eom_kinematics eom_library->kinematics
+#define eom_dae_jacobian eom_library->dae_jacobian
+#define eom_inverse_dynamics_derivatives eom_library->inverse_dynamics_derivatives
+#define eom_finish_rhs eom_library->finish_rhs
 #endif
 
 #ifdef __cplusplus

@@ -272,7 +272,7 @@ EOMGEN_SHARED int rhs_or_solved(const eom_at *at, const double *restrict x, doub
 {
     int far = 0;
     const int sound = rhs_directly(at, x, out, &far);
-    return sound && far ? EOMGEN_SUCCESS : EOM_SOLVER(finish_rhs)(at, x, out, sound);
+    return sound && far ? EOMGEN_SUCCESS : eom_finish_rhs(at, x, out, sound);
 }
 #else
 /* Of states side by side, whose closing_block and dynamics_block and, where REGULAR is defined, the shorter forms of
