@@ -187,7 +187,7 @@ def difference(old: Any, new: Any) -> float:
             return gap / max([FLOOR, *map(abs, old)])
         try:
             one, two = np.asarray(old, dtype=float), np.asarray(new, dtype=float)
-        except ValueError:
+        except (ValueError, TypeError):  # words, or entries by name
             return max((difference(a, b) for a, b in zip(old, new, strict=True)), default=0.0)
         if one.shape != two.shape:
             return np.inf

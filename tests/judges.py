@@ -1,6 +1,7 @@
-"""Judges from outside in NumPy: rigid-body dynamics from body poses alone, and the augmented form with multipliers.
+"""Judges from outside in NumPy: rigid bodies from their poses alone, multipliers, Newton's steps onto constraints.
 
-Derivatives are central differences of tenth order, good to about 1e-13 of the function's size.
+Derivatives are central differences of tenth order, good to about 1e-13 of the function's size.  Solvers are judged by
+dense solves with the functions of a module that are formulas: M, h, C, C_q and C_q v + C_t.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import sympy
+from scipy.spatial.transform import Rotation
 
 STEP = 0.02
 FIRST = np.array([5 / 6, -5 / 21, 5 / 84, -5 / 504, 1 / 1260])
@@ -143,9 +145,74 @@ def augmented(M: np.ndarray, h: np.ndarray, C_q: np.ndarray, gamma: np.ndarray) 
     rank = int((sizes > 1e-9).sum())
     G = Vt[:rank]
     right = (U.T @ (gamma / np.abs(C_q).max(initial=1.0)))[:rank] / sizes[:rank]
-    size = np.abs(M).max()
+    size = np.abs(M).max() or 1.0
     K = np.block([[M / size, G.T], [G, np.zeros((rank, rank))]])
     return np.linalg.solve(K, np.concatenate([-h / size, -right]))[:n]
+
+
+# -- Of the solvers of constraints -------------------------------------------------------------------------------------
+def central(values: Callable[[float], Any], h: float) -> Any:
+    """A derivative at 0 to fourth order."""
+    return (8.0 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12.0 * h)
+
+
+def sizes(module: Any) -> np.ndarray:
+    """Units of velocities (n_v,): 1 of angles, the mechanism's size of lengths."""
+    kinds = module.metadata["velocity_kinds"]
+    return np.array([module.metadata["length_scale"] if kind == "length" else 1.0 for kind in kinds])
+
+
+def displaced(module: Any, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """q after displacements d along the velocities, of Euler parameters by SciPy's rotations."""
+    q, balls = np.array(q), [tuple(pair) for pair in module.metadata["quaternion_slots"]]
+    plain_q = [k for k in range(module.n_q) if not any(i <= k < i + 4 for i, _ in balls)]
+    plain_v = [k for k in range(module.n_v) if not any(j <= k < j + 3 for _, j in balls)]
+    q[plain_q] += d[plain_v]
+    for i, j in balls:
+        turned = Rotation.from_quat(q[i : i + 4], scalar_first=True) * Rotation.from_rotvec(d[j : j + 3])
+        f = turned.as_quat(scalar_first=True)
+        q[i : i + 4] = f if f @ q[i : i + 4] > 0.0 else -f
+    return q
+
+
+def closed(module: Any, x: np.ndarray, t: float = 0.0) -> np.ndarray:
+    """[q; v] that Newton's steps of least norm reach from x, no entry of a step above 0.5, and the nearest velocities.
+
+    In units of the mechanism's size; the term of Levenberg and Marquardt is the mean residual, of 1e-8 at least, in
+    parts of the largest row.
+    """
+    s, rows, h = sizes(module), np.array(module.metadata["constraint_scales"]), module.metadata["n_h"]
+    q, v = displaced(module, x[: module.n_q], np.zeros(module.n_v)), x[module.n_q : module.n_q + module.n_v] / s
+    C, longest = np.zeros(0), 1.0 if h else 0.0
+    for _ in range(60):
+        J = module.constraint_jacobian(q, t=t, rows="all") * s / rows[:, None]
+        C = module.constraints(q, t=t, rows="all") / rows[:h]
+        if longest < 1e-13:
+            break
+        G = J[:h] @ J[:h].T
+        step = -J[:h].T @ np.linalg.solve(G + max(1e-8, np.abs(C).mean()) * G.diagonal().max() * np.eye(h), C)
+        longest = np.abs(step).max()
+        q = displaced(module, q, s * step * min(1.0, 0.5 / max(longest, 1e-300)))
+    left = module.velocity_constraints(np.concatenate([q, s * v]), t=t, rows="all") / rows
+    return np.concatenate([q, s * (v - np.linalg.lstsq(J, left, rcond=1e-9)[0])])
+
+
+def solved(module: Any, x: np.ndarray, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations, and what constraints exert along the velocities, from M, h, C_q and the rate of C_q v + C_t."""
+    q, v, n = x[: module.n_q], x[module.n_q : module.n_q + module.n_v], module.n_v
+    M, h = module.mass_matrix(q), module.bias(t, x)
+
+    def rate(s: float) -> Any:
+        """C' at the same velocities, s later."""
+        return module.velocity_constraints(np.concatenate([displaced(module, q, s * v), v]), t=t + s, rows="all")
+
+    if not module.n_c:
+        return np.linalg.solve(M, -h), np.zeros(n)
+    s, rows = sizes(module), np.array(module.metadata["constraint_scales"])
+    C_q = module.constraint_jacobian(q, t=t, rows="all")
+    gamma = central(rate, 1e-3 / max(1.0, np.abs(v / s).max()))
+    a = s * augmented(s[:, None] * M * s, s * h, C_q * s / rows[:, None], gamma / rows)
+    return a, M @ a + h
 
 
 def random_states(module: Any, seed: int, count: int, position: float = 0.15, speed: float = 3.0) -> list[np.ndarray]:

@@ -53,7 +53,8 @@ def test_a_difference_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[
     old = golden.read("slider_crank")
     for folder in ("old", "new"):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "slider_crank.json").write_text(json.dumps(old))
+        for name in ("slider_crank", "faults", "schema"):
+            (tmp_path / folder / f"{name}.json").write_text(json.dumps(golden.read(name)))
     assert golden.compare(tmp_path / "old", tmp_path / "new") == 0
     old["bias"][1][2] *= 1 + 1e-8
     (tmp_path / "new" / "slider_crank.json").write_text(json.dumps(old))

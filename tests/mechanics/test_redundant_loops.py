@@ -65,28 +65,6 @@ def test_a_third_crank_of_a_parallelogram_changes_nothing(
     assert np.abs(mod.constraints(run.x[: mod.n_q], rows="all")).max() < 1e-11
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("name", ["slider_crank", "four_bar", "peaucellier", "skewed_four_bar", "three_cranks"])
-def test_projection_finds_the_nearest_state(module: Callable[..., Any], name: str, target: str) -> None:
-    """A displaced state comes back to the manifold nearby: rows that depend on others there do not pull it along.
-
-    The nearest point is at most as far away as the point the displacement started from; the factor allows for the
-    curvature of the manifold and for Newton's steps, each of which is of minimum norm.
-    """
-    mod = module(name, target=target)
-    sizes = [mod.metadata["length_scale"] if k == "length" else 1.0 for k in mod.metadata["coordinate_kinds"]]
-    random = np.random.default_rng(51)
-    x = mod.x0()
-    n = mod.n_q
-    for size in (1e-6, 1e-4, 1e-2, 0.1):
-        for _ in range(10):
-            step = size * random.uniform(-1, 1, n)
-            y = mod.project(np.concatenate([x[:n] + step * sizes, x[n:]]))
-            assert np.abs(mod.constraints(y[:n], rows="all")).max() <= 1e-12
-            back = np.linalg.norm((y[:n] - x[:n]) / sizes - step)
-            assert back <= 1.2 * np.linalg.norm(step), size
-
-
 def test_a_loop_that_cannot_close_is_an_error_at_its_joint(tmp_path: Path) -> None:
     file = tmp_path / "wide.yaml"
     file.write_text(FOUR_BAR.replace("a4: {value: 0.10", "a4: {value: 0.50"), encoding="utf-8")
