@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from .identification.regressor import standard_parameters as _standard_parameters
     from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
-    from .runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
     from .runtime.drawing import explore as _explore
@@ -78,7 +77,6 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "consistent": "analysis.consistent",
     "kinematic_analysis": "simulation.kinematic",
     "motion_range": "analysis.coordinate_range",
-    "inverse_dynamics_derivatives": "runtime.derivative_calls",
     "report": "runtime.drawing",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
@@ -248,7 +246,6 @@ class Module(BoundModel):
         consistent = _consistent
         kinematic_analysis = _kinematic_analysis
         motion_range = _motion_range
-        inverse_dynamics_derivatives = _inverse_dynamics_derivatives
         report = _report
         draw = _draw
         draw_branches = _draw_branches

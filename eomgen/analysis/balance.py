@@ -21,7 +21,6 @@ from ..numeric.projection import tangent_projector
 from ..numeric.ranks import Partition, partition, rank
 from ..numeric.scales import Scales
 from ..runtime.argument_checks import read_names, unknown
-from ..runtime.derivative_calls import assembly_jacobian
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -293,7 +292,7 @@ def slopes(
     by_unknown = np.hstack([P, U])[n_q:]
     motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
     if len(parameters) and n_h:
-        moved = assembly_jacobian(module, t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
+        moved = module.kernels.assembly_jacobian(t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
         C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])

@@ -13,7 +13,6 @@ from ..errors import cannot, ill_chosen, ill_shaped, no_choice
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import partition, rank
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
-from ..runtime.derivative_calls import assembly_jacobian, output_derivatives
 from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
 from .balance import TangentSpace, displacement_names, displacement_rates, find_tangent, projected_directions
 from .linearization import Linearization, own_accelerations
@@ -59,7 +58,7 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     for name in names:
         if name not in layout.x:
             raise unknown("coordinate or velocity", name, layout.x)
-    rows = assembly_jacobian(module, t, x)
+    rows = module.kernels.assembly_jacobian(t, x)
     slopes, at_rest, C_q = rows[:n_h, :n_q], rows[n_h : n_h + n_c, :n_q], rows[n_h : n_h + n_c, n_q : layout.n_x]
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
@@ -237,6 +236,6 @@ def _outputs(
     n_q, n_v, n_x = layout.n_q, layout.n_v, layout.n_x
     if not layout.n_y:
         return np.zeros((0, directions.shape[1])), np.zeros((0, layout.n_u))
-    Y = output_derivatives(module, t, x, rates[n_q:])
+    Y = module.kernels.output_derivatives(t, x, rates[n_q:])
     by_a = Y[:, n_x : n_x + n_v]
     return Y[:, :n_x] @ directions + by_a @ moved[n_q:], Y[:, n_x + n_v : n_x + n_v + layout.n_u] + by_a @ U[n_q:]

@@ -14,7 +14,6 @@ from ..base.limits.numbers import EPS, TINY
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
 from ..numeric.projection import largest
 from ..runtime.argument_checks import unknown
-from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
 from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes
 from .linearization import BALANCED, own_accelerations
@@ -228,7 +227,7 @@ class Search:
         held = self.held_rows(module, x[: layout.n_q])
         rows = np.zeros((len(held), layout.n_p))
         if layout.n_loop_coordinates and self.parameters:
-            every = assembly_jacobian(module, self.t, x)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
+            every = module.kernels.assembly_jacobian(self.t, x)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
             for k, row in enumerate(held):
                 if row.name in layout.loops:
                     rows[k] = every[layout.loops.index(row.name)] / row.scale

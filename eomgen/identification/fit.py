@@ -24,7 +24,6 @@ from ..errors import (
     off_range,
 )
 from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
-from ..runtime.derivative_calls import output_derivatives
 from ..runtime.inputs import Forcing, Table
 from ..runtime.late_start import fixed_told, start_slopes, tell_fixed
 from ..runtime.layout import bounds_of
@@ -181,7 +180,7 @@ def _outputs(module: BoundModel, names: Sequence[str], forcing: Forcing, t: Arra
     of = [layout.n_u + module.p_names.index(name) if name in module.p_names else
           module.u_names.index(name) if name in module.u_names else -1 for name in names]  # fmt: skip
     for j, time in enumerate(t):
-        Y = output_derivatives(module.bind(u=u[:, j]), float(time), x[:, j], rates[n_q:, j])
+        Y = module.bind(u=u[:, j]).kernels.output_derivatives(float(time), x[:, j], rates[n_q:, j])
         here = S[j]
         result[j] = Y[:, :n_x] @ here + Y[:, n_x : n_x + n_v] @ (J[j] @ here + by[j])[n_q:]
         for column, place in enumerate(of):

@@ -5,29 +5,42 @@ What every analysis and every run takes.  :class:`~..module.Module` is the same 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, lru_cache
+from math import prod
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from .argument_checks import read_numbers
+from ..base.limits.analyses import MOST_ANGLE
+from ..base.limits.constraints import CHOSEN
+from ..base.texts import angle_in_degrees
+from ..errors import UsageError, calls_within, ill_placed, ill_shaped, no_number
+from .argument_checks import read_number, read_numbers, require_mapping
 from .argument_names import both_names
-from .assembled import Assembled
-from .kernels import Kernels, Projection, Refused, Rows, mechanical
+from .initial import Given, Initial
+from .kernels import DerivedState, Kernels, Projection, Refused, Rows, mechanical
 from .layout import Layout
-from .momenta import Momenta
-from .refusals import refuse_reaction_laws
+from .refusals import refuse_reaction_laws, refuse_states
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
     from .tree_motion import DependentMotion
 
 
-class BoundModel(Assembled, Momenta):
+class InverseDynamicsDerivatives(NamedTuple):
+    """Derivatives of the generalized forces of the inverse dynamics, each at fixed other arguments."""
+
+    dtau_dq: Array  #: (n_v, n_q)
+    dtau_dv: Array  #: (n_v, n_v)
+    dtau_da: Array  #: (n_v, n_v), the mass matrix
+
+
+class BoundModel:
     """A model with parameters and inputs bound, and the calls that need no analysis and no run.
 
     What its attributes and calls are, :class:`~..module.Module` says, whose parameters it has too.
@@ -175,6 +188,250 @@ class BoundModel(Assembled, Momenta):
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
         return self.kernels.derivative("parameter_jacobian")
+
+    _inverse_slopes = cached_property["Motion"](lambda self: self.kernels.motion("inverse_dynamics_derivatives"))
+
+    @both_names
+    def inverse_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> InverseDynamicsDerivatives:
+        """Differentiate the generalized forces ``inverse_dynamics(q, v, a)`` by q, by v and by a, each at fixed others.
+
+        Parameters
+        ----------
+        q, v, a : (n_q,), (n_v,), (n_v,) arrays, or with a last axis k
+            Coordinates, velocities and accelerations of the spanning tree.
+        p, u : arrays, optional
+        out : (n_v, n_q + 2 n_v) array, optional
+            Where all three are written side by side; the results are views of it.
+        t : float or (k,) array
+
+        Returns
+        -------
+        InverseDynamicsDerivatives
+            ``dtau_dq`` (n_v, n_q), ``dtau_dv`` and ``dtau_da`` (n_v, n_v); the last is the mass matrix.  Columns of
+            Euler parameters are partial derivatives by the four numbers: along a rotation with angular velocity w they
+            combine as ``dtau_dq @ dq`` with the change dq = N(q) w of q at that velocity.
+
+        Raises
+        ------
+        UnavailableError
+            The model has first-order states.
+        """
+        refuse_states(self.layout, "inverse_dynamics_derivatives")
+        refuse_reaction_laws(self.layout, "inverse_dynamics_derivatives")
+        n_q, n_v, every = self.n_q, self.n_v, self._inverse_slopes(q, v, a, p, u, out, t)
+        return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
+
+    # sums over all bodies, in ground axes; an error where the model has no bodies, or none with a mass
+
+    def _part(self, name: str, start: int, *shape: int, rates: bool = False) -> State:
+        """A part of the kernel ``centroidal``, whose sums over the bodies share the work."""
+        layout, whole = self.kernels.layout, self.kernels.state("centroidal")
+        n = layout.n_x if rates else layout.n_q
+
+        def find(x: ArrayLike, **given: Any) -> Array:
+            if layout.n_com == 0:
+                raise UsageError(f"model {layout.name!r} has no {name}: no body of it has a mass", code="EG-NO-INERTIA")
+            state = read_numbers("x", x)
+            if state.shape[:1] != (n,) or state.ndim > 2:
+                raise ill_shaped(f"{'x' if rates else 'q'} must have shape ({n},) or ({n}, k), not {state.shape}")
+            full = np.concatenate([state, np.zeros((layout.n_x - n, *state.shape[1:]))])
+            found = whole(full, **given)[start : start + prod(shape)]
+            return np.array(found.reshape(shape + state.shape[1:]))
+
+        return cast("State", DerivedState(name, find))
+
+    @cached_property
+    def center_of_mass(self) -> State:
+        """``center_of_mass(q)`` -> (3,) of all bodies (m)."""
+        return self._part("center_of_mass", 0, 3)
+
+    @cached_property
+    def com_jacobian(self) -> State:
+        """``com_jacobian(q)`` -> (3, n_v): the velocity of the centre of mass is this times v."""
+        return self._part("com_jacobian", 3, 3, self.kernels.layout.n_v)
+
+    @cached_property
+    def momentum(self) -> State:
+        """``momentum(x)`` -> (6,): linear (kg m/s), then angular about the centre of mass (kg m^2/s)."""
+        return self._part("momentum", 3 + 3 * self.kernels.layout.n_v, 6, rates=True)
+
+    @cached_property
+    def centroidal_inertia(self) -> State:
+        """``centroidal_inertia(q)`` -> (3, 3) about the centre of mass of all bodies (kg m^2)."""
+        return self._part("centroidal_inertia", 9 + 3 * self.kernels.layout.n_v, 3, 3)
+
+    # positions that loops allow
+
+    @both_names
+    @np.errstate(all="ignore")
+    def x0(
+        self,
+        values: Mapping[str, float | str] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float | str,
+    ) -> Array:
+        """Find an initial state: loops closed and velocities consistent.
+
+        Parameters
+        ----------
+        values, **named : float
+            Coordinates and velocities (``theta``, ``theta_dot``) of the tree or of cut joints, outputs of positions or
+            velocities (``tip_x``), places and velocities of markers (``"x(rod.tip)"``, ``"vx(rod.tip)"``), held
+            exactly; the rest is solved.  Without any, the declared initial values are held; else they are kept where
+            they leave room.
+        t : float
+            Time (s); matters for driven constraints only.
+        p, u : optional
+            As for :meth:`bind`.
+
+        Returns
+        -------
+        (n_x,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close with these values, or the values contradict each other.
+        UsageError
+            An unknown name.
+
+        Warns
+        -----
+        UserWarning
+            The values are not reached from the declared position without leaving its branch; the loops are then closed
+            from the nearest guess; or an angle of more than two turns is given, as degrees would be.
+        """
+        initial, given = self._given(values, named, t, p, u)
+        q = initial.assembled(given.positions)
+        v = initial.velocities(q, given.rates if given.positions or given.rates else None)
+        return np.concatenate([q, v])
+
+    _declared_start = cached_property[Array](lambda self: self.x0())  # of the declared initial values at t = 0
+
+    @both_names
+    @np.errstate(all="ignore")
+    def assemble(
+        self,
+        guess: Mapping[str, float | str] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float | str,
+    ) -> Array:
+        """Find a position with closed loops near a guess.
+
+        Parameters
+        ----------
+        guess, **named : float
+            Coordinates of the tree or of cut joints.  They are kept as far as the loops allow, the independent ones
+            first; the others tell the branches apart.  What is not named starts from the declared initial position.
+        t, p, u
+            As for :meth:`x0`.
+
+        Returns
+        -------
+        (n_q,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close.
+        """
+        initial, given = self._given(guess, named, t, p, u)
+        if given.rates:
+            raise ill_placed(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
+        return initial.from_guess(given.positions) if given.positions else initial.assembled({})
+
+    @both_names
+    @np.errstate(all="ignore")
+    def branches(
+        self,
+        values: Mapping[str, float | str] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float | str,
+    ) -> list[Array]:
+        """Find all positions (n_q,) with the given values; the first is that of :meth:`x0`.
+
+        Without any, the declared initial values are held.  Where the held values leave freedom, the independent
+        coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
+        branch.
+        """
+        initial, given = self._given(values, named, t, p, u)
+        first = initial.assembled(given.positions, rough=True)
+        return initial.branches(given.positions, first)
+
+    @both_names
+    @np.errstate(all="ignore")
+    def branch(self, x: ArrayLike, t: float = 0.0) -> int:
+        """Tell on which side of the dead centres a state or position lies.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_q,) array
+
+        Returns
+        -------
+        int
+            1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
+            coordinates.
+        """
+        state = read_numbers("x", x)
+        if state.shape not in ((self.n_q,), (self.n_x,)):
+            raise ill_shaped(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
+        if not np.isfinite(state).all():
+            raise no_number(f"x must be finite, not {state}")
+        initial = self._initial(t, None, None)
+        here = initial.side(state[: self.n_q])
+        there = initial.side(initial.reference())
+        return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
+
+    def _given(self, values: Any, named: Any, t: float, p: Any, u: Any) -> tuple[Initial, Given]:
+        """The assembly to these values, and the values as positions and rates."""
+        if values is not None:
+            require_mapping("initial values", values)
+        numbers = {name: read_number(name, value) for name, value in {**(values or {}), **named}.items()}
+        layout = self.layout
+        for name, kind in zip(layout.q + layout.loops, layout.coordinate_kinds + layout.loop_kinds, strict=True):
+            if kind in ("angle", "turn") and abs(numbers.get(name, 0.0)) > MOST_ANGLE:
+                warnings.warn(angle_in_degrees(name, numbers[name]), stacklevel=calls_within() + 1)
+        initial = self._initial(t, p, u, numbers)
+        return initial, initial.sort(numbers)
+
+    def _initial(self, t: float, p: Any, u: Any, names: Iterable[str] = ()) -> Initial:
+        """The assembly of this model with other parameters and inputs, if given, to values of these names.
+
+        Raises
+        ------
+        UsageError
+            A number where parameters or inputs are meant, since a coordinate bears the name p or u.
+        """
+        layout = self.layout
+        for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
+            scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
+            if scalar and name in layout.q + layout.loops + layout.v:
+                kind = "state" if name in layout.states else "velocity" if name in layout.v else "coordinate"
+                raise ill_placed(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
+        kernels = (self if p is None and u is None else self.bind(p, u)).kernels
+        return Initial(kernels, read_number("t", t), map(str, names))
 
     # kinematics
 

@@ -98,6 +98,14 @@ class Kernels:
         """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
         return cast("Motion", self._make("motion", name, False))
 
+    def assembly_jacobian(self, t: float, x: Array) -> Array:
+        """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
+        return self.state("assembly_jacobian")(x, t=t)
+
+    def output_derivatives(self, t: float, x: Array, a: Array) -> Array:
+        """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
+        return self.motion("output_derivatives")(x[: self.layout.n_q], x[self.layout.n_q :], a, t=t)
+
     def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
         """Rows of a timed kernel at one state; the others need not be numbers there."""
         found = np.asarray(self.timed(name, nan=True)(t, x, u=u)[chosen])

@@ -31,7 +31,6 @@ from ..base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH,
 from ..errors import NoDerivativeError, cannot
 from ..numeric.projection import minimum_norm
 from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
-from ..runtime.derivative_calls import output_derivatives
 from ..runtime.inputs import Forcing
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
 from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, assembly_rows, keep_consistent
@@ -137,7 +136,7 @@ class Variational:
         layout, here = self.module.layout, self.module.bind(u=self.forcing(t, x))
         n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
         x_dot, S_dot = self.slopes(t, x, S)
-        Y, move = output_derivatives(here, t, x, x_dot[n_q:]), self.move(t, x, S)
+        Y, move = here.kernels.output_derivatives(t, x, x_dot[n_q:]), self.move(t, x, S)
         by_u, by_p = Y[:, n_x + n_v : n_x + n_v + n_u], Y[:, n_x + n_v + n_u :]
         return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
 

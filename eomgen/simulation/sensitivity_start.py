@@ -20,7 +20,6 @@ from ..numeric.projection import minimum_norm
 from ..runtime.argument_checks import unknown
 from ..runtime.change_points import scaled_jacobians
 from ..runtime.columns import Named
-from ..runtime.derivative_calls import assembly_jacobian
 from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing, Table, rate_places
 from ..runtime.layout import Layout
@@ -304,7 +303,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
 
 def assembly_rows(module: BoundModel, t: float, x: Array, inputs: SlopesNow | None) -> Array:
     """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
-    layout, E = module.layout, assembly_jacobian(module, t, x)
+    layout, E = module.layout, module.kernels.assembly_jacobian(t, x)
     if inputs is not None:
         by_u = E[:, layout.n_x : layout.n_x + layout.n_u]
         by_x, by_p = E[:, : layout.n_x], E[:, layout.n_x + layout.n_u :]
@@ -459,7 +458,10 @@ def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, 
         J = scaled_jacobians(module, np.array([point.time]), x[:, None], u[:, None] if len(u) else None)[0]
         U, sizes, _ = algebra.svd(J[: layout.n_h])
         lost = U[:, np.count_nonzero(sizes > 10.0 * PASSED * sizes.max(initial=0.0)) :]
-        C = assembly_jacobian(module.bind(u=u), point.time, x)[: layout.n_h] / layout.scales.c[: layout.n_h, None]
+        C = (
+            module.bind(u=u).kernels.assembly_jacobian(point.time, x)[: layout.n_h]
+            / layout.scales.c[: layout.n_h, None]
+        )
         for name, k in by:
             length = float(np.linalg.norm(C[:, k]))
             if length > 0.0 and float(np.linalg.norm(lost.T @ C[:, k])) > OPENS * length:

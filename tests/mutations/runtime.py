@@ -189,7 +189,7 @@ FAULTS = (
         "tests/mechanics/test_redundant_loops.py::test_flipped_solutions_are_rejected_by_the_module[numpy]",
     ),
     Fault(
-        "momenta-place", "Momenta.momentum",
+        "momenta-place", "BoundModel.momentum",
         "3 + 3 * self.kernels.layout.n_v",
         "9 + 3 * self.kernels.layout.n_v",
         "momentum is read from the place of the inertia",
