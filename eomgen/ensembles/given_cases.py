@@ -18,6 +18,7 @@ from ..base.value_rules import read_count
 from ..errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
 from ..runtime.argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
 from ..runtime.initial import Initial
+from ..runtime.kernels import Kernels
 from ..runtime.late_start import fixed_told, late_values, tell_fixed
 from ..runtime.refusals import require_switched
 from ..runtime.trajectory import last_state
@@ -297,7 +298,8 @@ def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array
 
 def _assemble_named(module: BoundModel, cases: Cases, columns: list[int], t: float) -> Array:
     """The states of runs that differ, as far as starts can tell, in their named values alone."""
-    initial = Initial(module.rebound(**cases.column(columns[0])).kernels, t, cases.values)
+    kernels = Kernels(module.core, module.layout, **cases.column(columns[0]))
+    initial = Initial(kernels, t, cases.values)
     given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
              for k in columns]  # fmt: skip
     alike: dict[tuple[float, ...], list[int]] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -59,11 +59,16 @@ class Kernels:
 
             self.layout = layout = started(layout, self.context.p)
         self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
-        self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
-        self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
-        self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
         self._derivatives: dict[str, Timed] = {}
 
+    def _rows(self, name: str, independent: Indices) -> Rows:
+        return Rows(self.state(name), independent)
+
+    constraints = cached_property["Rows"](
+        lambda self: self._rows("constraints", self.layout.rows[self.layout.rows < self.layout.n_h])
+    )
+    constraint_jacobian = cached_property["Rows"](lambda self: self._rows("constraint_jacobian", self.layout.rows))
+    velocity_constraints = cached_property["Rows"](lambda self: self._rows("velocity_constraints", self.layout.rows))
     mass_matrix: State = cast("State", property(lambda self: self.state("mass_matrix")))
     embedded_mass_matrix: State = cast("State", property(lambda self: self.state("embedded_mass_matrix")))
     bias: Timed = cast("Timed", property(lambda self: self.timed("bias")))
