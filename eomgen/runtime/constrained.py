@@ -12,9 +12,10 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..base.texts import shown
-from ..errors import UsageError, ill_shaped, no_number
+from ..errors import ill_shaped, no_number
 from ..numeric.scales import Scales
 from .argument_checks import as_real, read_number, read_numbers, with_numbers
+from .kernels import into
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -87,15 +88,7 @@ class ProjectedStates(NamedTuple):
 
     def shaped(self, result: Array, out: Array | None = None) -> Array:
         """A result (..., k) as it was asked for."""
-        result = result[..., 0] if self.single else result
-        if out is None:
-            return np.ascontiguousarray(result)
-        if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != result.dtype:
-            raise ill_shaped(f"out must be an array of shape {result.shape} and type {result.dtype}")
-        if not out.flags.writeable:
-            raise UsageError("out is read-only")
-        out[...] = result
-        return out
+        return into(out, np.ascontiguousarray(result[..., 0] if self.single else result))
 
 
 def _all_rows(module: BoundModel) -> Any:

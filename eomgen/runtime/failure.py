@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,31 +12,13 @@ from ..base.algebra import Array, correlated
 from ..base.kernel_table import NAMED
 from ..base.limits.analyses import FLAT, LOCKED
 from ..base.limits.numbers import LARGE_ROOT, SINGULAR, TINY_ROOT
-from ..errors import STATUS, EvaluationError
+from ..errors import STATUS, EvaluationError, UsageError
 from .layout import Layout
-
-if TYPE_CHECKING:
-    from .layout import Layout
-    from .protocols import State, Timed
 
 # -- causes ------------------------------------------------------------------------------------------------------------
 
 
-class Evaluates(Protocol):
-    """The calls of a model, as :class:`~.kernels.Kernels` has them."""
-
-    core: Any
-    context: Any
-    layout: Layout
-
-    def state(self, name: str, nan: bool = False) -> State: ...
-
-    def timed(self, name: str, nan: bool = False) -> Timed: ...
-
-
-def find_culprit(
-    kernels: Evaluates, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
-) -> str:
+def find_culprit(kernels: Any, status: int, t: float, x: Array, p: Array | None, u: Array | None) -> str:
     """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
     layout, q = kernels.layout, x[: kernels.layout.n_q]
     if status == 1:
@@ -67,7 +49,7 @@ def find_culprit(
     return ""
 
 
-def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Array | None) -> str:
+def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | None) -> str:
     """Names what makes a result that is no number: inputs, loads of elements, the mass matrix."""
     layout = kernels.layout
     inputs = kernels.context.u if u is None else u
@@ -143,22 +125,13 @@ class Fail:
 
     Parameters
     ----------
-    layout : Layout
-    culprit : callable, optional
-        (status, t, x, p, u) -> words that name what is to blame, or an empty string.
-    poses : callable, optional
-        (q, t=, p=) -> (n_bodies, 4, 4), to tell which discs lie flat.
+    kernels : Kernels
+        Of the model, which tell what is to blame.
     """
 
-    def __init__(
-        self,
-        layout: Layout,
-        culprit: Callable[[int, float, Array, Own, Own], str] | None = None,
-        poses: Callable[..., Array] | None = None,
-    ) -> None:
-        self.layout = layout
-        self.culprit = culprit
-        self.poses = poses
+    def __init__(self, kernels: Any) -> None:
+        self.kernels = kernels
+        self.layout: Layout = kernels.layout
 
     def vector(self, label: str, given: Any, bound: Array) -> Any:
         """The p or u of a call, as an array where it is given by name; the others are as bound."""
@@ -167,7 +140,7 @@ class Fail:
 
     def trouble(self, x: Array, t: float = 0.0, p: Own = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
-        return flat_disc(self.layout, x, t, p, self.poses) or rotation_trouble(self.layout, x)
+        return flat_disc(self.kernels, x, t, p) or rotation_trouble(self.layout, x)
 
     def __call__(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> None:
         raise self.exception(name, status, t, x, p, u)
@@ -198,16 +171,22 @@ class Fail:
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no degree of freedom"
             remedy = "start a little away from this position, or change the dimensions"
-        elif self.culprit is not None and (names or not self.layout.n_x):
-            if status == 5 and (found := self.culprit(1, t, x, p, u)):
+        elif names or not self.layout.n_x:
+            if status == 5 and (found := self._culprit(1, t, x, p, u)):
                 status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
             else:
-                found = self.culprit(status, t, x, p, u)
+                found = self._culprit(status, t, x, p, u)
             blame = f": {found}" if found else ""
         if status == 1 and name == "jacobian" and not blame:
             remedy += ", or a root of 0, which has no derivative"
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{at}: {what}{blame}; {remedy}", t, x)
+
+    def _culprit(self, status: int, t: float, x: Array, p: Own, u: Own) -> str:
+        try:
+            return find_culprit(self.kernels, status, t, x, p, u)
+        except UsageError:  # a kernel that would tell was not generated
+            return ""
 
     def _names(self, kernel: str) -> Sequence[str]:
         known = {("q",): self.layout.q, ("q", "v"): self.layout.x, ("q", "v", "a"): self.layout.x + self.layout.a}
@@ -223,13 +202,13 @@ def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     return None
 
 
-def flat_disc(
-    layout: Layout, x: Array, t: float, p: Array | None, poses: Callable[..., Array] | None
-) -> tuple[str, str] | None:
+def flat_disc(kernels: Any, x: Array, t: float, p: Array | None) -> tuple[str, str] | None:
     """A rolling disc that lies flat at a state, and the remedy; None if none does."""
+    layout = kernels.layout
     discs = layout.metadata.get("rolling_discs", ())
-    if not discs or poses is None or len(x) < layout.n_q:
+    if not discs or "poses" not in kernels.core.names or len(x) < layout.n_q:
         return None
+    poses = kernels.state("poses", nan=True)
     turns = np.concatenate([poses(x[: layout.n_q], t=t, p=p)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
     for name, wheel, axle, plane, normal in discs:
         across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
-from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
+from ..errors import cannot, ill_shaped, no_choice, not_finite
 from ..numeric.assembly import ConstraintSystem, CutJoints
 from .argument_checks import fitting, read_numbers
 from .argument_names import both_names
@@ -58,7 +58,7 @@ class Kernels:
             from .late_start import started
 
             self.layout = layout = started(layout, self.context.p)
-        self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
+        self.fail = Fail(self)
         self._derivatives: dict[str, Timed] = {}
 
     def _rows(self, name: str, independent: Indices) -> Rows:
@@ -142,18 +142,6 @@ class Kernels:
         for i, _ in self.layout.quaternion_slots:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
-
-    def _poses(self, q: Array, t: float, p: Array | None = None) -> Array:
-        return self.state("poses", nan=True)(q, t=t, p=p)
-
-    def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
-        """Names what a failure at a state is due to, as far as it can be told."""
-        from .failure import find_culprit
-
-        try:
-            return find_culprit(self, status, t, x, p, u)
-        except UsageError:  # a kernel that would tell was not generated
-            return ""
 
 
 class Derived:
