@@ -48,12 +48,13 @@ def record(
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described, header = described().copy, header()
-    steps: Callable[[], tuple[Array, Array, Array]] | None = None
-    if solution.steps is not None:
-        walked = solution.steps
-        steps = lambda: (*walked, forcing.sample(*walked))  # noqa: E731
+    walked = (solution.t, x) if solution.steps is None else solution.steps
+
+    def steps() -> tuple[Array, Array, Array]:
+        return *walked, forcing.sample(*walked)
+
     sampled = forcing.sample(solution.t, x) if varies else partial(forcing.sample, solution.t, x)
-    columns = Columns(module, solution.t, x, sampled, steps)
+    columns = Columns(module, solution.t, x, sampled, None if solution.steps is None else steps)
     events: list[Array] = []
     if solution.t_events:
         happened = zip(solution.t_events, solution.x_events, strict=True)
@@ -64,7 +65,7 @@ def record(
         def sample(t: Array) -> Trajectory:
             found, states = project(module, t, dense(t), forcing)
             head = described() | (header() if callable(header) else header) | {"residuals": found}
-            return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
+            return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states), steps), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described, again)
 
