@@ -1,6 +1,6 @@
 """What the C library makes of constraints: accelerations, projection, derivatives, reduced masses, and reports.
 
-The model's functions are C where their text is the subject, else those of target numpy.
+The model's functions are C in one case of each kind, else those of target numpy, which the same library calls.
 
 Judges: a solve with multipliers in NumPy, in which rotations go by SciPy; closed forms; differences of results.
 """
@@ -110,13 +110,13 @@ def chain(n: int) -> eg.Model:
 #: Model, method of derivation, and the functions that are compiled; none: target numpy.
 CASES: dict[str, tuple[Callable[[], eg.Model], str, list[str]]] = {
     "slider_crank": (lambda: models.build("powered_slider_crank"), "embedding", KERNELS),
-    "slider": (lambda: crank("s"), "embedding", KERNELS),
+    "slider": (lambda: crank("s"), "embedding", []),
     "balls": (rods, "embedding", [k for k in KERNELS if k != "kinematics"]),
     "balls, reactions": (rods, "newton_euler", ["rhs", "project"]),
-    "freedoms": (five_bar, "embedding", KERNELS),
+    "freedoms": (five_bar, "embedding", []),
     "freedoms, multipliers": (five_bar, "augmented", []),
-    "lengths": (carriage, "embedding", ["rhs", "project", "embedded_mass_matrix"]),
-    "towed": (towed, "embedding", ["rhs", "project", "jacobian", "parameter_jacobian", "input_jacobian"]),
+    "lengths": (carriage, "embedding", []),
+    "towed": (towed, "embedding", []),
     "tree": (lambda: chain(13), "embedding", ["rhs", "jacobian", "input_jacobian", "parameter_jacobian"]),
     "long tree": (lambda: chain(40), "embedding", ["rhs", "jacobian"]),
     "by columns": (lambda: chain(60), "recursive", []),
@@ -291,7 +291,7 @@ def near_dead_centre(theta: float) -> np.ndarray:
 def test_a_dead_centre_matters_where_the_set_is_fixed(method: str) -> None:
     """There s cannot move the slider-crank: rhs takes another coordinate and does not notice; the embedded M tells."""
     by_angle = crank("theta").compile(target="numpy")
-    by_length = crank("s").derive(method).compile(kernels=KERNELS, optimize=0)
+    by_length = crank("s").derive(method).compile(target="numpy")
     for theta in (0.0, 1e-12, 1e-6, 1e-3):
         x = by_angle.project(np.concatenate([near_dead_centre(theta), [2.0, -2.5, 0.0]]))
         np.testing.assert_allclose(by_length.rhs(0.0, x), by_angle.rhs(0.0, x), rtol=1e-11, atol=1e-9)
@@ -339,13 +339,12 @@ def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, 
 
 def test_a_gap_that_is_left_is_reported() -> None:
     """Two rods in one place whose lengths differ: half of the difference is left at either."""
-    model = rods(twice=True)
-    mod, judge = model.compile(kernels=["project", "constraints"], optimize=0), model.compile(target="numpy")
-    x, p, place = judge.x0(), np.array(judge.p), judge.p_names.index("gap")
+    mod = rods(twice=True).compile(target="numpy")
+    x, p, place = mod.x0(), np.array(mod.p), mod.p_names.index("gap")
     for gap in (0.0, 2e-11):
         p[place] = gap
         closed = mod.project(x, p=p)
-        residuals = judge.bind(p=p).constraints(closed[: judge.n_q], rows="all")
+        residuals = mod.bind(p=p).constraints(closed[: mod.n_q], rows="all")
         assert np.abs(residuals).max() == pytest.approx(gap / 2, abs=1e-14)
     for gap in (1e-9, 1e-3):
         p[place] = gap

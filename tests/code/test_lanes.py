@@ -15,6 +15,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from analysed import compiled
 from children import HANGS
 from command import run
 
@@ -66,10 +67,10 @@ def test_a_batch_brings_the_lanes_and_the_bits_stay(named: Callable[..., eg.Mode
 
 
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("gait_leg", marks=pytest.mark.thorough)])
-def test_every_column_has_the_bits_of_a_single_call(name: str, named: Callable[..., eg.Model]) -> None:
+def test_every_column_has_the_bits_of_a_single_call(name: str) -> None:
     """With parameters, times and inputs of their own, whatever the neighbours hold: some that fail among them."""
-    module = named(name).compile(optimize=0, kernels=["rhs", "project", "constraints"])
-    rng, start = np.random.default_rng(1), models.build(name).compile(target="numpy").x0()
+    module, rng = compiled(name, "cython"), np.random.default_rng(1)
+    start = module.x0()
     x = start[:, None] + 0.01 * rng.normal(size=(module.n_x, 4500))
     t, u = rng.uniform(0.0, 1.0, 4500), rng.normal(size=(module.n_u, 4500))
     found = module.rhs(t, x, u=u)

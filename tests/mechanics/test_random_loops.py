@@ -110,24 +110,3 @@ def test_closed_chains_move_as_multipliers_make_them(kind: str, rotation: str) -
             judges.agree(x_dot[n:], module.rhs(0.0, x)[n:], 1e-11, cond)
             change, parts = energy_rate(one, judge.q_dot, x, x_dot[n:])
             assert abs(change - judge.power) <= 1e-8 * max(abs(judge.power), parts)
-
-
-LOOPS = [(seed, planar, method) for seed in range(8) for planar in (False, True) for method in METHODS]
-
-
-@pytest.mark.parametrize(
-    ("seed", "planar", "method"), part_of(LOOPS, lambda x: x[0] == METHODS.index(x[2]) and x[1] == (x[0] % 2 == 0))
-)
-def test_any_loop_moves_as_multipliers_make_it(seed: int, planar: bool, method: str) -> None:
-    """Mixed joints either way round, planar and spatial, redundant rows where a loop is planar."""
-    made = random_model(seed, 4, planar=planar, reverse=True, loop=True)
-    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
-    n = mod.n_q
-    assert mod.n_c
-    assert mod.n_dof
-    for x in states_of(mod, seed, 2):
-        judge = Judge(mod, made, x, forces=False)
-        C_q = mod.constraint_jacobian(x[:n], rows="all")
-        a = judges.augmented(judge.M, judge.h, C_q, gamma(mod, x, judge.q_dot))
-        cond = max(np.linalg.cond(judge.M), np.linalg.cond(mod.embedded_mass_matrix(x[:n])))
-        judges.agree(mod.rhs(0.0, x)[n:], a, 1e-9, cond)

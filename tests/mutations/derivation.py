@@ -125,7 +125,6 @@ FAULTS = (
         "cross_motion(relative, above)",
         "cross_motion(above, relative)",
         "closure accelerations of cut joints: what relative motion adds has the wrong sign",
-        "tests/mechanics/test_random_loops.py::test_any_loop_moves_as_multipliers_make_it[4-True-newton_euler]",
         "tests/mechanics/test_methods.py::test_every_form_on_further_models[slider_crank]",
     ),
     Fault(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from analysed import compiled
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -16,7 +17,7 @@ FLOOR = 1000.0 + 1.0 / 3.0  #: (m) so high that heights beside it are many round
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
 
-@pytest.fixture(scope="module", params=["cython", "numpy"])
+@pytest.fixture(scope="module", params=TARGETS)
 def pushed(request: pytest.FixtureRequest) -> Any:
     """A ball on a rail; an input pushes a cart beside it, whose corners split the run and leave the ball alone."""
     m = eg.Model("pushed", gravity=(0, -G, 0))

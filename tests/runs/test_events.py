@@ -271,7 +271,7 @@ def spring() -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_functions_that_change_what_they_are_given_change_no_run(target: str) -> None:
     mod = spring().compile(target=target, **(IN_C if target == "cython" else {}))
     truth = mod.simulate((0, 1), **TIGHT).x
@@ -301,7 +301,7 @@ def test_functions_that_change_what_they_are_given_change_no_run(target: str) ->
     np.testing.assert_allclose(run.x[:2, -1], slopes[:2], atol=1e-7)
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None:
     """As an input is; one that is no number only beyond the end of the run, where rates are taken, is not."""
     mod = spring().compile(target=target, **(IN_C if target == "cython" else {}))

@@ -145,7 +145,7 @@ def test_what_stops_a_call_is_named(method: str) -> None:
     m.prismatic("J", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
     m.torque("pull", "J", -1 / (m.coordinate("x") * m.coordinate("x") ** 0.5))
     m.initial = {"x": 1.0}
-    mod = m.compile()
+    mod = m.compile(target="numpy")
     go = mod.integrator(method=method)
     refuses(f"EG-STALLED {method} 2.1781 11", go, 1.0, mod.x0(), 10.0)
     m = eg.Model("root")  # a force that is no number where x < 0
@@ -217,7 +217,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_run_takes_the_declared_steps(path: Path) -> None:
-    swing, h = eg.load(path).compile(**IN_C), 0.01
+    swing, h = eg.load(path).compile(target="numpy"), 0.01
     run, x = swing.simulate(), swing.x0()
     for _ in range(100):  # Kutta's classical formula
         a = swing.rhs(0.0, x)

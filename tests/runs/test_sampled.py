@@ -238,7 +238,10 @@ def outside() -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize(("method", "target"), [("Radau", "numpy"), ("DOP853", "cython")])
+@pytest.mark.parametrize(
+    ("method", "target"),
+    [("Radau", "numpy"), ("DOP853", "numpy"), pytest.param("DOP853", "cython", marks=pytest.mark.thorough)],
+)
 def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, method: str) -> None:
     called: list[float] = []
 
