@@ -104,6 +104,12 @@ def test_a_loop_is_kept_closed_and_a_run_that_cannot_begin_holds_up_none(lanes: 
         run = bound.simulate(2, {"theta": 1.2, "theta_dot": 10.0}, t_eval=times, **TIGHT)
         exact = bound.simulate(2, {"theta": 1.2, "theta_dot": 10.0}, t_eval=times, rtol=1e-13, atol=1e-15)
         assert_as_good(ensemble.samples[:, :, j], run.x, exact.x, lanes, 1e-11)
+    start, loose = {"theta": 1.2, "theta_dot": 10.0}, {"rtol": 1e-4, "atol": 1e-5}
+    turning = crank.simulate_many((1.0, 2.0), start, {"r": lengths}, events={"end": "s_dot"}, keep_events=9, **loose)
+    assert turning.t_end.tolist() == [2.0, 1.0, 2.0, 2.0]
+    for j in (0, 2, 3):  # states between steps are closed too
+        (x,) = turning.events("end")[1][:, :1, j].T
+        assert np.abs(crank.bind({"r": lengths[j]}).constraints(x[: crank.n_q], rows="all")).max() < 1e-12
 
 
 def test_runs_that_fail_are_marked_and_say_why() -> None:
