@@ -109,7 +109,7 @@ SECTIONS: dict[str, Callable[[bool], Rows]] = {
     "Right-hand sides of robots": right_hand_sides,
     "On equal terms": equal_terms,
     "Robots with closed loops": loops,
-    "Derivatives of inverse dynamics, and second derivatives": jacobians,
+    "Derivatives": jacobians,
     "Mass matrix and bias of a humanoid": humanoids,
     "Mass matrix and bias of a bicycle": bicycle,
 }

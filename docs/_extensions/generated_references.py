@@ -1,6 +1,7 @@
 """Parts of reference pages that are made from the package: from its tables of fields, and from its command line.
 
-``{eomgen-keys} joints`` writes a table of keys for each type of a section, ``{eomgen-verbs}`` a section for each verb.
+``{eomgen-keys} joints`` writes a table of keys for each type of a section, ``{eomgen-verbs}`` a section for each verb,
+``{eomgen-constructs} URDF`` what becomes of each element of a robot file.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from eomgen.describe.fields import joint_type
 from eomgen.elements import kinds
 from eomgen.elements.kinds import Field, Fields
 from eomgen.forces import FORCES
+from eomgen.importers.mjcf import MJCF
+from eomgen.importers.urdf import URDF
+from eomgen.importers.xml_file import ANY, INSIDE
 from eomgen.joints import JOINTS
 
 
@@ -130,8 +134,27 @@ class Verbs(SphinxDirective):
                     yield from self._verb(f"{name} {word}", inner)
 
 
+class Constructs(SphinxDirective):
+    """``{eomgen-constructs} URDF``: what becomes of elements and attributes, by its reason."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes in place of the directive."""
+        groups: dict[tuple[str, str], list[str]] = {}
+        for element, rows in {"URDF": URDF, "MJCF": MJCF}[self.arguments[0]].rows.items():
+            for row in rows:
+                names = {INSIDE: "and all inside", ANY: "any attribute"}
+                attributes = " ".join(names.get(name, name) for name in row.attributes)
+                groups.setdefault((row.fate, row.why), []).append(f"`{element}` {_cell(attributes)}".strip())
+        lines = ["| | | elements and attributes |", "|---|---|---|"]
+        lines += [f"| {_cell(fate)} | {_cell(why)} | {'; '.join(found)} |" for (fate, why), found in groups.items()]
+        return self.parse_text_to_nodes("\n".join(lines))
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
+    app.add_directive("eomgen-constructs", Constructs)
     app.add_directive("eomgen-keys", Keys)
     app.add_directive("eomgen-verbs", Verbs)
     return {"parallel_read_safe": True}

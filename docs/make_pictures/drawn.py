@@ -180,3 +180,39 @@ def generated_code() -> Any:
     ax.set(xlim=(-0.5, 3.5), ylim=(-1, 1))
     ax.axis("off")
     return figure
+
+
+@picture
+def glossary_slider_crank() -> Any:
+    """Bodies and joints with their names."""
+    ax = eg.load_example("slider_crank").draw({"theta": 0.9})
+    ax.figure.set_size_inches(4.8, 3.6)
+    return ax
+
+
+@picture
+def theory_body() -> Any:
+    """A point of a rigid body, by the place and the axes of the body."""
+    figure, ax = panels(size=(6, 3.2))
+    angle, origin, u = 0.5, np.array([2.0, 0.9]), np.array([1.6, 0.5])
+    axes = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    t = np.linspace(0, 2 * np.pi, 200)
+    outline = np.array([1.6 * np.cos(t) + 0.8, 0.75 * np.sin(t) + 0.2 + 0.1 * np.sin(3 * t)])
+    ax.fill(*(origin[:, None] + axes @ outline), color="#9ecae1", alpha=0.6)
+    point = origin + axes @ u
+    for start, end, label, color in (
+        (np.zeros(2), np.array([1, 0]), "$X$", "black"),
+        (np.zeros(2), np.array([0, 1]), "$Y$", "black"),
+        (origin, origin + axes[:, 0], r"$\bar X^i$", "#d62728"),
+        (origin, origin + axes[:, 1], r"$\bar Y^i$", "#d62728"),
+        (np.zeros(2), origin, "", "#555555"),
+        (origin, point, "$P$", "#2ca02c"),
+    ):
+        style = {"arrowstyle": "-|>", "color": color, "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", end, start, arrowprops=style)
+        ax.text(*(end + 0.05), label, color=color, fontsize=13)
+    ax.text(0.85, 0.55, r"$\mathbf{R}^i$", fontsize=13, color="#555555")
+    ax.text(2.35, 1.75, r"$\mathbf{A}^i\bar{\mathbf{u}}$", fontsize=13, color="#2ca02c")
+    ax.set(xlim=(-0.2, 5.2), ylim=(-0.3, 2.9), aspect="equal")
+    ax.axis("off")
+    return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -242,4 +243,27 @@ def forms() -> Any:
     ax.set_xticks(place + 0.2, [line[0] for line in found], fontsize=7)
     ax.set(ylabel="operations", yscale="log")
     ax.legend(frameon=False, fontsize=8)
+    return figure
+
+
+@picture
+def comparison_robots() -> Any:
+    """Times of forward dynamics, from the last measurement."""
+    results = DOCS.parent / "benchmarks" / "results" / "rhs.json"
+    measured = json.loads(results.read_text(encoding="utf-8"))["measured"]
+    robots = ("UR5", "Panda", "ANYmal", "Talos")
+    tools = {
+        "eomgen": ("eomgen, default",),
+        "CasADi": ("CasADi, articulated bodies, default", "CasADi, composite bodies, default"),
+        "MuJoCo": ("MuJoCo",),
+        "Pinocchio (Python)": ("Pinocchio, from Python",),
+    }
+    figure, ax = panels(size=(7.5, 3))
+    for tool, rows in tools.items():
+        best = [min(measured[robot]["ns"][row]["best"] for row in rows) for robot in robots]
+        ax.plot(best, robots, "o", markersize=9, label=tool)
+    ax.set(xscale="log", xlabel="one evaluation of forward dynamics (ns, logarithmic)")
+    ax.margins(y=0.2)
+    ax.grid(alpha=0.3)
+    ax.legend(frameon=False, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
