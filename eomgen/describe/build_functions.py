@@ -25,7 +25,8 @@ from ..records import dataclass
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import FUNCTION, function_fields
-from .names import QUANTITIES, fault_of_name, nearest
+from .names import fault_of_name, nearest
+from .quantities import QUANTITIES
 from .values import Reader, is_number
 
 _HIDDEN = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)

@@ -39,8 +39,9 @@ from .fields import GROUND as GROUND_FIELDS
 from .given_equations import build_equations, check_energies, declare_equations
 from .input_rates import add_rates
 from .lagrangian import build_lagrangian, declare_lagrangian
-from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
+from .mechanism import Body, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
+from .quantities import SUMS, CarriedQuantity, WrenchQuantity
 from .read_shapes import read_shapes
 from .scope import Namespace
 from .sympy_face import in_order, name_of
@@ -156,8 +157,7 @@ def build(description: Description) -> Mechanism:
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.part and not a.carried}
-        | state_rates,
+        element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.carried} | state_rates,
         wrench_quantities=_exerted(reader),
         reaction_quantities=_carried(reader),
         initial=begun
@@ -252,7 +252,7 @@ def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
     for asked, path in reader.asked.items():
         if asked.carried:
             axes = reader.moving(asked.axes) if asked.axes else None
-            found[str(asked)] = CarriedQuantity(asked.element, asked.part, axes, path)
+            found[str(asked)] = CarriedQuantity(asked.of, asked.part, axes, path)
     return found
 
 
@@ -262,14 +262,15 @@ def _exerted(reader: Reader) -> dict[str, WrenchQuantity]:
     for asked, path in reader.asked.items():
         if asked.on:
             axes = reader.moving(asked.axes) if asked.axes else None
-            found[str(asked)] = WrenchQuantity(asked.element, asked.part, reader.moving(asked.on), axes, path)
+            found[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
     return found
 
 
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for (quantity, name, *_, on), path in reader.asked.items():
+    for asked, path in reader.asked.items():
+        quantity, name, on = asked.name, asked.of, asked.on
         if name in known and known[name].is_rigid and not on:
             told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"

@@ -13,10 +13,9 @@ from ..graph.core import LEAVES, Expr, reachable, symbols_of
 from .checks import check_keys
 from .description import DescribedEntry
 from .fields import INPUT, OUTPUT_FIELDS, PARAMETER
-from .marker_quantities import marker_quantity
 from .mechanism import Input, Output, Parameter
-from .names import QUANTITIES, VELOCITIES
 from .printed_names import take_latex
+from .quantities import VELOCITIES, Named
 from .units import Unit, UnitError, read_unit
 from .values import Reader
 from .visit import motions_of, names_of
@@ -152,9 +151,9 @@ class Outputs:
         """Whether an output is written with velocities, also where they cancel, as in ``0*vx(b) - 2``."""
         text, kinds = entry.values.get("expression"), self._reader.names.kinds
         names = {*symbols_of([expression]), *names_of(text)}
-        motions = [*filter(None, map(marker_quantity, names)), *motions_of(text)]
+        motions = [*filter(None, map(Named.parse, names)), *motions_of(text)]
         return (
-            any(QUANTITIES[motion.name][0] in VELOCITIES for motion in motions)
+            any(motion.level in VELOCITIES for motion in motions)
             or any(kinds.get(name) in ("velocity", "rate") for name in names)
             or any(
                 self._at(k)[0].of_velocities

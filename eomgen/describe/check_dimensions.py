@@ -20,7 +20,8 @@ from ..elements.kinds import Field
 from ..graph.core import Expr, Graph, reachable
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
-from .mechanism import TURNING, JointSpec, Output
+from .mechanism import JointSpec, Output
+from .quantities import TURNING
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
 from .values import Reader
@@ -152,9 +153,7 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 found |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
         found[name] = Known(quantity.dimension)
-    found |= {str(asked): Known(ENERGY.times(TIME, -1)) for asked in reader.asked if asked.name == "power"}
-    parts = {str(asked): asked.part for asked in reader.asked if asked.part}
-    found |= {name: Known(ENERGY if part.startswith("m") else FORCE) for name, part in parts.items()}
+    found |= {str(asked): Known(asked.dimension) for asked in reader.asked if asked.dimension is not None}
     return found | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

@@ -24,8 +24,8 @@ from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .element_entry import states_of
 from .fields import ADDED, COMPONENT
-from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import COM, QUANTITIES, TOTALS, fault_of_name, function_words, nearest
+from .names import fault_of_name, function_words, nearest
+from .quantities import COM, QUANTITIES, TOTALS, Named
 from .scope import ENERGIES, RATES
 from .units import UnitError, read_unit
 from .visit import Slot, Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
@@ -135,19 +135,16 @@ class Renaming(Visitor):
     def scalar(self, value: Any, slot: Slot) -> Any:
         hidden = slot.field.local if slot.field else ()
 
-        def locate(quantity: MarkerQuantity) -> str:
-            return str(quantity.renamed(place))
-
-        def element(quantity: ElementQuantity) -> str:
-            return str(quantity.renamed(lambda name: self.prefix + name, place))
-
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:
                 return marker
             found = self.marker(marker, slot)
             return found if isinstance(found, str) else self._named(marker, found)
 
-        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), locate, element)
+        def quantity(named: Named) -> str:
+            return str(named.renamed(place, lambda name: self.prefix + name))
+
+        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), quantity)
 
     def coordinate(self, name: str) -> str:
         known = name in self.own.joints or self.own.has_symbol(name)
@@ -575,7 +572,7 @@ def put_in(value: Any, variables: Round) -> Any:
     if isinstance(value, str):
         if value.strip() in variables:
             return variables[value.strip()]
-        return rewritten(value, lambda name: _text_of(name, variables), str)
+        return rewritten(value, lambda name: _text_of(name, variables))
     if isinstance(value, Mapping):
         return {key: part if key == "body" else put_in(part, variables) for key, part in value.items()}
     if isinstance(value, list | tuple):

@@ -16,9 +16,9 @@ from .build_cams import Contacts
 from .build_joints import Declared
 from .checks import check_keys, check_names
 from .description import DescribedEntry
-from .marker_quantities import element_quantity
-from .mechanism import STATE_RATE, TURNING, Body, FirstOrderState, JointSpec
+from .mechanism import STATE_RATE, Body, FirstOrderState, JointSpec
 from .names import nearest
+from .quantities import TURNING, Named
 from .scope import ENERGIES, RATES
 from .values import Reader
 
@@ -227,7 +227,7 @@ class ElementEntry:
             return Meaning("marker", place.order, "angle" if turns else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
-        if (asked := element_quantity(name)) is not None and asked.carried:
+        if (asked := Named.parse(name)) is not None and asked.carried:
             return Meaning("reaction" if asked.part else "multiplier")
         if asked is not None:  # whether a force moves with velocities is known once its law is
             return Meaning("element", 1 if asked.name == "rate" else 0, "length")

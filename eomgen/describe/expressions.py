@@ -18,9 +18,8 @@ from ..base.texts import shown
 from ..errors import ExpressionError, no_number
 from ..graph.core import Expr, Graph
 from ..syntax_trees import parse_statement
-from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WRENCH, function_words, nearest
-from .reaction_texts import multiplier_in, reaction_in, wrench_in
+from .names import function_words, nearest
+from .quantities import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WORDS, WRENCH, Call, Named
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -30,10 +29,7 @@ EXPONENT = 1000.0  #: size of a numeric exponent
 #: A name -> its expression; may raise :class:`ExpressionError` or note the fault and return a placeholder.
 Resolve = Callable[[str], Expr]
 #: The motion of a marker, such as ``vx(rod.tip)``, or what an element does, as ``force(k1)``, -> its expression.
-Locate = Callable[[MarkerQuantity | ElementQuantity], Expr]
-
-#: Words with parts, or rows, and what reads them.
-_WRENCHES = {REACTION: reaction_in, MULTIPLIER: multiplier_in, WRENCH: wrench_in}
+Locate = Callable[[Named], Expr]
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
@@ -195,7 +191,9 @@ class _Walker:
             parts = [self.walk(part, depth + 1) for part in (node.test, node.body, node.orelse)]
             return self.apply(node, "select", *parts)
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Call):
-            return self.carried(node, node.value)
+            word = _label(node.value.func)
+            if word in (REACTION, MULTIPLIER, WRENCH):
+                return self.quantity(node.value, word, node.attr)
         raise self.fault(node, _REFUSED.get(type(node), f"{type(node).__name__} is not allowed in an expression"))
 
     def number(self, node: ast.Constant) -> Expr:
@@ -257,12 +255,8 @@ class _Walker:
         if not isinstance(node.func, ast.Name):
             raise self.fault(node, "only the listed functions can be called")
         name = node.func.id
-        if name in QUANTITIES and name not in self.words:
+        if name in WORDS and name not in self.words and (name in QUANTITIES or name not in self.graph.functions):
             return self.quantity(node, name)
-        if name in OF_ELEMENTS and name not in self.graph.functions and not node.keywords:
-            return self.element(node, name)
-        if name in _WRENCHES and name not in self.graph.functions and (name != WRENCH or node.keywords):
-            return self.carried(node, node)
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
@@ -310,54 +304,20 @@ class _Walker:
             raise self.fault(node, f"diff() takes {declared.arity} order(s) after the call", "allowed: 0, 1, 2, 3")
         return Expr(self.graph, self.graph.call(declared, tuple(map(int, orders)), value.node[1:]))
 
-    def quantity(self, node: ast.Call, name: str) -> Expr:
+    def quantity(self, node: ast.Call, name: str, part: str = "") -> Expr:
+        """``vx(rod.tip, in=road)``, ``force(k1)``, ``reaction(A).x``, ``multiplier(mesh.ratio)``."""
         if self.locate is None:
+            what = "of a marker " if name in QUANTITIES else ""
             remedy = "use it in outputs, events and the laws of force elements"
-            raise self.fault(node, f"{name}(...) of a marker cannot be used here", remedy)
+            raise self.fault(node, f"{name}(...) {what}cannot be used here", remedy)
         words = {word: key for key, word in _KEYWORDS.items()}
-        parts = [self.marker(argument, name) for argument in node.args]
-        for keyword in node.keywords:
-            if keyword.arg not in words:
-                raise self.fault(node, f"{name}() takes no {keyword.arg or '**'}=", "from= and in= take a marker")
-            parts.append(f"{words[keyword.arg]}={self.marker(keyword.value, name)}")
+        given = {words.get(x.arg or "**", x.arg or "**"): _label(x.value) for x in node.keywords}
         try:
-            return self.locate(MarkerQuantity.of(name, ", ".join(parts)))
+            if len(given) < len(node.keywords):
+                raise ExpressionError(f"{name}() is given a keyword twice", 0, "leave one out")
+            return self.locate(Named.read(Call(name, [_label(x) for x in node.args], given, part)))
         except ExpressionError as error:
             raise self.fault(node.args[0] if node.args else node, error.message, error.remedy, error.code) from None
-
-    def element(self, node: ast.Call, name: str) -> Expr:
-        """What a force element does."""
-        if self.locate is None:
-            remedy = "use it in outputs, events and the laws of force elements"
-            raise self.fault(node, f"{name}(...) of an element cannot be used here", remedy)
-        argument = node.args[0] if len(node.args) == 1 else None
-        if not isinstance(argument, ast.Name):
-            raise self.fault(node, f"{name}() takes the name of one force element", f"write {name}(spring_1)")
-        try:
-            return self.locate(ElementQuantity(name, argument.id))
-        except ExpressionError as error:
-            raise self.fault(argument, error.message, error.remedy, error.code) from None
-
-    def carried(self, node: ast.expr, call: ast.Call) -> Expr:
-        """``reaction(A).x``, ``multiplier(mesh.ratio)``, ``force(track, on=wheel).x``."""
-        if not isinstance(call.func, ast.Name) or call.func.id not in _WRENCHES:
-            raise self.fault(node, _REFUSED[ast.Attribute])
-        if self.locate is None:
-            remedy = "use it in outputs, events and the laws of force elements"
-            raise self.fault(node, f"{call.func.id}(...) cannot be used here", remedy)
-        try:
-            return self.locate(_WRENCHES[call.func.id](node))
-        except ExpressionError as error:
-            raise self.fault(node, error.message, error.remedy, error.code) from None
-
-    def marker(self, argument: ast.expr, quantity: str) -> str:
-        """The label of a marker, ``rod`` or ``rod.tip``."""
-        if isinstance(argument, ast.Name):
-            return argument.id
-        if isinstance(argument, ast.Attribute) and isinstance(argument.value, ast.Name):
-            return f"{argument.value.id}.{argument.attr}"
-        remedy = f"write {quantity}(body) or {quantity}(body.marker)"
-        raise self.fault(argument, f"{quantity}() takes markers, not expressions", remedy)
 
     def fold(self, node: ast.expr, operation: str, values: list[Expr]) -> Expr:
         result = values[0]
@@ -380,6 +340,14 @@ class _Walker:
         if result is None or (result.value is None and all(x.value is not None for x in operands)):
             raise self.fault(node, "the value is not a finite real number", "")
         return result
+
+
+def _label(node: ast.expr) -> str:
+    """A name, or names between dots; empty for anything else."""
+    if isinstance(node, ast.Name):
+        return node.id
+    before = _label(node.value) if isinstance(node, ast.Attribute) else ""
+    return f"{before}.{node.attr}" if before and isinstance(node, ast.Attribute) else ""
 
 
 def constant(text: str, what: str) -> float:

@@ -11,9 +11,8 @@ from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
-from .marker_quantities import ElementQuantity, MarkerQuantity
 from .mechanism import velocity_names
-from .names import MULTIPLIER, REACTION, WRENCH
+from .quantities import MULTIPLIER, REACTION, WRENCH, Named
 from .scope import RATES
 from .sympy_face import names_of, require_name, symbol
 
@@ -75,7 +74,7 @@ class Wrench(NamedTuple):
         return self._replace(axes="")._part("size")
 
     def _part(self, part: str) -> Any:
-        return symbol(str(ElementQuantity(self.function, self.element, part, self.axes, self.on)))
+        return symbol(str(Named(self.function, self.element, "", self.axes, self.on, part)))
 
 
 class JointReaction(Wrench):
@@ -180,7 +179,7 @@ class ConstraintHandle:
         row : str, optional
             Which equation, such as ``height`` of a rolling wheel; not needed where there is one.
         """
-        return symbol(str(ElementQuantity(MULTIPLIER, f"{self.name}.{row}" if row else self.name)))
+        return symbol(str(Named(MULTIPLIER, f"{self.name}.{row}" if row else self.name)))
 
 
 class MarkerHandle:
@@ -241,7 +240,7 @@ class MarkerHandle:
     @property
     def angle(self) -> Any:
         """Turn of the marker about the z axis of ground (rad), as a SymPy symbol."""
-        return self._symbol(MarkerQuantity("angle", self.label))
+        return self._symbol(Named("angle", self.label))
 
     def seen(self, origin: MarkerHandle | None = None, axes: MarkerHandle | None = None) -> SeenMotion:
         """The motion of this marker as seen from another marker, in the axes of a third.
@@ -263,27 +262,27 @@ class MarkerHandle:
 
     def distance(self, other: MarkerHandle) -> Any:
         """Distance from the origin of another marker (m), as a SymPy symbol."""
-        return self._symbol(MarkerQuantity("distance", self.label, noted(other)))
+        return self._symbol(Named("distance", self.label, noted(other)))
 
     def distance_rate(self, other: MarkerHandle) -> Any:
         """Rate of the distance from the origin of another marker (m/s), as a SymPy symbol."""
-        return self._symbol(MarkerQuantity("distance_rate", self.label, noted(other)))
+        return self._symbol(Named("distance_rate", self.label, noted(other)))
 
     def angle_from(self, other: MarkerHandle) -> Any:
         """Turn of this marker about the z axis of another (rad), as a SymPy symbol."""
-        return self._symbol(MarkerQuantity("angle", self.label, noted(other)))
+        return self._symbol(Named("angle", self.label, noted(other)))
 
     def note(self) -> None:
         """Store an unnamed marker in the description, because an expression uses its motion."""
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
 
-    def _symbol(self, quantity: MarkerQuantity) -> Any:
+    def _symbol(self, quantity: Named) -> Any:
         self.note()
         return symbol(str(quantity))
 
     def _triple(self, prefix: str, suffix: str) -> Triple:
-        x, y, z = (self._symbol(MarkerQuantity(f"{prefix}{axis}{suffix}", self.label)) for axis in "xyz")
+        x, y, z = (self._symbol(Named(f"{prefix}{axis}{suffix}", self.label)) for axis in "xyz")
         return (x, y, z)
 
 
@@ -323,7 +322,7 @@ class SeenMotion(NamedTuple):
         return self._triple("w", "_dot")
 
     def _triple(self, prefix: str, suffix: str = "") -> Triple:
-        x, y, z = (symbol(str(MarkerQuantity(f"{prefix}{axis}{suffix}", *self))) for axis in "xyz")
+        x, y, z = (symbol(str(Named(f"{prefix}{axis}{suffix}", *self))) for axis in "xyz")
         return (x, y, z)
 
 

@@ -13,15 +13,14 @@ from dataclasses import field
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.limits.runs import ATOL, RTOL
-from ..elements import dimensions
 from ..errors import ModelError, Problem
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .description import place_of
-from .names import ACCELERATIONS, VELOCITIES
 from .placement import TURNS, Columns
+from .quantities import CarriedQuantity, Quantity, WrenchQuantity
 from .requirements import Requirement
 
 if TYPE_CHECKING:
@@ -118,80 +117,6 @@ class BodyShape(NamedTuple):
     frame: Frame
     file: str = ""  #: of a mesh
     color: str = ""  #: #rrggbb; the body's own where there is none
-
-
-ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
-SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
-TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
-#: Level of a Quantity -> its dimension, save for angles (axis 3).
-LEVEL_DIMENSIONS = (
-    *(dimensions.LENGTH, dimensions.SPEED, dimensions.ACCELERATION),
-    *(dimensions.INERTIA.times(dimensions.TIME, -1), dimensions.INERTIA),
-    *(dimensions.SPEED.times(dimensions.MASS), dimensions.MASS),
-    *(dimensions.SPIN, dimensions.SPIN, dimensions.SPIN_RATE, dimensions.SPIN_RATE),
-)
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Motion of a marker: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2, or 3 for its angle about
-    the z axis of the origin, 4 for its distance from the origin.
-
-    ``origin`` is the marker that it is seen from and ``axes`` the marker whose axes count; None stands for ground.
-
-    Levels of :data:`TURNING` are the angular velocity and acceleration of the marker's body.
-
-    Sums over all bodies: ``level`` :data:`ANGULAR_MOMENTUM` or :data:`INERTIA` (``axis`` 0 to 5: xx yy zz xy xz yz)
-    about the marker's origin, :data:`MOMENTUM` and :data:`MASS` without a marker.  The marker None stands for the
-    centre of mass of all bodies.
-    """
-
-    marker: Marker | None
-    level: int
-    axis: int
-    origin: Marker | None = None
-    axes: Marker | None = None
-
-    @property
-    def dimension(self) -> dimensions.Dimension:
-        """What it is measured in."""
-        return dimension_of(self.level, self.axis)
-
-    @property
-    def order(self) -> int | None:
-        """How many times the place is differentiated in it: 0, 1 or 2; None of the mass, which does not move."""
-        if self.level == MASS:
-            return None
-        return 2 if self.level in ACCELERATIONS else 1 if self.level in VELOCITIES else 0
-
-
-def dimension_of(level: int, axis: int) -> dimensions.Dimension:
-    """The dimension of a quantity."""
-    if axis == 3 and level < 2:
-        return dimensions.SPIN if level else dimensions.NONE
-    return LEVEL_DIMENSIONS[level]
-
-
-class WrenchQuantity(NamedTuple):
-    """A part of what a force element exerts on the body of a marker, along the axes of a marker (None: ground)."""
-
-    element: str
-    part: str
-    on: Marker
-    axes: Marker | None
-    path: str  #: where an expression speaks of it first
-
-
-class CarriedQuantity(NamedTuple):
-    """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
-
-    ``part`` is empty for a multiplier.
-    """
-
-    of: str
-    part: str
-    axes: Marker | None
-    path: str  #: where an expression speaks of it first
 
 
 @dataclass(frozen=True)

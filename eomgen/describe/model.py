@@ -32,7 +32,8 @@ from .handles import (
     placed_markers,
 )
 from .methods import check_keywords, checked_keywords, keywords_of
-from .names import COM, fault_of_name
+from .names import fault_of_name
+from .quantities import COM
 from .sympy_face import function, named, names_of, one_or_several, require_name, symbol
 from .write_yaml import plain, plain_description, yaml_text
 

@@ -23,44 +23,6 @@ def function_words() -> dict[str, tuple[int, int]]:
     return {**found, "heaviside": (1, 1), "deg": (1, 1), "diff": (2, 17)}
 
 
-#: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).
-QUANTITIES: dict[str, tuple[int, int]] = {
-    prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
-}
-QUANTITIES |= {"angle": (0, 3), "angle_rate": (1, 3)}  # turn about the z axis of another marker, or of ground
-QUANTITIES |= {"distance": (0, 4), "distance_rate": (1, 4)}
-# angular velocity and acceleration of the marker's body, in ground axes and in the marker's own
-QUANTITIES |= {
-    f"w{axis}{suffix}": (level, k)
-    for level, suffix in zip((7, 8, 9, 10), ("", "_body", "_dot", "_body_dot"), strict=True)
-    for k, axis in enumerate("xyz")
-}
-# sums over all bodies about the marker's origin, ground axes: angular momentum, inertia (levels of mechanism.Quantity)
-QUANTITIES |= {f"angular_momentum_{axis}": (3, k) for k, axis in enumerate("xyz")}
-QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}
-#: Quantities between two markers.
-PAIRS = ("angle", "angle_rate", "distance", "distance_rate")
-#: Quantities that can be seen from another marker, and resolved in the axes of another.
-RESOLVED = tuple(name for name, (level, axis) in QUANTITIES.items() if axis < 3 and level in (0, 1, 2, 7, 9))
-#: Quantities of a force element: generalized force along its path, the path's length or angle and its rate, power.
-OF_ELEMENTS = ("force", "length", "rate", "power")
-#: Quantities of a joint and of an equation of a constraint: what it carries.
-REACTION, MULTIPLIER = "reaction", "multiplier"
-#: Parts of a reaction: force and moment, size of the force, size of its part across the axis of the joint.
-REACTION_PARTS = ("x", "y", "z", "mx", "my", "mz", "size", "normal")
-#: What a force element exerts on the body of a marker, ``force(track, on=wheel).x``, and its parts.
-WRENCH, WRENCH_PARTS = "force", ("x", "y", "z", "mx", "my", "mz", "size")
-#: Levels of what is linear in velocities.
-VELOCITIES = (1, 3, 5, 7, 8)
-#: Levels of what only the accelerations tell.
-ACCELERATIONS = (2, 9, 10)
-#: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.
-TOTALS: dict[str, tuple[int, int]] = {f"momentum_{axis}": (5, k) for k, axis in enumerate("xyz")} | {
-    "total_mass": (6, 0)
-}
-#: The word that stands for the centre of mass of all bodies where a marker is asked for, unless a body bears it.
-COM = "com"
-
 _C_KEYWORDS = frozenset(
     word
     for line in (

@@ -10,9 +10,8 @@ from ..errors import ExpressionError
 from ..frames import Marker
 from ..graph.core import Expr, Graph, symbols_of
 from .description import Faults
-from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
-from .mechanism import TURNING, Quantity
-from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
+from .names import fault_of_name, nearest
+from .quantities import ACCELERATIONS, COM, ONE_OR_TWO, QUANTITIES, TOTALS, TURNING, Named, Quantity, call_of
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
@@ -48,8 +47,8 @@ def late_names(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str
     late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
     late["rate of a state"] = "rate of a state"
     for name in sorted(used):
-        what, found = late.get(names.kinds.get(name, "")), marker_quantity(name)
-        if found is not None and QUANTITIES[found.name][0] in ACCELERATIONS:
+        what, found = late.get(names.kinds.get(name, "")), Named.parse(name)
+        if found is not None and found.level in ACCELERATIONS:
             what = "acceleration"
         if what is not None:
             yield name, what
@@ -129,7 +128,7 @@ class Scope:
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
         output: Callable[[str], Expr],
-        ask: Callable[[ElementQuantity, str], None],
+        ask: Callable[[Named, str], None],
         local: Mapping[str, Expr] | None = None,
         exclusive: bool = False,
     ) -> None:
@@ -147,12 +146,9 @@ class Scope:
                 )
                 self.names.faults.add(self.path, message, f"rename the {kind}", "EG-NAME-TAKEN")
             return self.local[name]
-        quantity: MarkerQuantity | ElementQuantity | None = None
-        if "(" in name:
+        if (call := call_of(name)) is not None:
             try:
-                quantity = marker_quantity(name) or element_quantity(name)
-                if quantity is not None:
-                    return self.locate(quantity)
+                return self.locate(Named.read(call))
             except ExpressionError as error:
                 self.names.faults.add(self.path, error.message, error.remedy, error.code)
                 return self.graph.symbol(name)
@@ -188,9 +184,9 @@ class Scope:
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         return found
 
-    def locate(self, found: MarkerQuantity | ElementQuantity) -> Expr:
+    def locate(self, found: Named) -> Expr:
         """The symbol of ``vx(rod.tip)`` or ``force(k1)``; raises ExpressionError for an unknown marker or element."""
-        if isinstance(found, ElementQuantity):
+        if not found.is_motion:
             if self.level < LAW:
                 carried = "reaction" if found.carried else "quantity of a force element"
                 self._refuse(str(found), carried)
@@ -203,7 +199,7 @@ class Scope:
             return self.graph.symbol(str(found))
         seen = found
         if axis == 4 and found.origin == COM:  # a distance is the same from either end
-            seen = found._replace(marker=found.origin, origin=found.marker)
+            seen = found._replace(of=found.origin, origin=found.of)
         point = self._point(seen)
         origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
         self.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
@@ -219,14 +215,14 @@ class Scope:
                 raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
             raise
 
-    def _point(self, found: MarkerQuantity) -> Marker | None:
+    def _point(self, found: Named) -> Marker | None:
         """The marker of a quantity; None for the centre of mass of all bodies."""
         try:
-            return self.marker(found.marker)
+            return self.marker(found.of)
         except ExpressionError:
-            if found.marker != COM:
+            if found.of != COM:
                 raise
-        if found.name in ONE_OR_TWO or QUANTITIES[found.name][0] in TURNING:
+        if found.name in ONE_OR_TWO or found.level in TURNING:
             raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         return None
 

@@ -18,8 +18,8 @@ from ..graph.functions import Function
 from ..graph.shown import parts_of, shortened
 from .description import Description, items
 from .expressions import parse
-from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import fault_of_name, unique
+from .quantities import Named
 from .scope import RATES
 from .sympy_face import free_names, function_name, function_names, is_sympy, one_or_several
 
@@ -228,7 +228,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             raise ExpressionError(f"{name} is not a real number")
         return graph.symbol(name)
 
-    def locate(quantity: MarkerQuantity | ElementQuantity) -> Expr:
+    def locate(quantity: Named) -> Expr:
         return resolve(str(quantity))
 
     try:

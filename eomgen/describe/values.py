@@ -29,10 +29,10 @@ from ..graph.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
-from .marker_quantities import ElementQuantity
-from .mechanism import Body, Quantity
+from .mechanism import Body
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
+from .quantities import Named, Quantity
 from .requirements import Requirements
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy, name_of
@@ -67,7 +67,7 @@ class Reader:
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
         self.markers: dict[str, Marker] = {}
         self.quantities: dict[str, Quantity] = {}
-        self.asked: dict[ElementQuantity, str] = {}  # what force elements do, and where that is used first
+        self.asked: dict[Named, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
         self.requirements = Requirements(faults)  # with the declared values of parameters
@@ -78,18 +78,18 @@ class Reader:
         self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
         self.mass_data: Sequence[Body] = ()  # bodies whose masses are read
 
-    def ask(self, quantity: ElementQuantity, path: str) -> None:
+    def ask(self, quantity: Named, path: str) -> None:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
         if quantity.carried:
             self._ask_reaction(quantity)
             self.asked.setdefault(quantity, path)
             return
         names = [str(entry.name) for entry in self.description.sections["forces"]]
-        if quantity.element not in names:
+        if quantity.of not in names:
             raise ExpressionError(
-                f"no force element {quantity.element!r}",
+                f"no force element {quantity.of!r}",
                 0,
-                nearest(quantity.element, names, "elements"),
+                nearest(quantity.of, names, "elements"),
                 code="EG-NAME-UNKNOWN",
             )
         for label in (quantity.on, quantity.axes):
@@ -97,7 +97,7 @@ class Reader:
                 self.moving(label)
         self.asked.setdefault(quantity, path)
 
-    def _ask_reaction(self, quantity: ElementQuantity) -> None:
+    def _ask_reaction(self, quantity: Named) -> None:
         """Refuse the reaction of an unknown joint, or the multiplier of an unknown element."""
         places = ("joints",) if quantity.part else ("constraints", "joints")
         names = [str(entry.name) for place in places for entry in self.description.sections[place]]

@@ -15,58 +15,30 @@ from typing import Any, NamedTuple
 from ..base.names import place_of_marker
 from ..base.names import undotted as undotted_name
 from ..elements.kinds import Field, Fields
-from ..errors import ExpressionError
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, fields_of
-from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, REACTION_PARTS, WRENCH, WRENCH_PARTS
+from .quantities import IN_TEXT, Named
 
-_MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-    rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
-    rf"\(\s*(?P<arguments>{_MARKER}(?:\s*,\s*(?:(?:in|from)\s*=\s*)?{_MARKER})*)\s*\)"
-    rf"|\b(?P<what>{'|'.join((*OF_ELEMENTS, MULTIPLIER))})\(\s*(?P<element>{_MARKER})\s*\)"
-    rf"|\b{REACTION}\(\s*(?P<joint>{_MARKER})\s*(?:,\s*in\s*=\s*(?P<axes>{_MARKER})\s*)?\)"
-    rf"\.(?P<part>{'|'.join(REACTION_PARTS)})\b"
-    rf"|\b{WRENCH}\(\s*(?P<pushing>{_MARKER})\s*,\s*on\s*=\s*(?P<on>{_MARKER})\s*"
-    rf"(?:,\s*in\s*=\s*(?P<along>{_MARKER})\s*)?\)\.(?P<component>{'|'.join(WRENCH_PARTS)})\b"
+    rf"|(?P<quantity>{IN_TEXT})"
     r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
-
 _ATOM = re.compile(r"[A-Za-z0-9_.]+\Z")
 
-Rename = Callable[[str], str]
-Locate = Callable[[MarkerQuantity], str]
 
-
-def rewritten(value: Any, name: Rename, locate: Locate, element: Callable[[ElementQuantity], str] | None = None) -> Any:
-    """A value with every name, motion of a marker (``vx(rod.tip)``) and element (``force(k1)``) replaced.
-
-    Numbers stay, and without ``element`` so do the elements.
-    """
-    if not isinstance(value, str):
-        return value
+def rewritten(value: Any, name: Callable[[str], str], quantity: Callable[[Named], str] = str) -> Any:
+    """A value with every name and quantity (``vx(rod.tip)``, ``force(k1)``) replaced; numbers stay."""
 
     def one(found: re.Match[str]) -> str:
         if found["number"] is not None:
             return found[0]
-        if found["quantity"] is not None:
-            try:
-                return locate(MarkerQuantity.of(found["quantity"], found["arguments"]))
-            except ExpressionError:  # told where the text is read
-                return found[0]
-        if found["what"] is not None:
-            return found[0] if element is None else element(ElementQuantity(found["what"], found["element"]))
-        if found["joint"] is not None:
-            quantity = ElementQuantity(REACTION, found["joint"], found["part"], found["axes"] or "")
-            return found[0] if element is None else element(quantity)
-        if found["pushing"] is not None:
-            quantity = ElementQuantity(WRENCH, found["pushing"], found["component"], found["along"] or "", found["on"])
-            return found[0] if element is None else element(quantity)
-        return name(found[0])
+        if found["name"] is not None:
+            return name(found[0])
+        read = Named.parse(found[0])
+        return found[0] if read is None else quantity(read)  # a fault is told where the text is read
 
-    return _TOKEN.sub(one, value)
+    return _TOKEN.sub(one, value) if isinstance(value, str) else value
 
 
 def in_brackets(text: str) -> str:
@@ -82,20 +54,20 @@ def names_of(value: Any) -> set[str]:
         found.add(name)
         return name
 
-    rewritten(value, note, str)
+    rewritten(value, note)
     return found
 
 
-def motions_of(value: Any) -> set[MarkerQuantity]:
+def motions_of(value: Any) -> set[Named]:
     """Every motion of a marker in a text."""
-    found: set[MarkerQuantity] = set()
+    found: set[Named] = set()
 
-    def note(quantity: MarkerQuantity) -> str:
+    def note(quantity: Named) -> str:
         found.add(quantity)
         return str(quantity)
 
-    rewritten(value, lambda name: name, note)
-    return found
+    rewritten(value, str, note)
+    return {quantity for quantity in found if quantity.is_motion}
 
 
 class Slot(NamedTuple):
@@ -232,10 +204,7 @@ class Undotted(Visitor):
     def scalar(self, value: Any, slot: Slot) -> Any:
         if not isinstance(value, str) or "." not in value:
             return value
-        return rewritten(value, self.coordinate, self._renamed, self._renamed)
-
-    def _renamed(self, quantity: MarkerQuantity | ElementQuantity) -> str:
-        return str(quantity.renamed(self.coordinate))
+        return rewritten(value, self.coordinate, lambda quantity: str(quantity.renamed(self.coordinate)))
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference, slot)

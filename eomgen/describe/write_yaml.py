@@ -14,7 +14,7 @@ from ..elements.kinds import Field, items
 from ..errors import cannot
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description
 from .fields import MODEL, SHORT, fields_of
-from .marker_quantities import marker_quantity
+from .quantities import Named
 from .sympy_face import free_names, is_sympy, name_of, symbol
 from .visit import undotted
 from .yaml_file import scalar
@@ -37,7 +37,7 @@ def with_named_markers(description: Description) -> Description:
     if not description.motions:
         return description
     parts = [description.values, *(entry.values for part in description.sections.values() for entry in part)]
-    uses = {name: found for name in sorted(_names_in(parts)) if (found := marker_quantity(name))}
+    uses = {name: found for name in sorted(_names_in(parts)) if (found := Named.parse(name))}
     spoken = {label for quantity in uses.values() for label in quantity.markers}
     labels = [label for label in description.motions if label in spoken]
     if not labels:
@@ -45,7 +45,7 @@ def with_named_markers(description: Description) -> Description:
     sections = {name: list(description.sections[name]) for name in SECTIONS}
     named = {label: _give_name(sections["bodies"], description.motions[label]) for label in labels}
     named_symbols = {
-        symbol(name): symbol(str(quantity.renamed(lambda label: named.get(label, label))))
+        symbol(name): symbol(str(quantity.renamed(lambda label: named.get(label, label), str)))
         for name, quantity in uses.items()
         if not named.keys().isdisjoint(quantity.markers)
     }

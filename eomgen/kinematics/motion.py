@@ -6,16 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Protocol, TypeVar, cast
 
-from ..describe.mechanism import (
+from ..describe.mechanism import STATE_RATE, JointSpec, Mechanism
+from ..describe.quantities import (
     ANGULAR_MOMENTUM,
     INERTIA,
     MASS,
     MOMENTUM,
-    STATE_RATE,
     TURNING,
     CarriedQuantity,
-    JointSpec,
-    Mechanism,
     Quantity,
     WrenchQuantity,
 )
