@@ -249,7 +249,7 @@ class Named(NamedTuple):
         keywords: Collection[str] = ("in",) if name == REACTION else ("in", "on")
         if not part:
             raise ExpressionError(f"{what} has several parts", 0, _WRITE[name])
-        if name == WRENCH and element and "on" not in given and part in parts:
+        if name == WRENCH and element and given.keys() <= {"in"} and part in parts:
             message = f"{WRENCH}({element}).{part} does not say on which body the element acts"
             raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{part}")
         missing = name == WRENCH and "on" not in given
