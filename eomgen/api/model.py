@@ -55,7 +55,7 @@ class Model(Builder):
     @classmethod
     def from_sympy(cls, method: Any, name: str = "system", **options: Any) -> Model:
         """A model from equations that SymPy's mechanics formed; see :func:`eomgen.from_sympy`, with its arguments."""
-        from ..importers.sympy_equations import describe_method
+        from ..importers.sympy_mechanics import describe_method
 
         with waiting(f"reading the equations of {type(method).__name__}"):
             return cls.from_description(describe_method(method, name, **options))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..elements.dimensions import SPIN
 from ..elements.element_type import ElementType, Types
-from ..elements.kinds import LAW, ConstraintNames, Fields, Flag, Scalar
+from ..elements.kinds import LAW, Fields, Flag, Scalar, SomeNames
 
 #: Of any constraint that may close and open in a run.
 SWITCHING: Fields = {
@@ -14,7 +14,7 @@ SWITCHING: Fields = {
     ),
     "opens": Scalar("where it falls to 0 while the constraint holds, it lets go", level=LAW),
     "closed": Flag("whether it holds at the start of a run; false if closes is given, else true"),
-    "releases": ConstraintNames("one or several other constraints that let go as it closes, before the impact"),
+    "releases": SomeNames("one or several other constraints that let go as it closes, before the impact"),
     "stabilisation": Scalar(
         "rate (1/s), greater than 0, at which an error of the equation dies away while it holds",
         default=10,

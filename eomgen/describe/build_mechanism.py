@@ -17,14 +17,15 @@ from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
 from .bodies import check_bodies, check_display, read_body, read_body_shapes
 from .build_cams import check_turns, declare_contacts
-from .build_events import build_events, check_resets
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates, with_locks
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .build_states import (
     begun_switches,
+    build_events,
     build_states,
     build_switches,
+    check_resets,
     declare_states,
     declare_switches,
     events_of_switches,

@@ -19,7 +19,7 @@ from ..errors import Problem, UsageError
 from ..joints import JOINTS
 from .build_cams import needs_point
 from .build_joints import coordinate_names, sketch
-from .build_states import CLOSED, COUNTER, EVENT, is_switched
+from .build_states import CLOSED, COUNTER, SAMPLED, is_switched
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .element_entry import states_of
@@ -44,7 +44,7 @@ def is_constant(value: Any) -> bool:
 
 # -- the names of a component ------------------------------------------------------------------------------------------
 class OwnNames:
-    """Names that a description declares: symbols of expressions, bodies, joints."""
+    """Names that a description declares: symbols of expressions, bodies, joints and constraints."""
 
     def __init__(self, description: Description) -> None:
         sections = description.sections
@@ -53,7 +53,7 @@ class OwnNames:
             return {entry.name for place in places for entry in sections[place] if isinstance(entry.name, str)}
 
         self.bodies = named("bodies") - {GROUND_NAME}
-        self.joints = named("joints")
+        self.elements = named("joints", "constraints")
         self.symbols = named("parameters", "inputs", "functions", "states", "outputs", "events")
         for entry in sections["joints"]:
             kind = entry.values.get("type")
@@ -69,7 +69,7 @@ class OwnNames:
         self.symbols |= {f"{entry.name}{CLOSED}" for entry in sections["constraints"] if is_switched(entry)}
         for entry in sections["states"]:
             if "period" in entry.values and isinstance(entry.name, str):
-                self.symbols |= {entry.name + COUNTER, entry.name + EVENT}
+                self.symbols |= {entry.name + COUNTER, entry.name + SAMPLED}
         for entry in sections["constraints"]:
             if needs_point(entry.values):
                 self.symbols.add(str(entry.values.get("coordinate", f"{entry.name}_contact")))
@@ -147,7 +147,7 @@ class Renaming(Visitor):
         return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), quantity)
 
     def coordinate(self, name: str) -> str:
-        known = name in self.own.joints or self.own.has_symbol(name)
+        known = name in self.own.elements or self.own.has_symbol(name)
         return self.prefix + name if known or self.closed else name
 
     def latex(self, text: Any) -> Any:

@@ -289,17 +289,8 @@ class SomeNames(Field):
     """A list of names, or one name."""
 
     argument, annotation = "str or sequence of str", "Any"
+    names_of = "coordinate"
     schema = any_of(ref("name"), array(ref("name")))
-    ending = ""  #: what the names have behind them where they stand in expressions
-
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return _named(value, lambda name: visitor.coordinate(name + self.ending).removesuffix(self.ending))
-
-
-class ConstraintNames(SomeNames):
-    """Constraints that close and open, which go by the names of their states."""
-
-    says, ending = SomeNames.says, "_closed"
 
 
 class Reference(Field):
