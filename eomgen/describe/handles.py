@@ -104,22 +104,26 @@ def noted(marker: Labelled) -> str:
     return marker.label
 
 
-class ForceHandle:
-    """A force element of the model; what it does can stand in outputs, events and other laws.
+class ElementHandle:
+    """A joint, force element or constraint of the model.
 
     Attributes
     ----------
     model : Model
         The model it belongs to.
     name : str
-        Name of the element.
+        Its name.
     """
 
     def __init__(self, model: Described, entry: DescribedEntry) -> None:
         self.model, self.name, self._entry = model, entry.name, entry
 
     def __repr__(self) -> str:
-        return f"<ForceHandle {self.name}: {self._entry.values.get('type')}>"
+        return f"<{type(self).__name__} {self.name}: {self._entry.values.get('type')}>"
+
+
+class ForceHandle(ElementHandle):
+    """A force element of the model; what it does can stand in outputs, events and other laws."""
 
     @property
     def force(self) -> Any:
@@ -154,22 +158,8 @@ class ForceHandle:
         return Wrench(WRENCH, self.name, "" if axes is None else noted(axes), noted(marker))
 
 
-class ConstraintHandle:
-    """A constraint element of the model; its multipliers can stand in outputs, events and laws.
-
-    Attributes
-    ----------
-    model : Model
-        The model it belongs to.
-    name : str
-        Name of the element.
-    """
-
-    def __init__(self, model: Described, entry: DescribedEntry) -> None:
-        self.model, self.name, self._entry = model, entry.name, entry
-
-    def __repr__(self) -> str:
-        return f"<ConstraintHandle {self.name}: {self._entry.values.get('type')}>"
+class ConstraintHandle(ElementHandle):
+    """A constraint element of the model; its multipliers can stand in outputs, events and laws."""
 
     def multiplier(self, row: str = "") -> Any:
         """The Lagrange multiplier of an equation, as a SymPy symbol.
@@ -426,22 +416,8 @@ def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
     return {key: value for key, value in (("axes", axes), ("matrix", plain)) if value is not None}
 
 
-class JointHandle:
-    """A joint of the model; its coordinates are SymPy symbols that forces and outputs can use.
-
-    Attributes
-    ----------
-    model : Model
-        The model it belongs to.
-    name : str
-        Name of the joint.
-    """
-
-    def __init__(self, model: Described, entry: DescribedEntry) -> None:
-        self.model, self.name, self._entry = model, entry.name, entry
-
-    def __repr__(self) -> str:
-        return f"<JointHandle {self.name}: {self._entry.values.get('type')}>"
+class JointHandle(ElementHandle):
+    """A joint of the model; its coordinates are SymPy symbols that forces and outputs can use."""
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
