@@ -115,8 +115,8 @@ def _derivatives(q: str, j: int, T: str, V: str | None) -> list[tuple[str, Calla
     return [
         (partial_rate, lambda s: [s.momenta[j]]),
         (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
-        slope(T, lambda s: s.kinetic_energy if V else s.lagrangian),
-        *([slope(V, lambda s: s.potential_energy)] if V else []),
+        slope(T, lambda s: s.T if V else s.lagrangian),
+        *([slope(V, lambda s: s.V)] if V else []),
     ]
 
 

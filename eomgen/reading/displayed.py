@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UnavailableError, at_odds
 from ..runtime.argument_checks import find_lacking
-from .readable import Readable
-from .writes_quantities import Derived
+from .readable import Derived, Readable, dynamic_symbols
 
 
 class Displayed(Readable):
@@ -67,8 +66,6 @@ class Displayed(Readable):
         -------
         ReadingView
         """
-        from .writes_quantities import dynamic_symbols
-
         return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
 
     def subs(self, values: Mapping[Any, Any]) -> ReadingView:
@@ -142,7 +139,7 @@ class ReadingView(Displayed):
     def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
         self.source: Displayed = source.source if isinstance(source, ReadingView) else source
         self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbols, self._values = symbols, tuple(given for given in values if given)
+        self._symbol, self._put_in = symbols, tuple(given for given in values if given)
 
     def fresh(self) -> Derived:
         return self.source.fresh()
@@ -162,11 +159,11 @@ class ReadingView(Displayed):
             A value was put in for a coordinate, a velocity, an acceleration or the time: the steps of a solution
             differentiate by them.  Or a value holds a name that is no parameter or input of the model.
         """
-        if not self._values:
+        if not self._put_in:
             return self.source.explain(level)  # type: ignore[attr-defined]
         k = self.kinematics
         known = {*k.parameter_names, *k.input_names}
-        moving = sorted({name for given in self._values for name in given}.difference(known))
+        moving = sorted({name for given in self._put_in for name in given}.difference(known))
         strange = sorted({*self.names_put_in}.difference(known))
         if moving:
             raise UnavailableError(
@@ -182,16 +179,8 @@ class ReadingView(Displayed):
         return self.source.explained(self.in_plain_symbols(), level)  # type: ignore[attr-defined]
 
     def _picture_and_facts(self, facts: str) -> str:
-        return facts if self._values else self.source._picture_and_facts(facts)
+        return facts if self._put_in else self.source._picture_and_facts(facts)
 
     def in_plain_symbols(self) -> Readable:
         plain = self.source._symbol
-        return self if self._symbols is plain else ReadingView(self.source, plain, self._values)
-
-    @property
-    def _symbol(self) -> Callable[[str], Any]:
-        return self._symbols
-
-    @property
-    def _put_in(self) -> tuple[Mapping[str, Any], ...]:
-        return self._values
+        return self if self._symbol is plain else ReadingView(self.source, plain, self._put_in)

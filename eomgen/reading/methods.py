@@ -258,15 +258,25 @@ def momentum_rates(quantities: Quantities) -> Row:
     return quantities.tree.canonical[len(quantities.kinematics.v) :]
 
 
-class LinearEquations(NamedTuple):
-    """matrix times unknowns = right; ``unknowns`` are names."""
+class BlockSystem(NamedTuple):
+    """A linear system of a method: ``matrix * unknowns = right``; of equations SymPy matrices.
 
-    matrix: Rows
-    unknowns: tuple[str, ...]
-    right: Row
+    Attributes
+    ----------
+    matrix : sympy.Matrix
+        (n, n)
+    unknowns : sympy.Matrix
+        (n, 1), accelerations, reactions and multipliers.
+    right : sympy.Matrix
+        (n, 1)
+    """
+
+    matrix: Any
+    unknowns: Any
+    right: Any
 
 
-def block_system(quantities: Quantities) -> LinearEquations:
+def block_system(quantities: Quantities) -> BlockSystem:
     """The system that the method solves for accelerations and reactions.
 
     ``augmented``: [M C_q^T; C_q 0] [v'; lambda] = [Q + Q_v; -gamma], redundant constraints left out.
@@ -279,13 +289,13 @@ def block_system(quantities: Quantities) -> LinearEquations:
         lower = [(*line, *(zero for _ in jacobian)) for line in jacobian]
         unknowns = (*(str(a.node[1]) for a in kinematics.a), *multiplier_names(kinematics, len(quantities.rows)))
         right = (*(-h for h in quantities.equations.bias), *(-g for g in quantities.gamma))
-        return LinearEquations((*upper, *lower), unknowns, right)
+        return BlockSystem((*upper, *lower), unknowns, right)
     system = tree.system
     n = len(system.unknowns)
     rows = [[zero] * n for _ in system.right]
     for (i, j), entry in zip(system.places, system.entries, strict=True):
         rows[i][j] = entry
-    return LinearEquations(tuple(map(tuple, rows)), unknown_names(quantities), system.right)
+    return BlockSystem(tuple(map(tuple, rows)), unknown_names(quantities), system.right)
 
 
 def unknown_names(quantities: Quantities) -> tuple[str, ...]:

@@ -72,24 +72,6 @@ class ByName(Mapping[str, Value], Generic[Value]):
         return f"<by {self._what}: {', '.join(self._names)}>"
 
 
-class SpatialMotion(NamedTuple):
-    """Velocity or acceleration of a body or marker in ground axes, SymPy columns (3, 1).
-
-    Attributes
-    ----------
-    angular : sympy.Matrix
-        Angular velocity (rad/s) or acceleration (rad/s^2).
-    linear : sympy.Matrix
-        Of the origin of the body or marker (m/s, m/s^2).
-    center_of_mass : sympy.Matrix
-        Of the centre of mass of the body (m/s, m/s^2).
-    """
-
-    angular: Any
-    linear: Any
-    center_of_mass: Any
-
-
 # -- groups ------------------------------------------------------------------------------------------------------------
 
 

@@ -112,16 +112,27 @@ def told(at: Mapping[str, Any]) -> str:
 # constraints, as in ``Module.linearize``.  With M v_i' = f: M dv_i' = df - dM v_i' along each direction.
 
 
-class StateEquations(NamedTuple):
-    """A (n, n), B (n, n_u), and the names of states and inputs."""
+class SymbolicLinearization(NamedTuple):
+    """x' = A x + B u near a state, in displacements, velocities and changes of inputs.
 
-    A: Rows
-    B: Rows
+    Attributes
+    ----------
+    A, B : sympy.Matrix
+        (n, n), (n, n_u); rows of expressions before they are written.
+    states, inputs : tuple of str
+        What the entries of x and u are called, as in ``Module.linearize``.
+    intermediates : list of (sympy.Symbol, sympy.Expr)
+        Named parts of large matrices, in order.
+    """
+
+    A: Any
+    B: Any
     states: tuple[str, ...]
     inputs: tuple[str, ...]
+    intermediates: Sequence[tuple[Any, Any]] = ()
 
 
-def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> StateEquations:
+def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> SymbolicLinearization:
     """A and B at a state; velocities that ``at`` does not name are 0.
 
     ``equilibrium`` tells that the accelerations vanish there.
@@ -167,7 +178,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     A: Rows = (*upper, *(row[:n] for row in lower))
     B: Rows = (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower))
     require_finite(quantities, {"A": A, "B": B}, named)
-    return StateEquations(
+    return SymbolicLinearization(
         A,
         B,
         (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free)),

@@ -35,21 +35,13 @@ from ..printing.formula import (
 )
 from ..printing.writers import TIGHT
 from .named_parts import PartMeaning, find_blocks, grouped
-from .readable import Readable
+from .readable import BODIES, LOOPS, PARTS, Readable
 from .tree_system import MANY
 
 # -- equations ---------------------------------------------------------------------------------------------------------
 
 
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
-#: What a reader may want next: attributes of the equations, in the order of a derivation.
-ATTRIBUTES = (
-    "q", "v", "parameters", "T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces",
-    "poses", "velocities", "accelerations", "momenta", "linearize", "operations", "report",
-)  # fmt: skip
-OF_BODIES = ("poses", "velocities", "accelerations")
-OF_PARTS = ("T", "V", "lagrangian", "momenta", "quadratic_velocity", "generalized_forces")
-OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
 
 
 class PrintedCoordinate(NamedTuple):
@@ -283,13 +275,15 @@ class PrintedEquations:
     @property
     def attributes(self) -> tuple[str, ...]:
         """Attributes to read next."""
-        loops: tuple[str, ...] = OF_LOOPS if self.equations.constraint_names else ()
         mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
-        loops = (*loops, "states", "state_rates") if mechanism.states else loops
-        loops = (*loops, "sampled", "sampled_values") if mechanism.clocks else loops
-        lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_PARTS if mechanism.given is not None else ())}
-        lacking |= {"linearize"} if mechanism.states else set()  # refused
-        return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)
+        lacking = {*([BODIES] if mechanism.bare else ()), *([PARTS] if mechanism.given is not None else ())}
+        rows = {row.name: row.offered for row in there.rows() if row.offered and row.offered not in lacking}
+        loops = [name for name, offered in rows.items() if offered == LOOPS and self.equations.constraint_names]
+        found = ["q", "v", "parameters", *(name for name, offered in rows.items() if offered != LOOPS)]
+        found += ["operations", "report"] if mechanism.states else ["linearize", "operations", "report"]
+        found += [*loops, *(["states", "state_rates"] if mechanism.states else [])]
+        found += ["sampled", "sampled_values"] if mechanism.clocks else []
+        return tuple(name for name in found if hasattr(there, name))
 
 
 def plain(line: str) -> str:

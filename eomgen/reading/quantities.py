@@ -278,12 +278,22 @@ def require_bodies(kinematics: Kinematics) -> None:
         )
 
 
-class PointMotion(NamedTuple):
-    """Velocity or acceleration of a body or marker, ground axes: angular, of its origin, of the centre of mass."""
+class SpatialMotion(NamedTuple):
+    """Velocity or acceleration of a body or marker in ground axes; of equations SymPy columns (3, 1).
 
-    angular: Vec3
-    linear: Vec3
-    center_of_mass: Vec3
+    Attributes
+    ----------
+    angular : sympy.Matrix
+        Angular velocity (rad/s) or acceleration (rad/s^2).
+    linear : sympy.Matrix
+        Of the origin of the body or marker (m/s, m/s^2).
+    center_of_mass : sympy.Matrix
+        Of the centre of mass of the body (m/s, m/s^2).
+    """
+
+    angular: Any
+    linear: Any
+    center_of_mass: Any
 
 
 class Quantities:
@@ -316,13 +326,13 @@ class Quantities:
             )
 
     @property
-    def kinetic_energy(self) -> Expr:
+    def T(self) -> Expr:
         """T (J)."""
         self._require_energy("T", ("kinetic_energy",))
         return self.tree.kinetic_energy
 
     @property
-    def potential_energy(self) -> Expr:
+    def V(self) -> Expr:
         """V of gravity and springs (J); of given equations with kinetic energy alone 0, as it is compiled."""
         self._require_energy("V", ("potential_energy", "kinetic_energy"))
         return self.tree.potential_energy
@@ -332,7 +342,7 @@ class Quantities:
         """L = T - V; of a bare Lagrangian what was given."""
         self._require_energy("the Lagrangian", ("kinetic_energy",))
         bare = self.kinematics.mechanism.lagrangian
-        return bare.expression if bare is not None else self.kinetic_energy - self.potential_energy
+        return bare.expression if bare is not None else self.T - self.V
 
     @cached_property
     def momenta(self) -> Row:
@@ -482,18 +492,18 @@ class Quantities:
         rows = zip(frame.rotation, frame.position, strict=True)
         return (*((*row, x) for row, x in rows), (o, o, o, i))
 
-    def velocity(self, name: str) -> PointMotion:
+    def velocity(self, name: str) -> SpatialMotion:
         """Velocity of a body or marker, ground axes."""
         marker = self.markers[name]
         angular = self.kinematics.motion.angular_velocity(marker)
-        return PointMotion(angular, self._velocity(marker), self._velocity(self._centre(marker)))
+        return SpatialMotion(angular, self._velocity(marker), self._velocity(self._centre(marker)))
 
-    def acceleration(self, name: str) -> PointMotion:
+    def acceleration(self, name: str) -> SpatialMotion:
         """Acceleration of a body or marker, ground axes."""
         marker = self.markers[name]
         turning = self.kinematics.motion.turning_of(marker, own_axes=False, rate=True)
         linear, centre = (self._rate(self._velocity(m)) for m in (marker, self._centre(marker)))
-        return PointMotion(turning, linear, centre)
+        return SpatialMotion(turning, linear, centre)
 
     def _velocity(self, marker: Marker) -> Vec3:
         """Velocity of a marker's origin: the rate of its position or, where that is longer, from the body's twist."""

@@ -1,16 +1,26 @@
-"""A derivation -> every quantity of its equations as SymPy, an attribute each."""
+"""The table of quantities: every quantity of derived equations by name, formed, written in SymPy, an attribute each."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..base.notation import Notation
-from ..graph.core import Expr
+from ..base.names import hint
+from ..base.notation import Notation, split_rate
+from ..describe.visit import Undotted
+from ..equations import TreeEquations
+from ..errors import NonFiniteError, at_odds, incomplete
+from ..graph.core import Expr, Graph, copied, symbols_of
+from ..graph.evaluate import evaluate
+from ..kinematics import Kinematics
+from ..kinematics.mobility import Mobility
 from ..kinematics.topology import acceleration_name
+from ..runtime.argument_checks import UnknownNameError
 from .methods import (
+    BlockSystem,
     BodiesApart,
     block_system,
     body_mass_matrix,
@@ -20,34 +30,142 @@ from .methods import (
     model_notation,
     momentum_names,
     momentum_rates,
+    put_in,
+    read_value,
+    read_values,
 )
-from .near_state import linearize, told
-from .quantities import PointMotion, Quantities, require_bodies
+from .near_state import SymbolicLinearization, linearize, told
+from .quantities import Quantities, SpatialMotion, needed, require_bodies, write
 from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
-from .writes_quantities import WritesQuantities
 
 if TYPE_CHECKING:
-    from .named_parts import ByName, NamedSum, SpatialMotion
+    from .named_parts import ByName, NamedSum
 
-# -- quantities of methods ---------------------------------------------------------------------------------------------
+# -- functions of time -------------------------------------------------------------------------------------------------
 
 
-class BlockSystem(NamedTuple):
-    """A linear system of a method: ``matrix * unknowns = right``, SymPy matrices.
+def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
+    """Name -> SymPy: ``theta`` is theta(t), ``theta_dot`` its derivative, ``theta_ddot`` the second one.
 
-    Attributes
+    Velocities that are no rates of coordinates (``ball_wx``), inputs, momenta and multipliers are functions of time as
+    well; parameters are plain symbols; t is ``dynamicsymbols._t``.
+    """
+    orders: dict[str, tuple[str, int]] = {name: (name, 0) for name in kinematics.names}
+    loop = kinematics.loop_coordinates.names
+    for name in (*kinematics.names, *loop):
+        orders |= {name: (name, 0), f"{name}_dot": (name, 1), f"{name}_ddot": (name, 2)}
+    for velocity in (*kinematics.velocity_names, *kinematics.state_names):
+        base, order = orders.setdefault(velocity, (velocity, 0))
+        orders[acceleration_name(velocity)] = (base, order + 1)
+    inputs = kinematics.input_names
+    for name in inputs:
+        base, order = split_rate(name)
+        orders[name] = (base, order) if base in inputs else (name, 0)
+    orders |= {name: (name, 0) for name in momentum_names(kinematics)}
+
+    return partial(_function_of_time, orders)
+
+
+def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
+    import sympy
+    from sympy.physics.mechanics import dynamicsymbols
+
+    if name == "t":
+        return dynamicsymbols._t
+    if name not in orders:
+        return sympy.Symbol(name)
+    base, order = orders[name]
+    return dynamicsymbols(base, order)
+
+
+# -- rows of the table -------------------------------------------------------------------------------------------------
+
+
+Derived = tuple[Kinematics, Mobility, TreeEquations]
+Names = list[tuple[str, Expr]]
+Choose = Callable[[Quantities], Sequence[Expr]]
+ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
+#: What equations must have for a display to name a quantity among those to read next.
+ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
+SHOWN = 8  #: names that a message lists
+
+
+class Quantity(cached_property[Any]):
+    """A row of the table: an attribute that is made when it is first asked for.
+
+    Parameters
     ----------
-    matrix : sympy.Matrix
-        (n, n)
-    unknowns : sympy.Matrix
-        (n, 1), accelerations, reactions and multipliers.
-    right : sympy.Matrix
-        (n, 1)
+    make : callable
+        (equations, name of the attribute) -> its value.
+    doc : str
+    offered : str
+        Of what equations a display names it among those to read next; of none by default.
+    by_name : bool
+        Whether each body, marker or joint has one.
     """
 
-    matrix: Any
-    unknowns: Any
-    right: Any
+    def __init__(
+        self, make: Callable[[Any, str], Any], doc: str | None, offered: str = "", by_name: bool = False
+    ) -> None:
+        super().__init__(lambda equations: make(equations, self.name))
+        self.__doc__, self.offered, self.by_name = doc, offered, by_name
+
+    def __set_name__(self, owner: type[Any], name: str) -> None:
+        super().__set_name__(owner, name)
+        self.name = name
+
+
+def scalar(doc: str, offered: str = "", form: Callable[[Quantities], Expr] | None = None, prefix: str = "") -> Quantity:
+    """A row of one expression, formed by the attribute of its name or by ``form``; its parts begin with ``prefix``."""
+
+    def make(equations: Readable, name: str) -> Any:
+        return equations._write(name, lambda s: [(form or attrgetter(name))(s)], prefix)[0]
+
+    return Quantity(make, doc, offered)
+
+
+def column(doc: str, offered: str = "", form: Choose | None = None) -> Quantity:
+    """A row of a SymPy column."""
+    return Quantity(
+        lambda eqs, name: eqs._matrix(name, lambda s: [(x,) for x in (form or attrgetter(name))(s)], 1), doc, offered
+    )
+
+
+def matrix(
+    columns: Callable[[Readable], int],
+    doc: str,
+    offered: str = "",
+    form: Callable[[Quantities], Sequence[Sequence[Expr]]] | None = None,
+) -> Quantity:
+    """A row of a SymPy matrix."""
+    return Quantity(lambda eqs, name: eqs._matrix(name, form or attrgetter(name), columns(eqs)), doc, offered)
+
+
+def quantity(offered: str = "", by_name: bool = False) -> Callable[[Callable[[Any], Any]], Quantity]:
+    """A row that a method makes."""
+    return lambda make: Quantity(lambda eqs, _: make(eqs), make.__doc__, offered, by_name)
+
+
+def _n(equations: Readable) -> int:
+    return int(equations.mobility.n_dof)
+
+
+def _n_v(equations: Readable) -> int:
+    return len(equations.kinematics.v)
+
+
+class WrittenQuantity(NamedTuple):
+    """A quantity in SymPy, entry by entry, with its named parts; ``formed`` gives it as the derivation formed it."""
+
+    named: list[tuple[Any, Any]]
+    flat: list[Any]
+    formed: Callable[[], tuple[list[Expr], Names]]
+
+
+def _equations(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
+    import sympy
+
+    return [sympy.Eq(a, b, evaluate=False) for a, b in zip(left, right, strict=True)]
 
 
 class FreeBody(NamedTuple):
@@ -65,50 +183,279 @@ class FreeBody(NamedTuple):
     moment: list[Any]
 
 
-class SymbolicLinearization(NamedTuple):
-    """x' = A x + B u near a state, in displacements, velocities and changes of inputs.
+# -- the table ---------------------------------------------------------------------------------------------------------
 
-    Attributes
-    ----------
-    A, B : sympy.Matrix
-        (n, n), (n, n_u)
-    states, inputs : tuple of str
-        What the entries of x and u are called, as in ``Module.linearize``.
-    intermediates : list of (sympy.Symbol, sympy.Expr)
-        Named parts of large matrices, in order.
+# A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and
+# what values are put in; :class:`~.displayed.ReadingView` is the same derivation with other answers.
+
+
+class Readable(ABC):
+    """The quantities of derived equations as SymPy expressions and matrices, each made when it is first asked for.
+
+    Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
+    the tree to all velocities ``v``.  In open chains both are the same.
     """
 
-    A: Any
-    B: Any
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    intermediates: list[tuple[Any, Any]]
+    kinematics: Kinematics
+    mobility: Mobility
 
+    @abstractmethod
+    def fresh(self) -> Derived:
+        """A copy of what was derived, in a graph of its own."""
 
-class QuantitiesOfMethods(WritesQuantities):
-    """What the method of derivation has; every other method refuses it and says which have it."""
+    @abstractmethod
+    def again(self) -> Readable:
+        """The same with nothing made yet."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.kinematics.mechanism.name
+
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """Name of the method of derivation."""
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent coordinates."""
+        return self.mobility.independent
+
+    @property
+    def acceleration_names(self) -> tuple[str, ...]:
+        """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
+        k = self.kinematics
+        return tuple(acceleration_name(k.velocity_names[k.velocity_labels.index(n)]) for n in self.independent)
+
+    @property
+    def constraint_names(self) -> tuple[str, ...]:
+        """Names of the rows of ``constraint_jacobian``, such as ``C.r_x`` of joint C; nonholonomic ones last."""
+        return tuple(self.kinematics.constraints.labels[i] for i in self.mobility.independent_rows)
 
     @cached_property
-    def gibbs_function(self) -> Any:
-        """S (W^2 kg) of method ``gibbs_appell``: dS/dv' = M v' - Q_v on the tree; without terms free of v'."""
-        return self._write("gibbs_function", lambda s: [gibbs_function(s)], "S_")[0]
+    def notation(self) -> Notation:
+        """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
+        return model_notation(self.kinematics, self.names_put_in)
 
-    @cached_property
-    def hamiltonian(self) -> Any:
-        """H(q, p, t) (J) of method ``hamilton``, in the momenta ``p_theta``, ... of ``momentum_symbols``."""
-        return self._write("hamiltonian", lambda s: [hamiltonian(s)], "H_")[0]
+    # -- symbols ------------------------------------------------------------------------------------------------------
+    def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
+        return tuple(map(self._symbol, names))
+
+    @property
+    def q(self) -> tuple[Any, ...]:
+        """Coordinates of the spanning tree, SymPy symbols."""
+        return self._symbols(self.kinematics.names)
+
+    @property
+    def v(self) -> tuple[Any, ...]:
+        """Velocities of the spanning tree, SymPy symbols."""
+        return self._symbols(self.kinematics.velocity_names)
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """Parameters, SymPy symbols."""
+        return self._symbols(self.kinematics.parameter_names)
+
+    @property
+    def states(self) -> tuple[Any, ...]:
+        """First-order states, SymPy symbols."""
+        return self._symbols(self.kinematics.state_names)
+
+    @property
+    def sampled(self) -> tuple[Any, ...]:
+        """Sampled states in the order of renewal, behind t for each of their clocks, SymPy symbols."""
+        return self._symbols([name for name, _ in self.kinematics.sampled])
 
     @property
     def momentum_symbols(self) -> tuple[Any, ...]:
         """The symbols of the momenta in ``hamiltonian``, one for each of ``v``."""
-        return tuple(map(self._symbol, momentum_names(self.kinematics)))
+        return self._symbols(momentum_names(self.kinematics))
+
+    # -- energies -----------------------------------------------------------------------------------------------------
+    T = scalar("Kinetic energy (J).", PARTS)
+    V = scalar("Potential energy of gravity and springs (J); of a bare Lagrangian -L at rest.", PARTS)
+    lagrangian = scalar("T - V (J).", PARTS, prefix="L_")
+
+    # -- equations of motion ------------------------------------------------------------------------------------------
+    @cached_property
+    def _motion(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
+        import sympy
+
+        n = self.mobility.n_dof
+        written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
+        named = self._named["force"] = self._named["mass_matrix"]
+        self._all["force"] = self._all["mass_matrix"]  # they are written together
+        return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
+
+    mass_matrix = Quantity(lambda eqs, _: eqs._motion[1], "sympy.Matrix (n, n), n the degrees of freedom.", ANY)
+    force = Quantity(
+        lambda eqs, _: eqs._motion[2],
+        "sympy.Matrix (n, 1): ``mass_matrix * v' = force``; it is ``quadratic_velocity + generalized_forces``.",
+        ANY,
+    )
+
+    @property
+    def intermediates(self) -> list[tuple[Any, Any]]:
+        """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
+        return self._motion[0]
+
+    quadratic_velocity = column(
+        "Q_v (n, 1): Coriolis, centrifugal and gyroscopic terms, and what prescribed motions ask for.", PARTS
+    )
+
+    @quantity(PARTS)
+    def generalized_forces(self) -> NamedSum:
+        """Q (n, 1) of gravity and all force elements; ``generalized_forces["motor"]`` is that of one alone.
+
+        ``.parts`` is a dict of all.  Gravity is ``"gravity"``; a bare Lagrangian has ``"potential"``, ``"forces"`` and
+        ``"dissipation"``.
+        """
+        import sympy
+
+        from .named_parts import NamedSum
+
+        n = self.mobility.n_dof
+        names: list[str] = []
+
+        def choose(s: Quantities) -> list[Expr]:
+            names[:] = s.forces
+            return [*s.total_force, *(x for force in s.forces.values() for x in force)]
+
+        written = self._write("generalized_forces", choose, "Q_")
+        parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
+        return NamedSum.of(written[:n], parts, self._plain)
+
+    state_rates = column("s' (n_s, 1) of the first-order states ``states``.", form=attrgetter("kinematics.state_rates"))
+    sampled_values = column(
+        "What ``sampled`` become (n, 1), one after the other; for t: the time of the next sample.",
+        form=lambda s: [x for _, x in s.kinematics.sampled],
+    )
+
+    # -- motion of bodies and markers ---------------------------------------------------------------------------------
+    def _places(self) -> tuple[str, ...]:
+        """Names of bodies and of named markers."""
+        require_bodies(self.kinematics)
+        mechanism = self.kinematics.mechanism
+        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
+
+    @quantity(BODIES, by_name=True)
+    def poses(self) -> ByName[Any]:
+        """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
+        return self._by_name(
+            "body or marker", self._places(), lambda one: self._matrix(f"poses.{one}", lambda s: s.pose(one), 4)
+        )
+
+    @quantity(BODIES, by_name=True)
+    def velocities(self) -> ByName[SpatialMotion]:
+        """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
+        make = partial(self._spatial, "velocities", Quantities.velocity)
+        return self._by_name("body or marker", self._places(), make)
+
+    @quantity(BODIES, by_name=True)
+    def accelerations(self) -> ByName[SpatialMotion]:
+        """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
+        make = partial(self._spatial, "accelerations", Quantities.acceleration)
+        return self._by_name("body or marker", self._places(), make)
+
+    def _spatial(self, what: str, of: Callable[[Quantities, str], SpatialMotion], name: str) -> SpatialMotion:
+        import sympy
+
+        written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
+        return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
+
+    @quantity(by_name=True)
+    def loop_coordinates(self) -> ByName[Any]:
+        """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
+
+        def make(one: str) -> Any:
+            return self._write(f"loop_coordinates.{one}", lambda s: [s.loop_coordinates[one]])[0]
+
+        return self._by_name("coordinate of a cut joint", self.kinematics.loop_coordinates.names, make)
+
+    momenta = column("p = dT/dv (n_v, 1), conjugate to the velocities ``v``.", PARTS)
+
+    # -- constraints --------------------------------------------------------------------------------------------------
+    constraints = column("C(q, t) (m, 1), which vanishes: the holonomic equations, without redundant ones.", LOOPS)
+    velocity_constraints = column(
+        "C_q v + C_t (n_c, 1), which vanishes: rates of the holonomic equations, then the nonholonomic ones."
+    )
+    constraint_jacobian = matrix(
+        _n_v, "C_q (n_c, n_v), nonholonomic rows last: the derivative of ``velocity_constraints`` by ``v``.", LOOPS
+    )
+    gamma = column("gamma (n_c, 1) of C'' = C_q v' + gamma = 0.", LOOPS)
+    velocity_transformation = matrix(
+        _n, "B (n_v, n) of v = B v_i + b, v_i the velocities of ``independent``; b is ``velocity_offset``.", LOOPS,
+        attrgetter("transformation.matrix"),
+    )  # fmt: skip
+    velocity_offset = column(
+        "b (n_v, 1) of v = B v_i + b: what drivers and other motions over time add; 0 without them.",
+        form=attrgetter("transformation.offset"),
+    )
+    acceleration_offset = column(
+        "a (n_v, 1) of v' = B v_i' + a.", form=attrgetter("transformation.acceleration_offset")
+    )
 
     @cached_property
-    def momentum_rates(self) -> Any:
-        """p' = -dH/dq + Q (n_v, 1) of method ``hamilton``, in q and v, without the forces of constraints."""
-        return self._column("momentum_rates", momentum_rates)
+    def has_long_loops(self) -> bool:
+        """Whether loops make ``mass_matrix`` and ``force`` so long that ``tree_system`` is read more easily."""
+        if self.mobility.n_dof in (0, len(self.kinematics.v)):
+            return False
+        return is_long(Quantities(*self.fresh())) or len(self.intermediates) > MANY
 
-    @cached_property
+    @quantity()
+    def tree_system(self) -> TreeSystem:
+        """M_t v' = f_t + C^T lambda, C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
+
+        With v' = B v_i' + a, which the constraints give, M = B^T M_t B and f = B^T (f_t - M_t a).  Where
+        ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
+        parts.
+        """
+        import sympy
+
+        n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
+        formed: list[TreeParts] = []
+
+        def choose(quantities: Quantities) -> list[Expr]:
+            formed[:] = [tree_parts(quantities, self.has_long_loops)]
+            return formed[0].flat
+
+        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].given))
+        shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
+        mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
+        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
+
+    # -- of single methods; others refuse them and say which have them ----------------------------------------------
+    body_velocity_transformation = matrix(
+        _n,
+        """B_b (6 n_b, n) of the velocities of all bodies by those of ``independent``.
+
+        Of each body the velocity of its centre of mass in ground axes, then its angular velocity in body axes.
+        ``B_b.T * body_mass_matrix * B_b`` is ``mass_matrix``, less the inertia of drives.
+        """,
+        form=body_velocities,
+    )
+    body_mass_matrix = matrix(
+        lambda eqs: 6 * len(eqs.kinematics.mechanism.bodies),
+        "M_b (6 n_b, 6 n_b): mass and inertia of each body, for the velocities of ``body_velocity_transformation``.",
+        form=body_mass_matrix,
+    )
+    gibbs_function = scalar(
+        "S (W^2 kg) of method ``gibbs_appell``: dS/dv' = M v' - Q_v on the tree; without terms free of v'.",
+        form=gibbs_function,
+        prefix="S_",
+    )
+    hamiltonian = scalar(
+        "H(q, p, t) (J) of method ``hamilton``, in the momenta ``p_theta``, ... of ``momentum_symbols``.",
+        form=hamiltonian,
+        prefix="H_",
+    )
+    momentum_rates = column(
+        "p' = -dH/dq + Q (n_v, 1) of method ``hamilton``, in q and v, without the forces of constraints.",
+        form=momentum_rates,
+    )
+
+    @quantity()
     def block_system(self) -> BlockSystem:
         """The linear system of methods ``augmented``, ``newton_euler`` and ``amalgamated``.
 
@@ -126,11 +473,10 @@ class QuantitiesOfMethods(WritesQuantities):
             return [*(x for row in found.matrix for x in row), *found.right]
 
         written, n = self._write("block_system", choose, "K_"), len(names)
-        unknowns = [self._symbol(name) for name in names]
-        parts = written[: n * n], unknowns, written[n * n :]
+        parts = written[: n * n], list(self._symbols(names)), written[n * n :]
         return BlockSystem(*(sympy.Matrix(n, len(x) // n if n else 0, x) for x in parts))
 
-    @cached_property
+    @quantity(by_name=True)
     def free_bodies(self) -> ByName[FreeBody]:
         """Newton's and Euler's equations of each body, of methods ``newton_euler`` and ``amalgamated``.
 
@@ -138,42 +484,30 @@ class QuantitiesOfMethods(WritesQuantities):
         the joint, in ground axes; those of joints that close loops are written with their multipliers ``lambda_1``, ...
         """
         BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
-        return self._by_name("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
 
-    def _free_body(self, name: str) -> FreeBody:
-        written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
-        equations = _equations([*written[:3], *written[6:9]], [*written[3:6], *written[9:]])
-        return FreeBody(equations[:3], equations[3:])
+        def make(name: str) -> FreeBody:
+            written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
+            equations = _equations([*written[:3], *written[6:9]], [*written[3:6], *written[9:]])
+            return FreeBody(equations[:3], equations[3:])
 
-    @cached_property
+        return self._by_name("body", [body.name for body in self.kinematics.mechanism.bodies], make)
+
+    @quantity(by_name=True)
     def joint_forces(self) -> ByName[list[Any]]:
         """Of each joint of the tree an equation along each direction in which it is free: reaction = drive.
 
         The left side is the component of the reaction in ``free_bodies``; the right side what force elements and
         constraint elements exert along the coordinate, 0 if there are none.
         """
+
+        def make(name: str) -> list[Any]:
+            pairs = self._write(
+                f"joint_forces.{name}", lambda s: [x for p in BodiesApart(s).along_joint(name) for x in p]
+            )
+            return _equations(pairs[::2], pairs[1::2])
+
         joints = BodiesApart(Quantities(*self.fresh())).joints  # refuses other methods
-        return self._by_name("joint of the tree", joints, self._joint_force)
-
-    def _joint_force(self, name: str) -> list[Any]:
-        written = self._write(
-            f"joint_forces.{name}", lambda s: [x for pair in BodiesApart(s).along_joint(name) for x in pair]
-        )
-        return _equations(written[::2], written[1::2])
-
-    @cached_property
-    def body_velocity_transformation(self) -> Any:
-        """B_b (6 n_b, n) of the velocities of all bodies by those of ``independent``.
-
-        Of each body the velocity of its centre of mass in ground axes, then its angular velocity in body axes.
-        ``B_b.T * body_mass_matrix * B_b`` is ``mass_matrix``, less the inertia of drives.
-        """
-        return self._matrix("body_velocity_transformation", body_velocities, self.mobility.n_dof)
-
-    @cached_property
-    def body_mass_matrix(self) -> Any:
-        """M_b (6 n_b, 6 n_b): mass and inertia of each body, for the velocities of ``body_velocity_transformation``."""
-        return self._matrix("body_mass_matrix", body_mass_matrix, 6 * len(self.kinematics.mechanism.bodies))
+        return self._by_name("joint of the tree", joints, make)
 
     def linearize(self, at: Mapping[Any, Any] | None = None, *, equilibrium: bool = False) -> SymbolicLinearization:
         """The equations of motion near a state, x' = A x + B u, in symbols.
@@ -232,277 +566,237 @@ class QuantitiesOfMethods(WritesQuantities):
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])
         return SymbolicLinearization(A, B, names, inputs, self._named.pop("linearize"))
 
-
-def _equations(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
-    import sympy
-
-    return [sympy.Eq(a, b, evaluate=False) for a, b in zip(left, right, strict=True)]
-
-
-# -- quantities of all methods -----------------------------------------------------------------------------------------
-
-# A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and
-# what values are put in; :class:`~.displayed.ReadingView` is the same derivation with other answers.
-
-
-class Readable(QuantitiesOfMethods):
-    """The quantities of derived equations as SymPy expressions and matrices, each made when it is first asked for.
-
-    Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
-    the tree to all velocities ``v``.  In open chains both are the same.
-    """
-
-    @property
-    def name(self) -> str:
-        """Name of the model."""
-        return self.kinematics.mechanism.name
-
-    @property
-    @abstractmethod
-    def method(self) -> str:
-        """Name of the method of derivation."""
-
-    @property
-    def independent(self) -> tuple[str, ...]:
-        """Names of the independent coordinates."""
-        return self.mobility.independent
-
-    @property
-    def acceleration_names(self) -> tuple[str, ...]:
-        """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
-        k = self.kinematics
-        return tuple(acceleration_name(k.velocity_names[k.velocity_labels.index(n)]) for n in self.independent)
-
-    @property
-    def constraint_names(self) -> tuple[str, ...]:
-        """Names of the rows of ``constraint_jacobian``, such as ``C.r_x`` of joint C; nonholonomic ones last."""
-        return tuple(self.kinematics.constraints.labels[i] for i in self.mobility.independent_rows)
-
-    @cached_property
-    def notation(self) -> Notation:
-        """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
-        return model_notation(self.kinematics, self.names_put_in)
-
-    # -- symbols ------------------------------------------------------------------------------------------------------
-    @property
-    def q(self) -> tuple[Any, ...]:
-        """Coordinates of the spanning tree, SymPy symbols."""
-        return tuple(map(self._symbol, self.kinematics.names))
-
-    @property
-    def v(self) -> tuple[Any, ...]:
-        """Velocities of the spanning tree, SymPy symbols."""
-        return tuple(map(self._symbol, self.kinematics.velocity_names))
-
-    @property
-    def parameters(self) -> tuple[Any, ...]:
-        """Parameters, SymPy symbols."""
-        return tuple(map(self._symbol, self.kinematics.parameter_names))
-
-    # -- energies -----------------------------------------------------------------------------------------------------
-    @cached_property
-    def T(self) -> Any:
-        """Kinetic energy (J)."""
-        return self._write("T", lambda s: [s.kinetic_energy])[0]
-
-    @cached_property
-    def V(self) -> Any:
-        """Potential energy of gravity and springs (J); of a bare Lagrangian -L at rest."""
-        return self._write("V", lambda s: [s.potential_energy])[0]
-
-    @cached_property
-    def lagrangian(self) -> Any:
-        """T - V (J)."""
-        return self._write("lagrangian", lambda s: [s.lagrangian], "L_")[0]
-
-    @cached_property
-    def momenta(self) -> Any:
-        """p = dT/dv (n_v, 1), conjugate to the velocities ``v``."""
-        return self._column("momenta", lambda s: s.momenta)
-
-    # -- equations of motion ------------------------------------------------------------------------------------------
-    @cached_property
-    def _motion(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
-        import sympy
-
-        n = self.mobility.n_dof
-        written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
-        named = self._named["force"] = self._named["mass_matrix"]
-        self._all["force"] = self._all["mass_matrix"]  # they are written together
-        return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
-
-    @property
-    def mass_matrix(self) -> Any:
-        """sympy.Matrix (n, n), n the degrees of freedom."""
-        return self._motion[1]
-
-    @property
-    def force(self) -> Any:
-        """sympy.Matrix (n, 1): ``mass_matrix * v' = force``; it is ``quadratic_velocity + generalized_forces``."""
-        return self._motion[2]
-
-    @property
-    def intermediates(self) -> list[tuple[Any, Any]]:
-        """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
-        return self._motion[0]
-
-    @cached_property
-    def quadratic_velocity(self) -> Any:
-        """Q_v (n, 1): Coriolis, centrifugal and gyroscopic terms, and what prescribed motions ask for."""
-        return self._column("quadratic_velocity", lambda s: s.quadratic_velocity)
-
-    @cached_property
-    def generalized_forces(self) -> NamedSum:
-        """Q (n, 1) of gravity and all force elements; ``generalized_forces["motor"]`` is that of one alone.
-
-        ``.parts`` is a dict of all.  Gravity is ``"gravity"``; a bare Lagrangian has ``"potential"``, ``"forces"`` and
-        ``"dissipation"``.
-        """
-        import sympy
-
-        from .named_parts import NamedSum
-
-        n = self.mobility.n_dof
-        names: list[str] = []
-
-        def choose(s: Quantities) -> list[Expr]:
-            names[:] = s.forces
-            return [*s.total_force, *(x for force in s.forces.values() for x in force)]
-
-        written = self._write("generalized_forces", choose, "Q_")
-        parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
-        return NamedSum.of(written[:n], parts, self._plain)
-
-    @property
-    def states(self) -> tuple[Any, ...]:
-        """First-order states, SymPy symbols."""
-        return tuple(map(self._symbol, self.kinematics.state_names))
-
-    @cached_property
-    def state_rates(self) -> Any:
-        """s' (n_s, 1) of the first-order states ``states``."""
-        return self._column("state_rates", lambda s: s.kinematics.state_rates)
-
-    @property
-    def sampled(self) -> tuple[Any, ...]:
-        """Sampled states in the order of renewal, behind t for each of their clocks, SymPy symbols."""
-        return tuple(self._symbol(name) for name, _ in self.kinematics.sampled)
-
-    @cached_property
-    def sampled_values(self) -> Any:
-        """What ``sampled`` become (n, 1), one after the other; for t: the time of the next sample."""
-        return self._column("sampled_values", lambda s: [x for _, x in s.kinematics.sampled])
-
-    # -- constraints --------------------------------------------------------------------------------------------------
-    @cached_property
-    def constraints(self) -> Any:
-        """C(q, t) (m, 1), which vanishes: the holonomic equations, without redundant ones."""
-        return self._column("constraints", lambda s: s.constraints)
-
-    @cached_property
-    def velocity_constraints(self) -> Any:
-        """C_q v + C_t (n_c, 1), which vanishes: rates of the holonomic equations, then the nonholonomic ones."""
-        return self._column("velocity_constraints", lambda s: s.velocity_constraints)
-
-    @cached_property
-    def constraint_jacobian(self) -> Any:
-        """C_q (n_c, n_v), nonholonomic rows last: the derivative of ``velocity_constraints`` by ``v``."""
-        return self._matrix("constraint_jacobian", lambda s: s.constraint_jacobian, len(self.kinematics.v))
-
-    @cached_property
-    def gamma(self) -> Any:
-        """gamma (n_c, 1) of C'' = C_q v' + gamma = 0."""
-        return self._column("gamma", lambda s: s.gamma)
-
-    @cached_property
-    def velocity_transformation(self) -> Any:
-        """B (n_v, n) of v = B v_i + b, v_i the velocities of ``independent``; b is ``velocity_offset``."""
-        return self._matrix("velocity_transformation", lambda s: s.transformation.matrix, self.mobility.n_dof)
-
-    @cached_property
-    def velocity_offset(self) -> Any:
-        """b (n_v, 1) of v = B v_i + b: what drivers and other motions over time add; 0 without them."""
-        return self._column("velocity_offset", lambda s: s.transformation.offset)
-
-    @cached_property
-    def acceleration_offset(self) -> Any:
-        """a (n_v, 1) of v' = B v_i' + a."""
-        return self._column("acceleration_offset", lambda s: s.transformation.acceleration_offset)
-
-    @cached_property
-    def has_long_loops(self) -> bool:
-        """Whether loops make ``mass_matrix`` and ``force`` so long that ``tree_system`` is read more easily."""
-        if self.mobility.n_dof in (0, len(self.kinematics.v)):
-            return False
-        return is_long(Quantities(*self.fresh())) or len(self.intermediates) > MANY
-
-    @cached_property
-    def tree_system(self) -> TreeSystem:
-        """M_t v' = f_t + C^T lambda, C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
-
-        With v' = B v_i' + a, which the constraints give, M = B^T M_t B and f = B^T (f_t - M_t a).  Where
-        ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
-        parts.
-        """
-        import sympy
-
-        n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
-        formed: list[TreeParts] = []
-
-        def choose(quantities: Quantities) -> list[Expr]:
-            formed[:] = [tree_parts(quantities, self.has_long_loops)]
-            return formed[0].flat
-
-        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].given))
-        shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
-        mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
-        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
-
-    # -- motion of bodies and markers ---------------------------------------------------------------------------------
-    def _places(self) -> tuple[str, ...]:
-        """Names of bodies and of named markers."""
-        require_bodies(self.kinematics)
-        mechanism = self.kinematics.mechanism
-        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
-
-    @cached_property
-    def poses(self) -> ByName[Any]:
-        """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
-        return self._by_name("body or marker", self._places(), self._pose)
-
-    def _pose(self, name: str) -> Any:
-        return self._matrix(f"poses.{name}", lambda s: s.pose(name), 4)
-
-    @cached_property
-    def velocities(self) -> ByName[SpatialMotion]:
-        """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        return self._by_name(
-            "body or marker", self._places(), partial(self._spatial, "velocities", Quantities.velocity)
-        )
-
-    @cached_property
-    def accelerations(self) -> ByName[SpatialMotion]:
-        """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
-        return self._by_name(
-            "body or marker", self._places(), partial(self._spatial, "accelerations", Quantities.acceleration)
-        )
-
-    def _spatial(self, what: str, of: Callable[[Quantities, str], PointMotion], name: str) -> SpatialMotion:
-        import sympy
-
-        from .named_parts import SpatialMotion
-
-        written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
-        return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
-
-    @cached_property
-    def loop_coordinates(self) -> ByName[Any]:
-        """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
-        return self._by_name("coordinate of a cut joint", self.kinematics.loop_coordinates.names, self._loop_coordinate)
-
-    def _loop_coordinate(self, name: str) -> Any:
-        return self._write(f"loop_coordinates.{name}", lambda s: [s.loop_coordinates[name]])[0]
+    # -- how quantities are formed and written -------------------------------------------------------------------------
+    @classmethod
+    def rows(cls) -> Iterator[Quantity]:
+        """The rows of the table."""
+        return (row for row in vars(Readable).values() if isinstance(row, Quantity))
 
     def in_plain_symbols(self) -> Readable:
         """The same quantities in plain symbols; these equations, where they are in no functions of time."""
         return self
+
+    @cached_property
+    def _symbol(self) -> Callable[[str], Any]:
+        """Name -> the SymPy object that stands for it."""
+        import sympy
+
+        return sympy.Symbol  # type: ignore[no-any-return]
+
+    #: Values that are put in for names, one mapping after the other.
+    _put_in: tuple[Mapping[str, Any], ...] = ()
+
+    @cached_property
+    def _named(self) -> dict[str, list[tuple[Any, Any]]]:
+        """Intermediates of what was written, by quantity."""
+        return {}
+
+    @cached_property
+    def _all(self) -> dict[str, WrittenQuantity]:
+        """What was written, by quantity."""
+        return {}
+
+    def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
+        import sympy
+
+        rows: list[Sequence[Expr]] = []
+
+        def flat(quantities: Quantities) -> list[Expr]:
+            rows[:] = choose(quantities)
+            return [x for row in rows for x in row]
+
+        written = self._write(name, flat)
+        return sympy.Matrix(len(rows), columns, written)
+
+    def _by_name(self, what: str, names: Sequence[str], make: Callable[[str], Any]) -> ByName[Any]:
+        from .named_parts import ByName
+
+        return ByName(what, names, make, self._plain)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what gives quantities as they were formed, which are functions here."""
+        return {name: value for name, value in vars(self).items() if name != "_all"}
+
+    def _write(
+        self,
+        name: str,
+        choose: Choose,
+        prefix: str = "",
+        given: ChooseNames | None = None,
+    ) -> list[Any]:
+        """Expressions of the quantities in SymPy; their named parts are kept under the name.
+
+        Each is formed in a copy of its own, so that what is read depends on the model alone.
+        """
+        formed, names = self._form(choose, given)
+        prefix = prefix or f"{name.replace('.', '_')}_"
+        k = self.kinematics
+        of_motion = given is not None
+        written = write(
+            formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters, of_motion
+        )
+        if self._put_in:
+            values = [*written.expressions, *(x for _, x in written.intermediates)]
+            self._require_finite(name, values, f"with {self._told}")
+        self._named[name] = written.intermediates
+        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
+        return written.expressions
+
+    def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
+        """Expressions of the quantities with values put in, and what names in them stand for."""
+        quantities = Quantities(*self.fresh())
+        expressions = list(choose(quantities))
+        names = list(given(quantities)) if given is not None else []
+        expressions += [x for _, x in names]
+        for values in self._put_in:
+            expressions = put_in(expressions, values)
+        count = len(expressions) - len(names)
+        return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
+
+    def as_formed(self, name: str, part: str | None = None) -> WrittenQuantity:
+        """A quantity as it was written and, to compare with, as it was formed; keys are those of :meth:`written`.
+
+        Parts that were written together, such as those of generalized forces, are in the whole.
+        """
+        value, key = getattr(self, name), f"{name}.{part}"
+        if isinstance(value, Mapping) and part is not None:
+            value[part]
+        if key not in self._all and name not in self._all:  # made before this went through pickle
+            return self.again().as_formed(name, part)
+        return self._all[key if key in self._all else name]
+
+    def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
+        """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
+        found = copied(list(expressions)) if self._put_in else list(expressions)
+        for values in self._put_in:
+            found = put_in(found, values)
+        return found
+
+    def numbers_put_in(self) -> dict[str, float | None]:
+        """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
+        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for given in self._put_in for name in given))
+        quantities: list[Any] = [*m.parameters, *m.inputs]
+        declared = {x.name: x.value for x in quantities if x.value is not None}
+        graph = Graph()
+        values = self.with_values([graph.symbol(name) for name in names])
+        return {
+            name: None if symbols_of([x]).difference(declared) else float(evaluate([x], declared)[0])
+            for name, x in zip(names, values, strict=True)
+        }
+
+    @property
+    def _told(self) -> str:
+        """Values that were put in, for messages."""
+        return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._put_in)
+
+    def _require_finite(self, name: str, written: Sequence[Any], where: str) -> None:
+        """Refuse a quantity that divides by zero."""
+        import sympy
+
+        if any(x.has(sympy.zoo, sympy.nan, sympy.oo) for x in written):
+            raise NonFiniteError(
+                f"{name} has no finite value {where}: it divides by zero there, as at a dead centre or where a "
+                "rotation is singular; put in other values, or leave one as a symbol"
+            )
+
+    @cached_property
+    def _rates(self) -> frozenset[str]:
+        v = self.kinematics.velocity_names
+        return frozenset((*v, *map(acceleration_name, v)))
+
+    def _plain(self, name: str) -> str:
+        """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
+        return Undotted(self.kinematics.mechanism.instances).coordinate(name)
+
+    def _read(self, given: Any, what: str = "symbol") -> dict[str, Any]:
+        """Values that a user puts in for names."""
+        allowed = self.kinematics.parameter_names if what == "parameter" else self._known
+        return read_values(given, allowed, what, self._plain)
+
+    def written(self, name: str, part: str | None = None) -> tuple[list[tuple[Any, Any]], Any]:
+        """A quantity with its named parts.
+
+        Parameters
+        ----------
+        name : str
+            An attribute, such as ``"T"`` or ``"poses"``.
+        part : str, optional
+            Of a quantity by name the one wanted, such as ``"rod"``; of ``generalized_forces`` a force element.
+
+        Returns
+        -------
+        intermediates : list of (sympy.Symbol, sympy.Expr)
+            Those that the quantity needs, in an order in which each uses only those before it; empty where it is
+            written out.
+        value : sympy.Expr or sympy.Matrix
+            What the attribute gives.
+
+        Raises
+        ------
+        UsageError
+            No quantity of this name, or no such part.
+
+        Examples
+        --------
+        >>> import eomgen as eg
+        >>> m = eg.Model("mass")
+        >>> slider = m.prismatic("rail", m.ground, m.body("block", mass="m"), coordinate="s")
+        >>> _ = m.parameter("m")
+        >>> m.derive().written("T")
+        ([], m*s_dot**2/2)
+        """
+        from .named_parts import NamedSum
+
+        table = {row.name: row for row in self.rows()}
+        if name not in table:
+            meant = hint(name, tuple(table), quoted=False) or f"there are {', '.join(table)}"
+            raise UnknownNameError(f"{name!r} is no quantity that is written; {meant}")
+        value = getattr(self, name)
+        if table[name].by_name:
+            if part is None:
+                there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
+                raise incomplete(f"{name!r} are written one by one; give the name of one as part: {there}")
+            whole = value[part]
+            return self._named[f"{name}.{part if part in tuple(value) else self._plain(part)}"], whole
+        if part is None:
+            named = self._named[name]  # those of the mass matrix and the force are chosen together
+            return needed(named, value) if name in ("mass_matrix", "force") else named, value
+        if not isinstance(value, NamedSum):
+            raise at_odds(f"{name!r} has no parts; leave {part!r} out")
+        return needed(self._named[name], value[part]), value[part]
+
+    @property
+    def _own(self) -> tuple[str, ...]:
+        """Names of coordinates, their derivatives, parameters and inputs, and the time."""
+        k = self.kinematics
+        rates = (*k.velocity_names, *map(acceleration_name, k.velocity_names))
+        return (*k.names, *rates, *k.parameter_names, *k.input_names, "t")
+
+    @property
+    def _known(self) -> tuple[str, ...]:
+        """Names for which values can be put in."""
+        return (*self._own, *momentum_names(self.kinematics), *self.names_put_in)
+
+    @property
+    def names_put_in(self) -> tuple[str, ...]:
+        """Names that the model does not have and that values put in have brought."""
+        graph = Graph()
+        values = (read_value(graph, name, value) for given in self._put_in for name, value in given.items())
+        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
+
+    def values_put_in(self) -> list[list[tuple[str, Any]]]:
+        """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
+        return [[(name, self._as_given(value)) for name, value in given.items()] for given in self._put_in]
+
+    def _as_given(self, value: Any) -> Any:
+        if isinstance(value, float | int):
+            return value
+        return write([read_value(Graph(), "", value)], self._symbol).expressions[0]
+
+    def symbols_put_in(self, names: Sequence[str]) -> list[Any]:
+        """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
+        graph = Graph()
+        found = [graph.symbol(name) for name in names]
+        for values in self._put_in:
+            found = put_in(found, values)
+        return write(found, self._symbol).expressions

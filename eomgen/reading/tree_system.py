@@ -7,7 +7,7 @@ not.  Long ones stand in names that say what they are: entries of rotations and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..base.operations import operations_with
 from ..graph.core import LEAVES, Expr, reachable, substitute, symbols_of
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.schedule import count
-from .quantities import Quantities, Row, Rows
+from .quantities import Quantities, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead
 SURELY = 1_500  #: operations beyond which nothing that is found equal makes them short
@@ -26,23 +26,15 @@ Named = list[tuple[str, Expr]]
 
 
 class TreeParts(NamedTuple):
-    """M_t (n_v, n_v) and f_t (n_v,) of the tree, C (n_c, n_v) and gamma (n_c,) of the constraints.
+    """All entries of M_t (n_v, n_v), f_t (n_v,), C (n_c, n_v) and gamma (n_c,), and what stands in them.
 
     ``given`` are names and values that stand in them, in order; ``zeros`` the coordinates on which M and f do not
     depend, for which 0 stands in all parts.
     """
 
-    mass_matrix: Rows
-    force: Row
-    constraint_jacobian: Rows
-    gamma: Row
+    flat: list[Expr]
     given: Named
     zeros: tuple[str, ...]
-
-    @property
-    def flat(self) -> list[Expr]:
-        """All entries, matrix by matrix and row by row."""
-        return [*_flat(self.mass_matrix), *self.force, *_flat(self.constraint_jacobian), *self.gamma]
 
 
 class TreeSystem(NamedTuple):
@@ -81,9 +73,7 @@ def is_long(quantities: Quantities) -> bool:
 
 def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
     """The parts; on request with names in them, and at 0 of what they do not depend on, which makes them shorter."""
-    n_v, n_c = len(quantities.kinematics.v), len(quantities.rows)
-    force = [-h for h in quantities.equations.bias]
-    flat = [*_flat(quantities.equations.mass_matrix), *force]
+    flat = [*_flat(quantities.equations.mass_matrix), *(-h for h in quantities.equations.bias)]
     flat += [*_flat(quantities.constraint_jacobian), *quantities.gamma]
     given: Named = []
     zeros: tuple[str, ...] = ()
@@ -93,17 +83,11 @@ def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
         put = {graph.symbol(name): graph.zero for name in zeros}
         names, values = zip(*_motion_names(quantities), strict=True)
         flat, given = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
-    parts = iter(flat)
-    mass, forces, jacobian, gamma = (_rows(parts, m, n) for m in (n_v, n_c) for n in (n_v, 1))
-    return TreeParts(mass, tuple(_flat(forces)), jacobian, tuple(_flat(gamma)), given, zeros)
+    return TreeParts(flat, given, zeros)
 
 
 def _flat(rows: Rows) -> list[Expr]:
     return [x for row in rows for x in row]
-
-
-def _rows(values: Iterator[Expr], rows: int, columns: int) -> Rows:
-    return tuple(tuple(next(values) for _ in range(columns)) for _ in range(rows))
 
 
 def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
