@@ -572,9 +572,9 @@ def difference(found: Difference | None, reason: str) -> Section:
         return Section(title, (Sentence("There is no formula here that the compiled module has too."),))
     rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in found.each.items())
     text = (
-        f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and "
-        f"compared with the "
-        f"module that is generated from the same equations. The largest difference, as a share of the largest entry or "
-        f"term, is {found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
+        f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and compared "
+        "with the module that is generated from the same equations or, where that has no such function, with the "
+        f"expressions of the derivation. The largest difference, as a share of the largest entry or term, is "
+        f"{found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
     )
     return Section(title, (Sentence(text), Table(("formula", "largest difference"), rows)))

@@ -186,6 +186,18 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     )
 
 
+FACTORED = 120  #: operations of an entry up to which it is factored
+
+
+def over_one_denominator(x: Any) -> Any:
+    """An entry as a textbook writes it, factored over one denominator, where that is shorter."""
+    import sympy
+
+    if not 1 < sympy.count_ops(x) <= FACTORED or not x.is_algebraic_expr(*x.free_symbols):
+        return x
+    return min((sympy.factor(x), x), key=lambda form: sympy.count_ops(form) + str(form).count("/"))
+
+
 class _Move(NamedTuple):
     """A direction on the constraints: changes of coordinates and of velocities (n_v)."""
 

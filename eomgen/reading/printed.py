@@ -152,6 +152,12 @@ class PrintedEquations:
         told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
         return [(letter, what) for letter, usual, what in told if letter != usual]
 
+    def told_letters(self) -> Iterator[PrintedSentence]:
+        """A sentence of them."""
+        if told := [(Letter(letter), f" is {what}") for letter, what in self.letters_told]:
+            pieces = [x for k, pair in enumerate(told) for x in ((", ", *pair) if k else pair)]
+            yield PrintedSentence((*pieces, "; the usual letters are names of the model."))
+
     @cached_property
     def mass_matrix(self) -> list[list[Formula]]:
         """M by rows."""
@@ -207,6 +213,72 @@ class PrintedEquations:
     def is_one_equation(self) -> bool:
         """Whether there is one acceleration, for which nothing was put in."""
         return len(self.accelerations) == 1 and isinstance(self.accelerations[0], Name)
+
+    @property
+    def column(self) -> Formula:
+        """v' as it is multiplied by M."""
+        return self.accelerations[0] if self.is_one_equation else MatrixOf(tuple((x,) for x in self.accelerations))
+
+    # -- what a page shows --------------------------------------------------------------------------------------------
+    @cached_property
+    def parts(self) -> PrintedParts | None:
+        """The parts of large equations."""
+        return PrintedParts(self) if self.is_long and self.equations.mobility.n_dof else None
+
+    @property
+    def page_names(self) -> Notation:
+        """How names are printed on a page."""
+        return self.parts.names if self.parts is not None else self.names
+
+    def items(self) -> Iterator[PrintedLine | PrintedRow | PrintedSentence | PrintedGroup]:
+        """The equations of motion, what stands in them, states, and what is left to say."""
+        if self.equations.mobility.n_dof == 0:
+            yield PrintedSentence((f"{STILL.capitalize()}.",))
+        else:
+            yield from self._motion() if self.parts is None else self.parts.items()
+        for told, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
+            if pairs:
+                yield PrintedSentence((told,))
+                yield from (PrintedLine(*pair) for pair in pairs)
+        if self.told:
+            yield PrintedSentence((self.told,))
+
+    def _motion(self) -> Iterator[PrintedLine | PrintedSentence | PrintedGroup]:
+        """M v' = f written out where it fits on a page, else in letters, and their entries."""
+        M, f = MatrixOf(tuple(map(tuple, self.mass_matrix))), MatrixOf(tuple((x,) for x in self.force))
+        if self.is_one_equation and self.fits:
+            factor = M.rows[0][0]
+            yield PrintedLine(
+                self.column if factor == NumberPart("1") else Product((factor, self.column)), self.force[0]
+            )
+        elif len(self.accelerations) > 1 and self.fits:
+            yield PrintedLine(Product((M, self.column)), f)
+        else:
+            mass, _, force = map(Letter, self.letters)
+            yield PrintedLine(Product((mass, self.column)), force)
+            yield from self.told_letters()
+            several = len(self.accelerations) > 1
+            whole = several and self.mass_matrix_fits
+            if whole:
+                yield PrintedLine(mass, M)
+            elif several:
+                zeros = "; entries that are not shown are 0" if self.vanishing else ""
+                yield PrintedSentence((f"The mass matrix is symmetric{zeros}.",))
+            lines = [
+                PrintedLine(Letter(self.label(entry)), entry.formula)
+                for entry in self.entries()
+                if not (whole and entry.letter == self.letters.mass)
+            ]
+            title = PrintedSentence((f"the {len(lines)} entries of M and f",))
+            yield from lines if len(lines) <= FOLDED else [PrintedGroup(title, lines)]
+        if self.named:
+            yield PrintedSentence(("where",))
+            yield from (PrintedLine(Name(name), x) for name, x in self.intermediates)
+
+    def label(self, entry: PrintedEntry) -> str:
+        """LaTeX of the place of an entry."""
+        n = len(self.accelerations)
+        return f"{entry.letter}_{{{(',' if n > 9 else '').join(map(str, entry.place))}}}" if n > 1 else entry.letter
 
     def entries(self) -> Iterator[PrintedEntry]:
         """Entries of M on and below its diagonal that do not vanish, then those of f."""
@@ -298,6 +370,7 @@ def plain(line: str) -> str:
 
 
 SHORT = 14  #: characters of an entry that stands in its matrix
+FOLDED = 12  #: formulas more than which are folded up
 LARGE = 12  #: rows or columns of a matrix that is shown on request
 TITLES = {
     PartMeaning.CONSTANT: "constants",
@@ -385,12 +458,8 @@ class PrintedParts:
     def items(self) -> Iterator[PrintedRow | PrintedSentence | PrintedGroup]:
         """All of it."""
         M, v, f = map(Letter, self.printed.letters)
-        rates = self.printed.accelerations
-        column = rates[0] if self.printed.is_one_equation else MatrixOf(tuple((x,) for x in rates))
-        yield PrintedRow((PrintedLine(Product((M, column)), f),))
-        if told := [(Letter(letter), f" is {what}") for letter, what in self.printed.letters_told]:
-            pieces = [x for k, pair in enumerate(told) for x in ((", ", *pair) if k else pair)]
-            yield PrintedSentence((*pieces, "; the usual letters are names of the model."))
+        yield PrintedRow((PrintedLine(Product((M, self.printed.column)), f),))
+        yield from self.printed.told_letters()
         if self.printed.of_loops:
             yield from self._embedding(M, v, f)
         for matrix in self._matrices:

@@ -34,7 +34,7 @@ from .methods import (
     read_value,
     read_values,
 )
-from .near_state import SymbolicLinearization, linearize, told
+from .near_state import SymbolicLinearization, linearize, over_one_denominator, told
 from .quantities import Quantities, SpatialMotion, needed, require_bodies, write
 from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
@@ -561,6 +561,8 @@ class Readable(ABC):
 
         written = self._write("linearize", choose, "A_")
         self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], told(values))
+        if not self._named["linearize"]:
+            written = [over_one_denominator(x) for x in written]
         (names,), inputs = states, self.kinematics.input_names
         n = len(names)
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 from ..base.latex import SUPERSCRIPTS, read_latex, text_form
 from ..base.notation import Notation
 from ..base.texts import fold, html_text, visible
-from ..printing import given_mathml, latex, mathml, sums_in_lines, text
-from ..printing.formula import DIGITS, ROUNDED, Formula, MatrixOf, Name, is_group, times
-from ..printing.writers import TIGHT, fenced, row, sum_line
+from ..printing import latex, mathml, sums_in_lines, text
+from ..printing.formula import DIGITS, ROUNDED, MatrixOf, times
+from ..printing.writers import TIGHT, row, sum_line
 from .printed import (
+    FOLDED,
     SAMPLED,
     SHORT,
     STILL,
@@ -197,10 +198,7 @@ def letter_text(latex: str) -> str:
 
 def _label(entry: PrintedEntry, n: int) -> str:
     letter = letter_text(entry.letter)
-    if n == 1:
-        return letter
-    comma = "," if n > 9 else ""
-    return f"{letter}_{comma.join(map(str, entry.place))}"
+    return f"{letter}_{(',' if n > 9 else '').join(map(str, entry.place))}" if n > 1 else letter
 
 
 def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:
@@ -295,7 +293,6 @@ def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
 # MathML needs neither a script nor a network: a saved notebook shows the formulas too.
 
 
-FOLDED = 12  #: formulas more than which are folded up
 MOST = 1_000  #: intermediates that are shown
 LEFT = "style='text-align:left'"
 CELL = "style='text-align:left;padding:0.15em 1.2em 0.15em 0'"  #: of tables, on pages that do not space cells
@@ -308,11 +305,24 @@ _FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Terme
 def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations, ROUNDED)
-    if equations.mobility.n_dof == 0:
-        return "".join([f"<p>{STILL.capitalize()}.</p>", *_states(printed)])
-    motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motions(printed), *_intermediates(printed)]
-    told = f"<p {LEFT}>{printed.told}</p>" if printed.told else ""
-    return "".join([*motion, *_states(printed), told])
+    return "".join(_html(item, printed.page_names) for item in printed.items())
+
+
+def _html(item: PrintedLine | PrintedRow | PrintedSentence | PrintedGroup, names: Notation) -> str:
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, names)) for x in sentence.pieces)
+
+    match item:
+        case PrintedLine():
+            return _line(names, item)
+        case PrintedRow():
+            sides = (row(mathml(x.left, names), "<mo>=</mo>", mathml(x.right, names)) for x in item.lines)
+            return _block("<mspace width='2em'></mspace>".join(sides))
+        case PrintedSentence():
+            return f"<p {LEFT}>{words(item)}</p>"
+        case PrintedGroup():
+            lines = "".join(_line(names, line) for line in item.lines[:MOST])
+            return f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"
 
 
 def facts_html(equations: Readable) -> str:
@@ -361,53 +371,10 @@ def _block(inside: str) -> str:
     return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
 
 
-def _motions(printed: PrintedEquations) -> Iterator[str]:
-    def shown(formula: Formula) -> str:
-        return mathml(formula, printed.names)
-
-    rates = [shown(x) for x in printed.accelerations]
-    M, f = printed.mass_matrix, printed.force
-    equals = "<mo>=</mo>"
-    if printed.is_one_equation and printed.fits:
-        factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
-        yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
-        return
-    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
-    right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
-    if len(rates) > 1 and printed.fits:
-        yield _block(row(left, v, equals, right))
-        return
-    mass, _, force = map(given_mathml, printed.letters)
-    yield _block(row(mass, rates[0] if printed.is_one_equation else v, equals, force))
-    if told := ", ".join(f"{_math(given_mathml(letter))} is {what}" for letter, what in printed.letters_told):
-        yield f"<p {LEFT}>{told}; the usual letters are names of the model.</p>"
-    whole = len(rates) > 1 and printed.mass_matrix_fits
-    if whole:
-        yield _block(row(mass, equals, left))
-    elif len(rates) > 1:
-        zeros = "; entries that are not shown are 0" if printed.vanishing else ""
-        yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
-    entries = [
-        _line(printed.names, _html_label(entry, len(rates)), entry.formula)
-        for entry in printed.entries()
-        if not (whole and entry.letter == printed.letters.mass)
-    ]
-    if len(entries) <= FOLDED:
-        yield from entries
-    else:
-        yield f"<details><summary>the {len(entries)} entries of M and f</summary>{''.join(entries)}</details>"
-
-
-def _html_label(entry: PrintedEntry, n: int) -> str:
-    if n == 1:
-        return given_mathml(entry.letter)
-    comma = "," if n > 9 else ""
-    return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
-
-
-def _line(names: Notation, label: str, formula: Formula) -> str:
+def _line(names: Notation, line: PrintedLine) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
-    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(formula, names))]
+    label = mathml(line.left, names)
+    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(line.right, names))]
     if len(lines) == 1:
         return _block(row(label, "<mo>=</mo>", lines[0]))
     cells = [
@@ -418,64 +385,13 @@ def _line(names: Notation, label: str, formula: Formula) -> str:
     return _block(f"<mtable displaystyle='true'>{''.join(cells)}</mtable>")
 
 
-def _intermediates(printed: PrintedEquations) -> Iterator[str]:
-    if printed.intermediates:
-        yield f"<p {LEFT}>where</p>"
-        yield from (_line(printed.names, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
-
-
-def _states(printed: PrintedEquations) -> Iterator[str]:
-    if printed.states:
-        yield f"<p {LEFT}>first-order states</p>"
-        yield from (_line(printed.names, mathml(rate, printed.names), x) for rate, x in printed.states)
-    if printed.sampled:
-        yield f"<p {LEFT}>{SAMPLED}</p>"
-        yield from (_line(printed.names, mathml(state, printed.names), x) for state, x in printed.sampled)
-
-
-def parts_html(parts: PrintedParts) -> Iterator[str]:
-    """Large equations: matrices with letters for their entries, and groups of what these are."""
-
-    def words(sentence: PrintedSentence) -> str:
-        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, parts.names)) for x in sentence.pieces)
-
-    def equation(line: PrintedLine) -> str:
-        return row(mathml(line.left, parts.names), "<mo>=</mo>", mathml(line.right, parts.names))
-
-    for item in parts.items():
-        match item:
-            case PrintedRow():
-                yield _block("<mspace width='2em'></mspace>".join(map(equation, item.lines)))
-            case PrintedSentence():
-                yield f"<p {LEFT}>{words(item)}</p>"
-            case PrintedGroup():
-                lines = "".join(
-                    _line(parts.names, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
-                )
-                yield f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"
-
-
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
 
 
 def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
     printed = PrintedEquations(equations, digits)
-    if equations.mobility.n_dof == 0:
-        lines = [_text(STILL)]
-    elif printed.is_long:
-        lines = [*_latex_parts(PrintedParts(printed))]
-    else:
-        lines = [
-            *_latex_motion(printed),
-            *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
-        ]
-    lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
-    if printed.sampled:
-        lines.append(_text(SAMPLED))
-        lines += [_broken(printed.names, latex(state, printed.names), x) for state, x in printed.sampled]
-    if told := printed.told:
-        lines.append(_text(told))
+    lines = [line for item in printed.items() for line in _latex(item, printed.page_names)]
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
 
@@ -492,37 +408,9 @@ def _text(words: str) -> str:
     return rf"\text{{{words.replace('_', chr(92) + '_')}}}"
 
 
-def _latex_motion(printed: PrintedEquations) -> Iterator[str]:
-    def shown(formula: Formula) -> str:
-        return latex(formula, printed.names)
-
-    rates = [shown(x) for x in printed.accelerations]
-    if printed.is_one_equation and printed.fits:
-        M, f = printed.mass_matrix[0][0], printed.force[0]
-        factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
-        yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
-        return
-    left = shown(MatrixOf(tuple(map(tuple, printed.mass_matrix))))
-    right = shown(MatrixOf(tuple((x,) for x in printed.force)))
-    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
-    if len(rates) > 1 and printed.fits:
-        yield f"{left} {v} = {right}"
-        return
-    mass, _, right = printed.letters
-    yield rf"{mass}\, {rates[0] if printed.is_one_equation else v} = {right}"
-    whole = len(rates) > 1 and printed.mass_matrix_fits
-    if whole:
-        yield f"{mass} = {left}"
-    for entry in printed.entries():
-        if not (whole and entry.letter == mass):
-            comma = "," if len(rates) > 9 else ""
-            label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
-            yield _broken(printed.names, label, entry.formula)
-
-
-def _broken(names: Notation, label: str, formula: Formula) -> str:
+def _broken(names: Notation, line: PrintedLine) -> str:
     """A formula; a long sum in lines of its terms."""
-    lines = sums_in_lines(formula, names)
+    label, lines = latex(line.left, names), sums_in_lines(line.right, names)
     shown = [latex(line, names) for line in lines]
     if len(shown) == 1:
         return f"{label} = {shown[0]}"
@@ -531,21 +419,14 @@ def _broken(names: Notation, label: str, formula: Formula) -> str:
     return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
 
 
-def _latex_parts(parts: PrintedParts) -> Iterator[str]:
-    """Large equations: matrices with letters for their entries, and groups of what these are."""
-
-    def shown(formula: Formula) -> str:
-        return latex(formula, parts.names)
-
-    def words(sentence: PrintedSentence) -> str:
-        return "".join(_text(x) if isinstance(x, str) else shown(x) for x in sentence.pieces)
-
-    for item in parts.items():
-        match item:
-            case PrintedRow():
-                yield r" \qquad ".join(f"{shown(line.left)} = {shown(line.right)}" for line in item.lines)
-            case PrintedSentence():
-                yield words(item)
-            case PrintedGroup():
-                yield words(item.title)
-                yield from (_broken(parts.names, shown(line.left), line.right) for line in item.lines)
+def _latex(item: PrintedLine | PrintedRow | PrintedSentence | PrintedGroup, names: Notation) -> Iterator[str]:
+    match item:
+        case PrintedLine():
+            yield _broken(names, item)
+        case PrintedRow():
+            yield r" \qquad ".join(f"{latex(x.left, names)} = {latex(x.right, names)}" for x in item.lines)
+        case PrintedSentence():
+            yield "".join(_text(x) if isinstance(x, str) else latex(x, names) for x in item.pieces)
+        case PrintedGroup():
+            yield from _latex(item.title, names)
+            yield from (_broken(names, line) for line in item.lines)

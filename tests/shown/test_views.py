@@ -315,6 +315,14 @@ def test_what_is_compiled_is_computed_by_the_equations() -> None:
 # -- near a state: what holds and what is refused ---------------------------------------------------------------------
 
 
+def test_entries_near_a_state_are_those_of_textbooks() -> None:
+    """Of a cart with a rod as pendulum and of a double pendulum, factored over one denominator."""
+    cart = eg.load_example("cart_pendulum").derive().linearize(at={"phi": 0}, equilibrium=True)
+    assert str(cart.A[3, 1]) == "3*g*(m_cart + m_pole)/(h*(4*m_cart + m_pole))"
+    double = eg.load_example("double_pendulum").derive().linearize(at={"theta1": 0, "bend": 0}, equilibrium=True)
+    assert str(double.A[3, 1]) == "-g*(l1*m1 + l1*m2 + l2*m2)/(l1*l2*m1)"
+
+
 def test_a_pendulum_near_a_symbolic_equilibrium() -> None:
     g, l, m, theta = sp.symbols("g l m theta")
     near = pendulum().derive().linearize(at={"tau": m * g * l / 2 * sp.sin(theta)}, equilibrium=True)
