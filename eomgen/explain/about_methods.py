@@ -48,24 +48,43 @@ def steps(author: Author) -> Section | None:
 
 
 def _embedding(author: Author) -> list[Piece]:
-    return [
+    axis = author.plane
+    kept = range(6) if axis is None else [*author.within, 3 + axis]
+
+    def each(letter: str, what: str, columns: bool) -> list[Piece]:
+        pieces: list[Piece] = []
+        for k, body in enumerate(author.mechanism.bodies):
+            at = [6 * k + i for i in kept]
+            pick = partial(_part, at, at if columns else None)
+            pieces += author.quantity(author.of(letter, body.name), what, pick=pick)
+        return pieces
+
+    pieces: list[Piece] = [
         Sentence(
-            "The velocities of all bodies stand below each other in $\\mathbf{v}_b$: for each body "
-            "$\\mathbf{v}$ of its centre of mass, in ground axes, and $\\boldsymbol{\\omega}$ in its own axes. They "
-            "are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + \\mathbf{b}_b$ with the velocity transformation"
+            "Of each body, $\\mathbf{v}$ holds the velocity of its centre of mass, in ground axes, and its angular "
+            f"velocity{' in its own axes' if axis is None else ''}. They are $\\mathbf{{v}} = \\mathbf{{B}} "
+            "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with the velocity transformation of the body"
         ),
-        *author.quantity(r"\mathbf{B}_b", "body_velocity_transformation"),
-        Sentence("The masses and the inertias of the bodies, in the same order, form the block-diagonal matrix"),
-        *author.quantity(r"\mathbf{M}_b", "body_mass_matrix"),
-        Sentence("The mass matrix of the independent accelerations is"),
-        FormulaLine((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
+        *each(r"\mathbf{B}", "body_velocity_transformation", False),
+        Sentence("The mass and the inertia of each body, in the same order, form its mass matrix"),
+        *each(r"\mathbf{M}", "body_mass_matrix", True),
+    ]
+    return [
+        *pieces,
+        Sentence("The mass matrix of the independent accelerations is the sum over all bodies"),
+        FormulaLine((r"\mathbf{M}", r"\sum \mathbf{B}^T \mathbf{M}_b \mathbf{B}")),
         Sentence(
-            "The part of the accelerations $\\dot{\\mathbf{v}}_b$ that holds no $\\ddot{\\mathbf{q}}_i$ and the "
-            "gyroscopic moments of the bodies give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized "
-            "forces of all elements together are $\\mathbf{Q}$:"
+            "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
+            "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "
+            "together $\\mathbf{Q}$:"
         ),
         *_right_side(author),
     ]
+
+
+def _part(rows: list[int], columns: list[int] | None, whole: Any) -> Any:
+    """Some rows and columns of a matrix; all columns by default."""
+    return whole[rows, :] if columns is None else whole[rows, columns]
 
 
 def _right_side(author: Author) -> list[Piece]:

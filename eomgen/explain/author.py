@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import sympy
@@ -10,6 +11,7 @@ import sympy
 from ..base.notation import literal, with_instance
 from ..errors import UnavailableError
 from ..graph.core import Expr
+from ..kinematics.report import plane_axis
 from ..kinematics.topology import acceleration_name
 from ..reading import Quantities, ReadingView
 from ..reading.quantities import Written, needed, write
@@ -69,6 +71,20 @@ class Author:
         self._told: list[tuple[Any, Any]] = []
         names = equations.kinematics.velocity_names
         self._rates = frozenset((*names, *map(acceleration_name, names)))
+
+    @cached_property
+    def plane(self) -> int | None:
+        """The ground axis across which a plane mechanism moves, which is one of the same name of all bodies."""
+        axis = plane_axis(self.equations.kinematics)
+        bodies = [body.name for body in self.mechanism.bodies]
+        if axis is None or any(self.equations.poses[name][axis, axis] != 1 for name in bodies):
+            return None
+        return axis
+
+    @property
+    def within(self) -> list[int]:
+        """The ground axes along which bodies move."""
+        return [k for k in range(3) if k != self.plane]
 
     # -- names --------------------------------------------------------------------------------------------------------
     def of(self, letter: str, name: str) -> str:

@@ -90,11 +90,15 @@ Piece = Sentence | FormulaLine | Table | DrawnPicture | Folded
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it; sections of ``level`` 2 belong to the one of level 1 before."""
+    """A heading and what stands below it; sections of ``level`` 2 belong to the one of level 1 before.
+
+    A page shows what is ``folded``, with what belongs to it, when it is asked to.
+    """
 
     title: str
     pieces: tuple[Piece, ...]
     level: int = 1
+    folded: bool = False
 
 
 # -- sides of formulas -------------------------------------------------------------------------------------------------

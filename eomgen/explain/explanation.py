@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -147,28 +148,32 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     full = level == "full"
     author = Author(equations, full)
     module, reason = _module(author)
-    sections: list[Section | None] = [about.mechanism(author, module)]
-    sections += [about.bodies(author), about.coordinates(author)]
+    sections: list[Section | None] = [about.mechanism(author, module), about.bodies(author), about.coordinates(author)]
+    details: list[Section | None] = []
     if full:
-        sections += about.motion(author)
-        sections.append(about.constraints(author))
-        sections += about.forces(author)
-        sections += [about_methods.energies(author), about_methods.steps(author)]
-    sections += [about_methods.final(author), about.states(author), about.counts(author)]
+        details += [*about.motion(author), about.constraints(author), *about.forces(author)]
+        details += [about_methods.energies(author), about_methods.steps(author)]
+    final = about_methods.final(author)
+    numbers: list[Section | None] = [about.states(author), about.counts(author)]
     if full:
         state, moved = {}, False
         if module is not None:
             x, moved = moving_state(module, author.independent_velocities)
             state = told_state(module, x)
-        sections.append(about.calculation(author, state, reason, moved))
+        numbers.append(about.calculation(author, state, reason, moved))
     found = None if module is None else compare(author, module)
-    sections.append(about.difference(found, reason))
+    sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(found, reason)]
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
     if author.put_in:
         values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
         title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
     kept = [section for section in sections if section is not None]
     return Explanation(title, kept, author.printer, None if found is None else found.largest)
+
+
+def _folded(section: Section | None) -> Section | None:
+    """A section that a page shows when it is asked to."""
+    return replace(section, folded=True) if section is not None and section.level == 1 else section
 
 
 def _module(author: Author) -> tuple[Any, str]:

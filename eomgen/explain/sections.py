@@ -24,7 +24,7 @@ from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentenc
 
 _AXIS = re.compile(r"\{([xyz])\}")  #: stands in sentences and formulas of joints for an axis of the joint
 _UNIT = re.compile(r"\\mathbf\{e\}_\{(\\mathbf\{n\}_[xyz])\}")  #: e along an axis n, which is n itself
-MANY = 8  #: bodies from which their masses are folded
+MANY = 2  #: bodies from which their masses are folded
 
 
 def mechanism(author: Author, module: Any | None) -> Section:
@@ -91,10 +91,12 @@ def bodies(author: Author) -> Section | None:
     m = author.mechanism
     pieces: list[Piece] = []
     if m.bodies:
+        axis, within = author.plane, author.within
+        J = r"\mathbf{J}" if axis is None else "J"
         pieces.append(
             Sentence(
                 "For each body: mass $m$ (kg), centre of mass $\\mathbf{c}$ (m) from the body's origin, and inertia "
-                "$\\mathbf{J}$ (kg m²) about the centre of mass, both in the body's axes."
+                f"${J}$ (kg m²) about the centre of mass, both in the body's axes."
             )
         )
         formulas: list[Piece] = []
@@ -103,9 +105,12 @@ def bodies(author: Author) -> Section | None:
             mass, *rest = map(_as_given, author.write("masses and inertias", properties).expressions)
             formulas.append(FormulaLine((author.of("m", body.name), mass)))
             if any(x != 0 for x in rest[:3]):
-                formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))
+                centre = sympy.Matrix(3, 1, rest[:3])[within, 0]
+                formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), centre)))
             if any(x != 0 for x in rest[3:]):
-                formulas.append(FormulaLine((author.of(r"\mathbf{J}", body.name), sympy.Matrix(3, 3, rest[3:]))))
+                inertia = sympy.Matrix(3, 3, rest[3:])
+                own = ("J", inertia[axis, axis]) if axis is not None else (r"\mathbf{J}", inertia)
+                formulas.append(FormulaLine((author.of(own[0], body.name), own[1])))
         if len(m.bodies) > MANY or not author.full:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
@@ -194,40 +199,38 @@ EXPANDED = 3  #: dependent velocities up to which the determinant is written out
 
 
 def motion(author: Author) -> list[Section]:
-    """Sections of position, velocity, acceleration."""
+    """Sections of position, velocity, acceleration; of a plane mechanism in its plane."""
     bodies = [body.name for body in author.mechanism.bodies]
     if not bodies:
         return []
+    axis = author.plane
+    within = author.within
+    about = [0, 1, 2] if axis is None else [axis]
+    omega, alpha = (r"\boldsymbol{\omega}", r"\boldsymbol{\alpha}") if axis is None else (r"\omega", r"\alpha")
+    plane = ""
+    if axis is not None:
+        along, across = " and ".join(f"${'xyz'[k]}$" for k in within), f"${'xyz'[axis]}$"
+        plane = f" All bodies move in one plane: components along {along} of ground are told, and turns about {across}."
+    place = r"\mathbf{r} + \mathbf{R} \mathbf{u}"
     position: list[Piece] = [
         Sentence(
             "For each body, $\\mathbf{r}$ is the position of its origin in ground axes, and the columns of "
-            "$\\mathbf{R}$ are its axes. A point at $\\mathbf{u}$ of the body is at "
-            "$\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
+            f"$\\mathbf{{R}}$ are its axes. A point at $\\mathbf{{u}}$ of the body is at ${place}$.{plane}"
         )
     ]
-    velocity: list[Piece] = [
-        Sentence(
-            "For each body, in ground axes: its angular velocity $\\boldsymbol{\\omega}$, and the velocity "
-            "$\\mathbf{v}$ of its centre of mass."
-        )
-    ]
-    acceleration: list[Piece] = [
-        Sentence(
-            "The rates of these velocities: angular acceleration $\\boldsymbol{\\alpha}$ and the acceleration "
-            "$\\mathbf{a}$ of the centre of mass."
-        )
-    ]
+    text = f"For each body, in ground axes: angular velocity ${omega}$ and velocity $\\mathbf{{v}}$ of the mass centre."
+    velocity: list[Piece] = [Sentence(text)]
+    text = f"The rates of these velocities: angular acceleration ${alpha}$, and $\\mathbf{{a}}$ of the centre of mass."
+    acceleration: list[Piece] = [Sentence(text)]
     for name in bodies:
-        position += author.quantity(author.of(r"\mathbf{r}", name), "poses", name, lambda pose: pose[:3, 3])
-        position += author.quantity(author.of(r"\mathbf{R}", name), "poses", name, lambda pose: pose[:3, :3])
-        velocity += author.quantity(author.of(r"\boldsymbol{\omega}", name), "velocities", name, lambda v: v.angular)
-        velocity += author.quantity(author.of(r"\mathbf{v}", name), "velocities", name, lambda v: v.center_of_mass)
-        acceleration += author.quantity(
-            author.of(r"\boldsymbol{\alpha}", name), "accelerations", name, lambda a: a.angular
-        )
-        acceleration += author.quantity(
-            author.of(r"\mathbf{a}", name), "accelerations", name, lambda a: a.center_of_mass
-        )
+        position += author.quantity(author.of(r"\mathbf{r}", name), "poses", name, lambda pose: pose[within, 3])
+        position += author.quantity(author.of(r"\mathbf{R}", name), "poses", name, lambda pose: pose[within, within])
+        for pieces, what, turning, moving in (
+            (velocity, "velocities", omega, r"\mathbf{v}"),
+            (acceleration, "accelerations", alpha, r"\mathbf{a}"),
+        ):
+            pieces += author.quantity(author.of(turning, name), what, name, lambda x: x.angular[about, 0])
+            pieces += author.quantity(author.of(moving, name), what, name, lambda x: x.center_of_mass[within, 0])
     return [
         Section("Position of each body", tuple(position)),
         Section("Velocity of each body", tuple(velocity)),
@@ -577,4 +580,6 @@ def difference(found: Difference | None, reason: str) -> Section:
         f"expressions of the derivation. The largest difference, as a share of the largest entry or term, is "
         f"{found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
     )
-    return Section(title, (Sentence(text), Table(("formula", "largest difference"), rows)))
+    return Section(
+        title, (Sentence(text), Folded(f"{len(rows)} formulas", (Table(("formula", "largest difference"), rows),)))
+    )

@@ -141,6 +141,8 @@ thead th{border-bottom:1px solid #666}
 tbody tr+tr td{border-top:1px solid #e4e4e4}
 details{margin:.6em 0;border-left:3px solid #d5d5d5;padding-left:.8em}
 summary{cursor:pointer;color:#24527a}
+.section{margin:0;border:0;padding:0}
+.section>summary>h2{display:inline-block;margin:.3em 0;font-size:1.15em}
 nav{columns:2;font-size:.95em}
 @media print{details{display:block}}
 """
@@ -151,10 +153,16 @@ def write_html(title: str, sections: Sequence[Section], printer: Printer) -> str
     body = [f"<h1>{_html(title)}</h1>"]
     links = [f"<li><a href='#s{k}'>{_html(s.title)}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1]
     body.append(f"<nav><ol>{''.join(links)}</ol></nav>")
+    opened = False
     for k, section in enumerate(sections, 1):
         tag = f"h{section.level + 1}"
-        body.append(f"<{tag} id='s{k}'>{_html(section.title)}</{tag}>")
+        heading = f"<{tag} id='s{k}'>{_html(section.title)}</{tag}>"
+        if section.level == 1:
+            body += ["</details>"] * opened
+            opened = section.folded
+        body.append(f"<details class='section'><summary>{heading}</summary>" if section.folded else heading)
         body += [_html_piece(piece, printer) for piece in section.pieces]
+    body += ["</details>"] * opened
     plain = html_text(title.replace("`", "").replace("$", ""))
     head = (
         "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"

@@ -604,7 +604,7 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     if not m.bare:
         freedoms = [j.joint.allows for j in m.joints]
         spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
-        if _moves_in_a_plane(kinematics) and all(j.joint.role != "loop" for j in m.joints):
+        if plane_axis(kinematics) is not None and all(j.joint.role != "loop" for j in m.joints):
             planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
             planar -= sum(label in c.labels for label in kinematics.coupled)
     return MechanismReport(
@@ -689,16 +689,16 @@ def _touched(kinematics: Kinematics, element: object) -> list[int]:
     return sorted(found)
 
 
-def _moves_in_a_plane(kinematics: Kinematics) -> bool:
-    """Whether every body turns about one ground axis only and moves across it, identically."""
+def plane_axis(kinematics: Kinematics) -> int | None:
+    """The ground axis about which every body turns and across which it moves, identically; else None."""
     graph = kinematics.graph
     turns, slides = [], []
     for k in range(len(kinematics.mechanism.bodies)):
         origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), "")
         turns.append(kinematics.motion.angular_velocity(origin))
         slides.append(kinematics.motion.velocity(origin))
-    for axis in range(3):
+    for axis in range(3 if turns else 0):
         others = [i for i in range(3) if i != axis]
         if all(w[i].is_zero for w in turns for i in others) and all(v[axis].is_zero for v in slides):
-            return bool(kinematics.mechanism.bodies)
-    return False
+            return axis
+    return None

@@ -237,6 +237,28 @@ def test_tex_compiles(tmp_path: Path) -> None:
     assert subprocess.run(words, cwd=tmp_path, capture_output=True, check=False).returncode == 0
 
 
+def test_a_plane_mechanism_is_explained_in_its_plane() -> None:
+    """Of each body three velocities, a mass matrix (3, 3) and one moment of inertia; steps are folded up."""
+    document = explained("four_bar", "embedding")
+    steps, masses = section(document, "Embedding"), section(document, "Bodies")
+    for body in ("crank", "coupler", "rocker"):
+        assert rf"\mathbf{{M}}_{{\mathrm{{{body}}}}} = \begin{{bmatrix}}" in steps
+        assert rf"J_{{\mathrm{{{body}}}}} = " in masses
+    assert "other" not in steps
+    assert r"\omega_{\mathrm{crank}} = \dot{\theta}" in section(document, "Velocity")
+    assert document.html.count("<details class='section'>") == document.html.count("<h2 id") - 5
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.thorough
+def test_a_four_bar_takes_three_screens(tmp_path: Path) -> None:
+    explained("four_bar", "embedding").save(tmp_path / "solution.html")
+    with Browser(tmp_path / "profile", (1920, 1080)) as browser:
+        browser.open((tmp_path / "solution.html").as_uri())
+        browser.wait_for("document.readyState === 'complete' && document.querySelector('h2') !== null")
+        assert browser.evaluate("document.documentElement.scrollHeight") <= 3 * 1080
+
+
 @pytest.mark.needs("chromium")
 @pytest.mark.thorough
 def test_worked_solutions_open_offline(tmp_path: Path) -> None:
@@ -245,6 +267,7 @@ def test_worked_solutions_open_offline(tmp_path: Path) -> None:
         browser.open((tmp_path / "solution.html").as_uri())
         browser.wait_for("document.readyState === 'complete' && document.querySelector('h2') !== null")
         assert browser.evaluate("document.querySelector('img').naturalWidth") > 100
+        browser.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true })")
         assert browser.evaluate(
             "[...document.querySelectorAll('math')].every(m => m.getBoundingClientRect().width > 0)"
         )
