@@ -159,7 +159,7 @@ def compare(author: Author, module: Any) -> Difference:
     each = {row.name for row in equations.rows() if row.by_name}
     others = sorted((key for key in shown if key[0] not in COMPARED), key=str)
     moves = bool(equations.mobility.n_dof)
-    for case in random_cases(module, STATES):
+    for case in random_cases(module, STATES, at_values=True):
         values = state_values(module, case)
         wanted = Wanted(module, case)
         for name, part in sorted(shown, key=str):

@@ -53,7 +53,7 @@ class Case(NamedTuple):
         return self.x[self.n_q :]
 
 
-def random_cases(module: BoundModel, count: int, seed: int = 0) -> list[Case]:
+def random_cases(module: BoundModel, count: int, seed: int = 0, at_values: bool = False) -> list[Case]:
     """States that move, on the constraints.
 
     Parameters
@@ -61,6 +61,8 @@ def random_cases(module: BoundModel, count: int, seed: int = 0) -> list[Case]:
     module : BoundModel
     count : int
     seed : int
+    at_values : bool
+        Whether parameters and inputs have the values of the module, not others near them.
 
     Raises
     ------
@@ -68,18 +70,20 @@ def random_cases(module: BoundModel, count: int, seed: int = 0) -> list[Case]:
         The loops do not close at the declared values either.
     """
     rng = np.random.default_rng(seed)
-    geometric = _geometric(module, rng)
-    found = [draw(module, rng, geometric, k) for k in range(count)]
-    return found
+    geometric = None if at_values else _geometric(module, rng)
+    return [draw(module, rng, geometric, k) for k in range(count)]
 
 
-def draw(module: BoundModel, rng: np.random.Generator, geometric: Array, number: int) -> Case:
+def draw(module: BoundModel, rng: np.random.Generator, geometric: Array | None, number: int) -> Case:
     """One state; parameters that keep the loops closed are tried first, then those that do not touch them."""
     t = float(rng.uniform(0.0, LATEST))
     spread = 1.0 + SPREAD * rng.standard_normal(module.n_p).clip(-2.0, 2.0)
     u = module.u + 0.5 * rng.standard_normal(module.n_u) * (1.0 + np.abs(module.u))
-    kept = np.where(geometric, module.p, module.p * spread)
-    for p, inputs in ((module.p * spread, u), (kept, u), (kept, module.u), (module.p, module.u)):
+    tried = [(module.p, module.u)]
+    if geometric is not None:
+        kept = np.where(geometric, module.p, module.p * spread)
+        tried = [(module.p * spread, u), (kept, u), (kept, module.u), *tried]
+    for p, inputs in tried:
         for _ in range(3):
             x = _state(module, rng, t, p, inputs)
             if x is not None:
