@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .graph import vectors as vec
-from .graph.core import Expr
+from .graph.core import Expr, Graph
 from .graph.vectors import Mat3, Vec3
 from .records import dataclass
 
@@ -21,6 +21,11 @@ class Frame:
         """A frame placed in the axes of this one, in the body."""
         turned = vec.product(self.rotation, inner.rotation)
         return Frame(turned, vec.add(self.position, vec.times(self.rotation, inner.position)))
+
+    @classmethod
+    def identity(cls, graph: Graph) -> Frame:
+        """The axes and the origin of the body itself."""
+        return cls(vec.identity(graph), vec.zero(graph))
 
 
 @dataclass(frozen=True)

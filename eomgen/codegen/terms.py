@@ -15,7 +15,6 @@ from ..equations.tree_equations import TreeEquations
 from ..errors import UsageError
 from ..forces.force import where
 from ..frames import Frame, Marker
-from ..graph import vectors as vec
 from ..graph.core import Expr, reachable, substitute
 from ..kinematics import Kinematics
 from ..kinematics.closing import shortest_gamma, shortest_rows
@@ -401,7 +400,7 @@ def _poses(kinematics: Kinematics) -> Row:
     graph = kinematics.graph
     entries: list[Expr] = []
     for k, body in enumerate(kinematics.mechanism.bodies):
-        origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+        origin = Marker(k, Frame.identity(graph), body.name)
         pose = kinematics.poses.marker(origin)
         for row, x in zip(pose.rotation, pose.position, strict=True):
             entries += [*row, x]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
+from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, substitute
-from ..graph.differentiate import gradient, jvp, vjp
+from ..graph.differentiate import gradient, jvp
 from ..graph.rounding_bounds import vanishing
 from ..graph.schedule import count
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
+from ..kinematics.wrenches import virtual_power
 
 
 def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
@@ -63,34 +63,11 @@ def _velocity(kinematics: Kinematics, k: int) -> Vec3:
 
 def generalized_forces(kinematics: Kinematics) -> list[Expr]:
     """Q of everything whose potential is not differentiated, by virtual power: Q = sum F . d(velocity)/dv."""
-    graph, n = kinematics.graph, len(kinematics.v)
-    velocities: list[Expr] = []
-    weights: list[Expr] = []
-    direct = [graph.zero] * n
-    loop = kinematics.loop_coordinates
+    loads: list[MarkerLoad | CoordinateLoad] = []
     for terms in kinematics.forces:
-        for load in terms.marker_loads if terms.force.by_power else terms.marker_remainder:
-            velocities += kinematics.motion.velocity(load.marker)
-            weights += load.force
-            velocities += kinematics.motion.angular_velocity(load.marker)
-            weights += load.torque
-        for along in terms.coordinate_remainder:
-            if along.coordinate in kinematics.names:
-                j = kinematics.velocity_labels.index(along.coordinate)
-                direct[j] = direct[j] + along.value
-            else:
-                velocities.append(loop.rates[loop.names.index(along.coordinate)])
-                weights.append(along.value)
-    powers = _weighted(velocities, weights, list(kinematics.v))
-    return [a + b + c for a, b, c in zip(direct, powers, _bare_forces(kinematics), strict=True)]
-
-
-def _weighted(velocities: Sequence[Expr], weights: Sequence[Expr], v: Sequence[Expr]) -> list[Expr]:
-    """d(velocities)/dv^T weights, leaving out what is zero."""
-    pairs = [(x, w) for x, w in zip(velocities, weights, strict=True) if not (x.is_zero or w.is_zero)]
-    if not pairs:
-        return [x.graph.zero for x in v]
-    return vjp([x for x, _ in pairs], [w for _, w in pairs], v)
+        loads += terms.marker_loads if terms.force.by_power else terms.marker_remainder
+        loads += terms.coordinate_remainder
+    return [a + b for a, b in zip(virtual_power(kinematics, loads), _bare_forces(kinematics), strict=True)]
 
 
 def _bare_forces(kinematics: Kinematics) -> list[Expr]:

@@ -45,7 +45,7 @@ from ..kinematics.wrenches import (
     kinetic_energy,
     potential_energy,
 )
-from .recursions import composite_mass_matrix
+from .recursions import along_joints, composite_mass_matrix
 from .tree_equations import TreeEquations
 
 
@@ -160,14 +160,7 @@ def _sweep(
         push = vec.add(vec.scale(inertia.mass, linear), vec.times(turning, inertia.moment))
         turn = vec.add(_moment(inertia.inertia, omega, alpha, turning), vec.cross(inertia.moment, linear))
         wrenches.append((vec.sub(turn, applied[k][0]), vec.sub(push, applied[k][1])))
-    result = [-f for f in turn_forces(blocks, coordinate_forces(kinematics))]
-    for k in reversed(range(len(links))):
-        link = links[k]
-        for c, column in enumerate(link.columns):
-            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
-        if link.parent != GROUND:
-            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
-    return tuple(result)
+    return tuple(along_joints(links, wrenches, turn_forces(blocks, coordinate_forces(kinematics))))
 
 
 # -- tree slopes -------------------------------------------------------------------------------------------------------

@@ -16,8 +16,16 @@ from ..graph.differentiate import jacobian, jvp
 from ..graph.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import Units
-from ..kinematics.wrenches import applied_wrenches, drive_inertias
+from ..kinematics.motion import combined
+from ..kinematics.wrenches import (
+    applied_wrenches,
+    coordinate_forces,
+    drive_inertias,
+    kinetic_energy,
+    potential_energy,
+)
 from ..records import dataclass
+from .recursions import along_joints
 from .tree_equations import LinearSystem, TreeEquations, linear_system
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -146,12 +154,7 @@ class FreeBodyCut:
         above = seen_from(self.pose, seen_from(self.holder, first))
         relative = add(sub(seen_from(self.marker, second), above), self.bend)
         six = [*relative[0], *relative[1]]
-        total = []
-        for row, rest in zip(self.rows, self.rest, strict=True):
-            for entry, x in zip(row, six, strict=True):
-                rest = rest + entry * x
-            total.append(rest)
-        return total
+        return [combined(rest, row, six) for row, rest in zip(self.rows, self.rest, strict=True)]
 
     def push(self, balances: list[Wrench], multipliers: Sequence[Expr], accelerations: Sequence[Expr]) -> None:
         """Take the joint's wrench, -W^T multipliers and its loads, off the balances of its two bodies."""
@@ -249,21 +252,13 @@ def free_body_equations(kinematics: Kinematics, method: str, system: LinearSyste
     bodies = FreeBodies(kinematics)
     inverse = _inverse_dynamics(bodies)
     entries = jacobian(inverse, list(kinematics.a))
-    kinetic, potential = graph.zero, graph.zero
-    for k, (link, twist) in enumerate(zip(kinematics.links, kinematics.twists, strict=True)):
-        kinetic = kinetic + 0.5 * dot(twist, link.spatial.times(*twist))
-        pose = kinematics.poses.link(k)
-        centre = vec.add(pose.position, vec.times(pose.rotation, link.com))
-        potential = potential - link.mass * vec.dot(kinematics.mechanism.gravity, centre)
-    for terms in kinematics.forces:
-        potential = potential + (graph.zero if terms.potential is None else terms.potential)
     return TreeEquations(
         method=method,
         mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
         bias=tuple(substitute(inverse, dict.fromkeys(kinematics.a, graph.zero))),
         inverse_dynamics=tuple(inverse),
-        kinetic_energy=kinetic,
-        potential_energy=potential,
+        kinetic_energy=kinetic_energy(kinematics),
+        potential_energy=potential_energy(kinematics),
         system=system,
     )
 
@@ -273,24 +268,13 @@ def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
     kinematics, graph = bodies.kinematics, bodies.graph
     motions: list[Twist] = []
     for link, product in zip(kinematics.links, bodies.products, strict=True):
-        above = motions[link.parent] if link.parent != GROUND else bodies.base
-        motion = add(link.down_twist(above), product)
+        motion = add(link.down_twist(motions[link.parent] if link.parent != GROUND else bodies.base), product)
         for c, column in enumerate(link.columns):
             motion = add(motion, scaled(kinematics.a[link.first + c], column))
         motions.append(motion)
     none: Wrench = vec.zero(graph), vec.zero(graph)
     wrenches = bodies.balances(motions, [none] * len(motions))
-    result = [-f for f in bodies.forces]
-    for name, value in bodies.along_cut.items():
-        row = kinematics.loop_coordinates.jacobian[kinematics.loop_coordinates.names.index(name)]
-        result = [r - entry * value for r, entry in zip(result, row, strict=True)]
-    for k in reversed(range(len(wrenches))):
-        link = kinematics.links[k]
-        for c, column in enumerate(link.columns):
-            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
-        if link.parent != GROUND:
-            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
-    return result
+    return along_joints(kinematics.links, wrenches, coordinate_forces(kinematics))
 
 
 class Unknowns:
@@ -339,12 +323,7 @@ class Forces:
             cut.push(balances, multipliers, accelerations)
             residuals += accelerations[: cut.closing]
         constraints = self.bodies.kinematics.constraints
-        for i in self.rows:
-            total = constraints.gamma[i]
-            for entry, x in zip(constraints.jacobian[i], a, strict=True):
-                total = total + entry * x
-            residuals.append(total)
-        return residuals
+        return residuals + [combined(constraints.gamma[i], constraints.jacobian[i], a) for i in self.rows]
 
     def solve(
         self, residuals: Sequence[Expr], sizes: Sequence[Expr], closing: Sequence[Expr], a: Sequence[Expr]

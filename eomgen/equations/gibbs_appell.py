@@ -9,12 +9,14 @@ of their velocities, S has one reverse gradient, and M is its Hessian: no recurs
 
 from __future__ import annotations
 
+from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, substitute
-from ..graph.differentiate import gradient, jacobian, vjp
+from ..graph.differentiate import gradient, jacobian
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
+from ..kinematics.wrenches import potential_energy, virtual_power
 from .tree_equations import TreeEquations
 
 
@@ -22,7 +24,10 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     """Gibbs-Appell equations of the spanning tree."""
     graph, n = kinematics.graph, len(kinematics.v)
     slopes = gradient(energy_of_acceleration(kinematics), list(kinematics.a))
-    inverse = [s - f for s, f in zip(slopes, _forces(kinematics), strict=True)]
+    loads: list[MarkerLoad | CoordinateLoad] = []
+    for terms in kinematics.forces:
+        loads += [*terms.marker_loads, *terms.coordinate_loads]
+    inverse = [s - f for s, f in zip(slopes, virtual_power(kinematics, loads), strict=True)]
     entries = jacobian(slopes, list(kinematics.a))
     rest = dict.fromkeys(kinematics.a, graph.zero)
     return TreeEquations(
@@ -31,7 +36,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         bias=tuple(substitute(inverse, rest)),
         inverse_dynamics=tuple(inverse),
         kinetic_energy=_kinetic(kinematics),
-        potential_energy=_potential(kinematics),
+        potential_energy=potential_energy(kinematics),
     )
 
 
@@ -57,41 +62,8 @@ def energy_of_acceleration(kinematics: Kinematics) -> Expr:
     return total
 
 
-def _forces(kinematics: Kinematics) -> list[Expr]:
-    """Q of all force elements by virtual power: each load times what moves it, differentiated by v."""
-    moved: list[Expr] = []
-    loads: list[Expr] = []
-    for terms in kinematics.forces:
-        for load in terms.marker_loads:
-            moved += [*kinematics.motion.velocity(load.marker), *kinematics.motion.angular_velocity(load.marker)]
-            loads += [*load.force, *load.torque]
-        for along in terms.coordinate_loads:
-            loads.append(along.value)
-            if along.coordinate in kinematics.velocity_labels:
-                moved.append(kinematics.v[kinematics.velocity_labels.index(along.coordinate)])
-            else:
-                loop = kinematics.loop_coordinates
-                moved.append(loop.rates[loop.names.index(along.coordinate)])
-    pairs = [(x, f) for x, f in zip(moved, loads, strict=True) if not (x.is_zero or f.is_zero)]
-    if not pairs:
-        return [kinematics.graph.zero] * len(kinematics.v)
-    return vjp([x for x, _ in pairs], [f for _, f in pairs], list(kinematics.v))
-
-
 def _kinetic(kinematics: Kinematics) -> Expr:
     total = kinematics.graph.zero
     for link, (omega, centre) in zip(kinematics.links, _velocities(kinematics), strict=True):
         total = total + (link.mass * vec.dot(centre, centre) + vec.dot(omega, vec.times(link.inertia, omega)))
     return 0.5 * total
-
-
-def _potential(kinematics: Kinematics) -> Expr:
-    total = kinematics.graph.zero
-    for k, link in enumerate(kinematics.links):
-        pose = kinematics.poses.link(k)
-        centre = vec.add(pose.position, vec.times(pose.rotation, link.com))
-        total = total - link.mass * vec.dot(kinematics.mechanism.gravity, centre)
-    for terms in kinematics.forces:
-        if terms.potential is not None:
-            total = total + terms.potential
-    return total

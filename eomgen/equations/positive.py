@@ -13,7 +13,6 @@ from ..base.limits.numbers import EPS, LEAST, TINY, WORTH_A_WORD
 from ..describe.mechanism import Mechanism
 from ..errors import EvaluationError, ModelError, PartitionError, Problem
 from ..frames import Frame, Marker
-from ..graph import vectors as vec
 from ..graph.evaluate import compile_evaluator, evaluate
 from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import ConstraintFunctions
@@ -78,7 +77,7 @@ class IdleMotion:
         rates = dict(zip(kinematics.velocity_names, map(float, self.v), strict=True))
         found: list[tuple[str, np.ndarray]] = []
         for k, body in enumerate(kinematics.mechanism.bodies):
-            marker = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+            marker = Marker(k, Frame.identity(graph), body.name)
             rotation = [x for row in motion.rotation(marker) for x in row]
             expressions = kinematics.resolve([*motion.angular_velocity(marker), *rotation])
             moving, still = (np.array(evaluate(expressions, values | part), dtype=float) for part in (rates, {}))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..frames import GROUND
@@ -13,6 +14,23 @@ from ..graph.tensors import add_matrices, rotate, rotate_symmetric, skew, symmet
 from ..graph.vectors import Mat3
 from ..kinematics.tree import Link, SpatialInertia
 from ..records import dataclass
+
+# -- sweeps ------------------------------------------------------------------------------------------------------------
+
+
+def along_joints(
+    links: Sequence[Link], wrenches: list[Wrench], forces: Sequence[Expr], order: Iterable[int] | None = None
+) -> list[Expr]:
+    """What wrenches, summed inwards, are along the motions of the joints, less forces (n,) there."""
+    result = [-f for f in forces]
+    for k in reversed(range(len(links))) if order is None else order:
+        link = links[k]
+        for c, column in enumerate(link.columns):
+            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
+        if link.parent != GROUND:
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
+    return result
+
 
 # -- composite bodies --------------------------------------------------------------------------------------------------
 
@@ -92,11 +110,7 @@ class Articulated:
 
         ``driven`` tells that D holds the inertia of a drive, which resists along the column.
         """
-        turn, push = wrench
-        turn_d, push_d = vec.scale(reciprocal, turn), vec.scale(reciprocal, push)
-        inertia = [[self.inertia[i][j] - turn[i] * turn_d[j] for j in range(3)] for i in range(3)]
-        coupling = [[self.coupling[i][j] - turn[i] * push_d[j] for j in range(3)] for i in range(3)]
-        mass = [[self.mass[i][j] - push[i] * push_d[j] for j in range(3)] for i in range(3)]
+        inertia, coupling, mass = self._with_square(wrench, reciprocal, operator.sub)
         zero = reciprocal.graph.zero
         entries = [*column[0], *column[1]]
         if sum(not x.is_zero for x in entries) == 1 and not driven:  # no force along a free unit column: exactly so
@@ -110,12 +124,17 @@ class Articulated:
 
     def held(self, wrench: Wrench, reciprocal: Expr) -> Articulated:
         """What is felt when a constraint that acts by the wrench holds: I + K K^T / G."""
+        inertia, coupling, mass = self._with_square(wrench, reciprocal, operator.add)
+        return Articulated(symmetric(_matrix(inertia)), _matrix(coupling), symmetric(_matrix(mass)))
+
+    def _with_square(
+        self, wrench: Wrench, reciprocal: Expr, combine: Callable[[Expr, Expr], Expr]
+    ) -> list[list[list[Expr]]]:
+        """The three parts with U U^T / D added or subtracted."""
         turn, push = wrench
         turn_d, push_d = vec.scale(reciprocal, turn), vec.scale(reciprocal, push)
-        inertia = [[self.inertia[i][j] + turn[i] * turn_d[j] for j in range(3)] for i in range(3)]
-        coupling = [[self.coupling[i][j] + turn[i] * push_d[j] for j in range(3)] for i in range(3)]
-        mass = [[self.mass[i][j] + push[i] * push_d[j] for j in range(3)] for i in range(3)]
-        return Articulated(symmetric(_matrix(inertia)), _matrix(coupling), symmetric(_matrix(mass)))
+        parts = ((self.inertia, turn, turn_d), (self.coupling, turn, push_d), (self.mass, push, push_d))
+        return [[[combine(A[i][j], a[i] * b[j]) for j in range(3)] for i in range(3)] for A, a, b in parts]
 
     def lifted(self, link: Link) -> Articulated:
         """In parent link axes about the parent's origin (Featherstone, RBDA, sec. 7.2)."""

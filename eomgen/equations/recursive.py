@@ -14,7 +14,7 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.schedule import count
-from ..graph.spatial import Twist, Wrench, add, dot, scaled
+from ..graph.spatial import Twist, Wrench, add, scaled
 from ..kinematics import Kinematics
 from ..kinematics.link_frames import (
     JointRates,
@@ -35,7 +35,13 @@ from ..kinematics.wrenches import (
     kinetic_energy,
     potential_energy,
 )
-from .recursions import ArticulatedBodies, ConstraintRow, TreeMotion, composite_mass_matrix
+from .recursions import (
+    ArticulatedBodies,
+    ConstraintRow,
+    TreeMotion,
+    along_joints,
+    composite_mass_matrix,
+)
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -108,24 +114,17 @@ def _newton_euler(
     a: Sequence[Expr],
 ) -> tuple[Expr, ...]:
     """M a + h: accelerations outwards, wrenches inwards (Featherstone, RBDA, table 5.1)."""
-    links = kinematics.links
+    links, graph = kinematics.links, kinematics.graph
     motions: list[Twist] = []
     wrenches: list[Wrench] = []
-    for k, link in kinematics.graph.marked(enumerate(links)):
-        above = motions[link.parent] if link.parent != GROUND else _base(kinematics)
-        motion = add(link.down_twist(above), products[k])
+    for k, link in graph.marked(enumerate(links)):
+        motion = add(link.down_twist(motions[link.parent] if link.parent != GROUND else _base(kinematics)), products[k])
         for c, column in enumerate(link.columns):
             motion = add(motion, scaled(a[link.first + c], column))
         motions.append(motion)
         wrenches.append(add(inertias[k].times(*motion), loads[k]))
-    result = [-f for f in coordinate_forces(kinematics)]
-    for k in kinematics.graph.marked(reversed(range(len(links)))):
-        link = links[k]
-        for c, column in enumerate(link.columns):
-            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
-        if link.parent != GROUND:
-            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
-    return tuple(result)
+    inwards = graph.marked(reversed(range(len(links))))
+    return tuple(along_joints(links, wrenches, coordinate_forces(kinematics), inwards))
 
 
 def solve_tree(

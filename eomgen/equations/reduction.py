@@ -15,6 +15,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
+from ..kinematics.motion import dot
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -49,17 +50,17 @@ class VelocityTransformation(NamedTuple):
 
     def project(self, forces: Sequence[Expr]) -> tuple[Expr, ...]:
         """B^T Q: generalized forces of the tree along the independent velocities."""
-        return tuple(_dot(column, forces) for column in zip(*self.matrix, strict=True))
+        return tuple(dot(column, forces) for column in zip(*self.matrix, strict=True))
 
     def mass_matrix(self, mass: Rows) -> Rows:
         """B^T M B."""
         columns = list(zip(*self.matrix, strict=True))
-        weighted = [[_dot(row, column) for row in mass] for column in columns]
-        return tuple(tuple(_dot(column, other) for other in weighted) for column in columns)
+        weighted = [[dot(row, column) for row in mass] for column in columns]
+        return tuple(tuple(dot(column, other) for other in weighted) for column in columns)
 
     def force(self, mass: Rows, right: Sequence[Expr]) -> tuple[Expr, ...]:
         """B^T (Q - M a)."""
-        rest = [-f + _dot(row, self.acceleration_offset) for f, row in zip(right, mass, strict=True)]
+        rest = [-f + dot(row, self.acceleration_offset) for f, row in zip(right, mass, strict=True)]
         return tuple(-x for x in self.project(rest))
 
 
@@ -85,13 +86,6 @@ def transform_velocities(
     ]
     rest = [(graph.zero, graph.zero) if j in unit else (-solved[j][n], -solved[j][n + 1]) for j in range(n)]
     return VelocityTransformation(tuple(matrix), tuple(b for _, b in rest), tuple(c for c, _ in rest))
-
-
-def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
-    total = a[0].graph.zero
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
 
 
 class LoopNames:

@@ -11,6 +11,7 @@ from ..graph.core import Expr, substitute
 from ..graph.differentiate import jacobian
 from ..kinematics import Kinematics
 from ..kinematics.link_frames import Turned
+from ..kinematics.motion import combined
 from ..records import dataclass
 from .recursions import TreeMotion
 
@@ -125,9 +126,9 @@ class TreeEquations:
         same.accelerations, same.pivots = None, ()
         return same
 
-    def take_mass_matrix(self, other: TreeEquations) -> None:
-        """Have the mass matrix of the same system by another method."""
-        self._mass_matrix = other._mass_matrix
+    def take_mass_matrix(self, other: TreeEquations | Callable[[], Rows]) -> None:
+        """Have the mass matrix of the same system by another method, or as a function."""
+        self._mass_matrix = other._mass_matrix if isinstance(other, TreeEquations) else other
 
     @property
     def mass_matrix(self) -> Rows:
@@ -185,20 +186,10 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
                 inverse[i] = inverse[i] + inertia * (slope[i] * acceleration)
         kinetic = kinetic + 0.5 * inertia * (rate * rate)
 
-    return TreeEquations(
-        method=tree.method,
-        mass_matrix=partial(_mass_matrix, tree, slopes),
-        bias=tuple(bias),
-        inverse_dynamics=tuple(inverse),
-        kinetic_energy=kinetic,
-        potential_energy=tree.potential_energy,
-        accelerations=tree.accelerations,
-        pivots=tree.pivots,
-        system=tree.system,
-        canonical=tree.canonical,
-        turned=tree.turned,
-        constrained=tree.constrained,
-    )
+    same = copy(tree)
+    same.take_mass_matrix(partial(_mass_matrix, tree, slopes))
+    same.bias, same.inverse_dynamics, same.kinetic_energy = tuple(bias), tuple(inverse), kinetic
+    return same
 
 
 def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr]]]) -> Rows:
@@ -226,17 +217,11 @@ def take_given(kinematics: Kinematics) -> TreeEquations:
     lower = given.mass_matrix
     mass = tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
     bias = tuple(-f for f in given.forcing)
-    inverse: list[Expr] = []
-    for row, h in zip(mass, bias, strict=True):
-        total = h
-        for entry, a in zip(row, kinematics.a, strict=True):
-            total = total + entry * a
-        inverse.append(total)
     return TreeEquations(
         method=GIVEN,
         mass_matrix=mass,
         bias=bias,
-        inverse_dynamics=tuple(inverse),
+        inverse_dynamics=tuple(combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)),
         kinetic_energy=given.kinetic_energy,
         potential_energy=given.potential_energy,
     )

@@ -72,7 +72,7 @@ def _embedding(author: Author) -> list[Piece]:
     return [
         *pieces,
         Sentence("The mass matrix of the independent accelerations is the sum over all bodies"),
-        FormulaLine((r"\mathbf{M}", r"\sum \mathbf{B}^T \mathbf{M}_b \mathbf{B}")),
+        FormulaLine((r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots")),
         Sentence(
             "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
             "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "

@@ -14,7 +14,6 @@ from ..elements.element_type import ElementType, Entry, table
 from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..frames import Frame, Marker
-from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.pairs import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
 from ..graph.vectors import Vec3
@@ -227,7 +226,7 @@ class ContactGroups(Force):
         graph = view.graph
         bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
         labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
-        frame = Frame(vec.identity(graph), vec.zero(graph))
+        frame = Frame.identity(graph)
         markers = [Marker(body, frame, labels[body]) for body in bodies]
         operands: list[Expr] = []
         for marker in graph.marked(markers):

@@ -259,7 +259,7 @@ def pair_kind(
         places.append(place(x))
         return graph.symbol(f"l{len(places) - 1}")
 
-    frame = Frame(vec.identity(graph), vec.zero(graph))
+    frame = Frame.identity(graph)
     normal = law.normal.mapped(own)
     rigid = [graph.zero if x is None else own(x) for x in law.rigid]
     friction = None if law.friction is None else law.friction.mapped(own)

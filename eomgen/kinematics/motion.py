@@ -55,20 +55,21 @@ def eliminate(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[E
 
 def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     """The product of two rows that are not empty."""
-    return total([x * y for x, y in zip(a, b, strict=True)])
+    return combined(a[0].graph.zero, a, b)
 
 
 def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
     """A value with multiples of others."""
-    return total([base, *(k * x for k, x in zip(factors, values, strict=True))])
+    for k, x in zip(factors, values, strict=True):
+        base = base + k * x
+    return base
 
 
 def total(terms: Sequence[Expr]) -> Expr:
     """The sum of terms, of which there is one at least."""
     found = terms[0]
     for term in terms[1:]:
-        if not term.is_zero:
-            found = found + term
+        found = found + term
     return found
 
 
@@ -396,7 +397,7 @@ class MarkerMotion:
 
     @cached_property
     def _ground(self) -> Marker:
-        return Marker(GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph)), "ground")
+        return Marker(GROUND, Frame.identity(self.graph), "ground")
 
     @cached_property
     def momentum(self) -> Momentum:

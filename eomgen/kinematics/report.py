@@ -198,7 +198,7 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
     bodies = [(k, body) for k, body in enumerate(mechanism.bodies) if body.plane is not None]
     across: list[Expr] = []
     for k, body in bodies:
-        marker = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+        marker = Marker(k, Frame.identity(graph), body.name)
         spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
         across += vec.cross(spin, body.plane or spin)
     symbols = sorted(symbols_of(across))
@@ -694,7 +694,7 @@ def plane_axis(kinematics: Kinematics) -> int | None:
     graph = kinematics.graph
     turns, slides = [], []
     for k in range(len(kinematics.mechanism.bodies)):
-        origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), "")
+        origin = Marker(k, Frame.identity(graph), "")
         turns.append(kinematics.motion.angular_velocity(origin))
         slides.append(kinematics.motion.velocity(origin))
     for axis in range(3 if turns else 0):

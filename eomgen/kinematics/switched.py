@@ -107,7 +107,7 @@ def _closed_or_0(switch: Switched, x: Expr) -> Expr:
 
 def _origin(kinematics: Kinematics, body: int) -> Marker:
     graph = kinematics.graph
-    return Marker(body, Frame(vec.identity(graph), vec.zero(graph)), kinematics.mechanism.bodies[body].name)
+    return Marker(body, Frame.identity(graph), kinematics.mechanism.bodies[body].name)
 
 
 def _load(kinematics: Kinematics, body: int, D: Row6, multiplier: Expr) -> MarkerLoad:

@@ -378,7 +378,7 @@ def place(frame: Frame, marker: Frame) -> Frame:
 def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Expr]) -> tuple[Link, ...]:
     """Links in tree order; ``symbols`` gives the Expr of each tree coordinate by name."""
     graph = mechanism.graph
-    ground = Frame(vec.identity(graph), vec.zero(graph))
+    ground = Frame.identity(graph)
     index = {GROUND: GROUND}
     frames = {GROUND: ground}
     links: list[Link] = []
@@ -474,7 +474,7 @@ class Poses:
     def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
         """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""
         if link == base:
-            own = Frame(vec.identity(self.graph), vec.zero(self.graph))
+            own = Frame.identity(self.graph)
             return own if within is None else place(within, own)
         key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:

@@ -8,15 +8,16 @@ moment about the body's origin).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 from ..describe.mechanism import Body, JointSpec
+from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, substitute
-from ..graph.differentiate import jacobian
+from ..graph.differentiate import jacobian, vjp
 from ..graph.spatial import Twist, Wrench
 from ..graph.tensors import add_matrices, shift_tensor, symmetric
 from ..graph.vectors import Vec3
@@ -61,6 +62,27 @@ def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
                 row = loop.jacobian[loop.names.index(load.coordinate)]
                 total = [f + load.value * entry for f, entry in zip(total, row, strict=True)]
     return total
+
+
+def virtual_power(kinematics: Kinematics, loads: Iterable[MarkerLoad | CoordinateLoad]) -> list[Expr]:
+    """Generalized forces of loads (n_v,): Q = sum F . d(velocity)/dv."""
+    motion, loop = kinematics.motion, kinematics.loop_coordinates
+    total = [kinematics.graph.zero] * len(kinematics.v)
+    pairs: list[tuple[Expr, Expr]] = []
+    for load in loads:
+        if isinstance(load, MarkerLoad):
+            moved = *motion.velocity(load.marker), *motion.angular_velocity(load.marker)
+            pairs += zip(moved, (*load.force, *load.torque), strict=True)
+        elif load.coordinate in kinematics.velocity_labels:
+            j = kinematics.velocity_labels.index(load.coordinate)
+            total[j] = total[j] + load.value
+        else:
+            pairs.append((loop.rates[loop.names.index(load.coordinate)], load.value))
+    pairs = [(x, w) for x, w in pairs if not (x.is_zero or w.is_zero)]
+    if not pairs:
+        return total
+    powers = vjp([x for x, _ in pairs], [w for _, w in pairs], list(kinematics.v))
+    return [a + b for a, b in zip(total, powers, strict=True)]
 
 
 def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
@@ -112,7 +134,7 @@ class _Displaced(Poses):
         return Frame(rotation, vec.add(frame.position, vec.add(shift, vec.cross(turn, arm))))
 
     def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
-        return GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph))
+        return GROUND, Frame.identity(self.graph)
 
 
 class JointWrenches:
@@ -191,18 +213,15 @@ class JointWrenches:
     @cached_property
     def origins(self) -> list[Vec3]:
         """Origins of the bodies, ground axes."""
-        graph = self.kinematics.graph
-        frame = Frame(vec.identity(graph), vec.zero(graph))
+        frame = Frame.identity(self.kinematics.graph)
         return [
             self.kinematics.poses.marker(Marker(k, frame, body.name)).position
             for k, body in enumerate(self.mechanism.bodies)
         ]
 
-    def _at_body(self, body: int, point: Vec3, wrench: Row6, sign: float = 1.0) -> Row6:
+    def _at_body(self, body: int, point: Vec3, wrench: Row6) -> Row6:
         """A wrench about a point, about the origin of a body instead."""
-        force: Vec3 = (wrench[0], wrench[1], wrench[2])
-        moment = vec.add((wrench[3], wrench[4], wrench[5]), vec.cross(vec.sub(point, self.origins[body]), force))
-        return tuple(x if sign > 0 else -x for x in (*force, *moment))
+        return _about(wrench, point, self.origins[body])
 
     @cached_property
     def cut(self) -> list[CutJoint]:
@@ -232,8 +251,9 @@ class JointWrenches:
     def _on_ends(self, spec: JointSpec, gradient: Row6) -> dict[int, Row6]:
         """A wrench on S about S, and its opposite on P, about the origins of the two bodies."""
         point = self.kinematics.poses.marker(spec.successor).position
-        ends = ((spec.successor.body, 1.0), (spec.predecessor.body, -1.0))
-        return {body: self._at_body(body, point, gradient, sign) for body, sign in ends if body != GROUND}
+        first, second = spec.predecessor.body, spec.successor.body
+        found = {body: self._at_body(body, point, gradient) for body in (second, first) if body != GROUND}
+        return {body: tuple(-x for x in six) if body == first else six for body, six in found.items()}
 
     # -- the kernels ----------------------------------------------------------------------------------------------
     @cached_property
@@ -436,7 +456,7 @@ def carried_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) 
     return turned
 
 
-def _about(wrench: list[Expr], start: Vec3, end: Vec3) -> Row6:
+def _about(wrench: Sequence[Expr], start: Vec3, end: Vec3) -> Row6:
     """A wrench about ``start``, about ``end`` instead."""
     force: Vec3 = (wrench[0], wrench[1], wrench[2])
     moment = vec.add((wrench[3], wrench[4], wrench[5]), vec.cross(vec.sub(start, end), force))

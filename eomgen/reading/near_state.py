@@ -17,6 +17,7 @@ from ..graph.core import Expr, substitute, symbols_of
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
 from ..graph.tensors import solve_symmetric
+from ..kinematics.motion import dot
 from ..numeric.ranks import partition
 from .methods import put_in
 from .quantities import Quantities, Row, Rows
@@ -160,7 +161,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     moves = [_move(quantities, column) for column in zip(*Z, strict=True)]
     moves += [_Move({}, column) for column in zip(*quantities.transformation.matrix, strict=True)]
     a = [graph.symbol(f"a({k})") for k in range(len(free))]
-    residual = [f - _dot(row, a) for f, row in zip(quantities.force, quantities.mass_matrix, strict=True)]
+    residual = [f - dot(row, a) for f, row in zip(quantities.force, quantities.mass_matrix, strict=True)]
     changes = [jvp(residual, move.along(kinematics.v)) for move in moves]
     slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
@@ -209,13 +210,6 @@ class _Move(NamedTuple):
         return self.coordinates | dict(zip(v, self.velocities, strict=True))
 
 
-def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
-    total = a[0].graph.zero
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
-
-
 def _displacement_name(quantities: Quantities, k: int) -> str:
     """The coordinate whose rate is velocity k, or ``ball_rx`` for the angular velocity ``ball_wx``."""
     label = quantities.kinematics.velocity_labels[k]
@@ -256,7 +250,7 @@ def _move(quantities: Quantities, column: Row) -> _Move:
     dq = {q: x - rest for q, x, rest in zip(kinematics.q, moved, still, strict=True) if x != rest}
     found = quantities.transformation
     own = [kinematics.v[kinematics.velocity_labels.index(name)] for name in quantities.mobility.independent]
-    v = [_dot(row, own) + b if own else b for row, b in zip(found.matrix, found.offset, strict=True)]
+    v = [dot(row, own) + b if own else b for row, b in zip(found.matrix, found.offset, strict=True)]
     return _Move(dq, tuple(jvp(v, dq)) if dq else (graph.zero,) * len(v))
 
 

@@ -12,7 +12,6 @@ from ..equations.analytical import form_energies
 from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
-from ..forces import CoordinateLoad, MarkerLoad
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, substitute, symbols_of
@@ -21,7 +20,7 @@ from ..graph.schedule import count
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..kinematics.wrenches import potential_energy
+from ..kinematics.wrenches import potential_energy, virtual_power
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -47,9 +46,9 @@ def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
         height = potential_energy(replace(kinematics, forces=()))
         found[GRAVITY if GRAVITY not in names else f"{GRAVITY}_field"] = _downhill(kinematics, height)
     for terms in kinematics.forces:
-        force = _virtual_power(kinematics, terms.marker_loads, terms.coordinate_loads)
+        force = virtual_power(kinematics, (*terms.marker_loads, *terms.coordinate_loads))
         if terms.potential is not None:
-            rest = _virtual_power(kinematics, terms.marker_remainder, terms.coordinate_remainder)
+            rest = virtual_power(kinematics, (*terms.marker_remainder, *terms.coordinate_remainder))
             slope = _downhill(kinematics, terms.potential)
             other = [a + b for a, b in zip(slope, rest, strict=True)]
             force = min(other, force, key=lambda forces: count(forces).total)
@@ -76,31 +75,6 @@ def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
     if kinematics.rates == kinematics.v:
         return slope
     return vjp(list(kinematics.rates), slope, list(kinematics.v))
-
-
-def _virtual_power(
-    kinematics: Kinematics, at_markers: Sequence[MarkerLoad], along: Sequence[CoordinateLoad]
-) -> list[Expr]:
-    """The generalized forces of some loads."""
-    motion, loop = kinematics.motion, kinematics.loop_coordinates
-    total = [kinematics.graph.zero] * len(kinematics.v)
-    moved: list[Expr] = []
-    weights: list[Expr] = []
-    for load in at_markers:
-        moved += [*motion.velocity(load.marker), *motion.angular_velocity(load.marker)]
-        weights += [*load.force, *load.torque]
-    for one in along:
-        if one.coordinate in kinematics.velocity_labels:
-            j = kinematics.velocity_labels.index(one.coordinate)
-            total[j] = total[j] + one.value
-        else:
-            moved.append(loop.rates[loop.names.index(one.coordinate)])
-            weights.append(one.value)
-    pairs = [(x, w) for x, w in zip(moved, weights, strict=True) if not (x.is_zero or w.is_zero)]
-    if not pairs:
-        return total
-    powers = vjp([x for x, _ in pairs], [w for _, w in pairs], list(kinematics.v))
-    return [a + b for a, b in zip(total, powers, strict=True)]
 
 
 def without_forces(kinematics: Kinematics) -> Kinematics:
@@ -481,7 +455,7 @@ class Quantities:
     def markers(self) -> dict[str, Marker]:
         """Bodies by name, at their origins, and named markers as ``rod.tip``."""
         mechanism = self.kinematics.mechanism
-        own = Frame(vec.identity(self.graph), vec.zero(self.graph))
+        own = Frame.identity(self.graph)
         bodies = {body.name: Marker(k, own, body.name) for k, body in enumerate(mechanism.bodies)}
         return bodies | {marker.label: marker for marker in mechanism.named_markers}
 
