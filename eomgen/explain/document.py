@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from ..base.texts import visible
-from ..printing import Formulas, given_mathml, latex, mathml, number, sums_in_lines, text
-from ..printing.formula import ROUNDED, Formula, MatrixOf, SumOf
-from ..printing.writers import sum_line
+from ..printing import Formulas, given_mathml, latex, latex_lines, mathml, mathml_lines, number, text
+from ..printing.formula import ROUNDED, Formula, MatrixOf
 from ..reading.printed import order_of
 from ..records import dataclass
 
@@ -128,23 +127,16 @@ class Printer:
 
     def latex_lines(self, side: Any) -> list[str]:
         """LaTeX of a side; a long sum in parts to be written below each other, each with its sign."""
-        if isinstance(side, str):
-            return [side]
-        return [_plus(k, x, "+ ") + latex(x, self.names) for k, x in enumerate(self._lines(side))]
+        return [side] if isinstance(side, str) else latex_lines(self._tree(side), self.names)
 
     def mathml_lines(self, side: Any) -> list[str]:
         """The same in MathML."""
-        if isinstance(side, str):
-            return [given_mathml(side)]
-        return [sum_line(x, self.names, first=k == 0) for k, x in enumerate(self._lines(side))]
+        return [given_mathml(side)] if isinstance(side, str) else mathml_lines(self._tree(side), self.names)
 
     def is_short(self, formula: FormulaLine) -> bool:
         """Whether all sides go into one line."""
         trees = [self._tree(side) for side in formula.sides if not isinstance(side, str)]
         return all(not isinstance(x, MatrixOf) and len(text(x, self.names)) <= SHORT for x in trees)
-
-    def _lines(self, side: Any) -> list[Formula]:
-        return sums_in_lines(self._tree(side), self.names)
 
     def _tree(self, side: Any) -> Formula:
         if isinstance(side, float | int):
@@ -152,8 +144,3 @@ class Printer:
         if isinstance(side, PutIn):
             return Formulas(self._formula.order, side.numbers, ROUNDED)(side.expression)
         return self._formula(side)
-
-
-def _plus(k: int, line: Formula, sign: str) -> str:
-    """The sign before a line that goes on with a sum."""
-    return sign if k and isinstance(line, SumOf) and not line.terms[0][0] else ""

@@ -6,7 +6,8 @@ from .formula import number as number
 from .writers import PAGE as PAGE
 from .writers import given_mathml as given_mathml
 from .writers import latex as latex
+from .writers import latex_lines as latex_lines
 from .writers import mathml as mathml
-from .writers import sums_in_lines as sums_in_lines
+from .writers import mathml_lines as mathml_lines
 from .writers import text as text
 from .writers import width as width

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cache
 
 from ..base.latex import SUPERSCRIPTS, NotationError, mathml_form, read_latex, text_form
@@ -51,8 +51,8 @@ def _piece(latex: str) -> str:
 # -- the writer --------------------------------------------------------------------------------------------------------
 
 
-class FormulaWriter(ABC):
-    """Writes the parts of a formula, whatever they stand in.
+class FormulaWriter:
+    """Writes the parts of a formula, each kind by the method of ``WRITTEN_BY``.
 
     Parameters
     ----------
@@ -62,37 +62,14 @@ class FormulaWriter(ABC):
 
     minus, plus = " - ", " + "  #: between terms
     negative = "-"  #: before a first term that is subtracted
+    grouped: Callable[[str], str]  #: in parentheses
 
     def __init__(self, names: Notation) -> None:
         self.names = names
 
     def write(self, formula: tree.Formula) -> str:
         """The text of a formula."""
-        match formula:
-            case tree.NumberPart():
-                return self.number(formula)
-            case tree.Name():
-                return self.name(formula.name)
-            case tree.Letter():
-                return self.letter(formula.latex)
-            case tree.Words():
-                return self.words(formula)
-            case tree.SumOf():
-                return self.sum(formula)
-            case tree.Product():
-                return self.product(formula)
-            case tree.Quotient():
-                return self.quotient(formula)
-            case tree.Power():
-                return self.power(formula)
-            case tree.CallOf():
-                return self.call(formula)
-            case tree.Relation():
-                return self.relation(formula)
-            case tree.CasesOf():
-                return self.cases(formula)
-            case tree.MatrixOf():
-                return self.matrix(formula)
+        return str(getattr(self, WRITTEN_BY[type(formula)])(formula))
 
     def sum(self, formula: tree.SumOf) -> str:
         """Terms with their signs."""
@@ -107,53 +84,21 @@ class FormulaWriter(ABC):
         shown = self.write(formula)
         return self.grouped(shown) if tree.is_group(formula) else shown
 
-    @abstractmethod
-    def grouped(self, inside: str) -> str:
-        """In parentheses."""
 
-    @abstractmethod
-    def number(self, part: tree.NumberPart) -> str:
-        """A number."""
-
-    @abstractmethod
-    def name(self, name: str) -> str:
-        """A name."""
-
-    @abstractmethod
-    def letter(self, latex: str) -> str:
-        """A symbol that is given in LaTeX."""
-
-    @abstractmethod
-    def words(self, part: tree.Words) -> str:
-        """What no other part is for."""
-
-    @abstractmethod
-    def product(self, formula: tree.Product) -> str:
-        """Factors side by side."""
-
-    @abstractmethod
-    def quotient(self, formula: tree.Quotient) -> str:
-        """A fraction."""
-
-    @abstractmethod
-    def power(self, formula: tree.Power) -> str:
-        """A power, the exponent of a function after its name."""
-
-    @abstractmethod
-    def call(self, formula: tree.CallOf) -> str:
-        """A function of arguments."""
-
-    @abstractmethod
-    def relation(self, formula: tree.Relation) -> str:
-        """Sides with a sign between them."""
-
-    @abstractmethod
-    def cases(self, formula: tree.CasesOf) -> str:
-        """Values and their conditions."""
-
-    @abstractmethod
-    def matrix(self, formula: tree.MatrixOf) -> str:
-        """Rows of entries."""
+WRITTEN_BY: dict[type, str] = {
+    tree.NumberPart: "number",
+    tree.Name: "name",
+    tree.Letter: "letter",
+    tree.Words: "words",
+    tree.SumOf: "sum",
+    tree.Product: "product",
+    tree.Quotient: "quotient",
+    tree.Power: "power",
+    tree.CallOf: "call",
+    tree.Relation: "relation",
+    tree.CasesOf: "cases",
+    tree.MatrixOf: "matrix",
+}
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
@@ -186,17 +131,16 @@ def fenced(inside: str, left: str = "(", right: str = ")") -> str:
 
 
 class _LatexWriter(FormulaWriter):
-    def grouped(self, inside: str) -> str:
-        return fenced(inside)
+    grouped = staticmethod(fenced)
 
     def number(self, part: tree.NumberPart) -> str:
         return rf"{part.digits} \cdot 10^{{{part.power}}}" if part.power else part.digits
 
-    def name(self, name: str) -> str:
-        return self.names.latex(name)
+    def name(self, part: tree.Name) -> str:
+        return self.names.latex(part.name)
 
-    def letter(self, latex: str) -> str:
-        return latex
+    def letter(self, part: tree.Letter) -> str:
+        return part.latex
 
     def words(self, part: tree.Words) -> str:
         return part.latex
@@ -270,17 +214,16 @@ def text(formula: tree.Formula, names: Notation) -> str:
 
 
 class _TextWriter(FormulaWriter):
-    def grouped(self, inside: str) -> str:
-        return f"({inside})"
+    grouped = staticmethod("({})".format)
 
     def number(self, part: tree.NumberPart) -> str:
         return f"{part.digits}e{part.power}" if part.power else part.digits
 
-    def name(self, name: str) -> str:
-        return self.names.text(name)
+    def name(self, part: tree.Name) -> str:
+        return self.names.text(part.name)
 
-    def letter(self, latex: str) -> str:
-        return text_form(read_latex(latex))
+    def letter(self, part: tree.Letter) -> str:
+        return text_form(read_latex(part.latex))
 
     def words(self, part: tree.Words) -> str:
         return part.text
@@ -360,15 +303,6 @@ def mathml(formula: tree.Formula, names: Notation) -> str:
     return _MathMLWriter(names).write(formula)
 
 
-def sum_line(formula: tree.Formula, names: Notation, first: bool) -> str:
-    """A line of a sum; the sign with which a further line begins is spaced as it is between terms."""
-    shown = mathml(formula, names)
-    if first or not isinstance(formula, tree.SumOf):
-        return shown
-    sign = MINUS_SIGN if formula.terms[0][0] else "+"
-    return f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if formula.terms[0][0] else shown}"
-
-
 def row(*parts: str) -> str:
     """Elements side by side, as one."""
     return f"<mrow>{''.join(parts)}</mrow>"
@@ -390,8 +324,7 @@ def table(rows: list[list[str]], style: str = "") -> str:
 class _MathMLWriter(FormulaWriter):
     minus, plus, negative = MINUS, "<mo>+</mo>", MINUS
 
-    def grouped(self, inside: str) -> str:
-        return mathml_fenced(inside)
+    grouped = staticmethod(mathml_fenced)
 
     def number(self, part: tree.NumberPart) -> str:
         digits = f"<mn>{part.digits}</mn>"
@@ -399,11 +332,11 @@ class _MathMLWriter(FormulaWriter):
             return digits
         return row(digits, f"<mo>·</mo><msup><mn>10</mn><mn>{part.power.replace('-', MINUS_SIGN)}</mn></msup>")
 
-    def name(self, name: str) -> str:
-        return self.names.mathml(name)
+    def name(self, part: tree.Name) -> str:
+        return self.names.mathml(part.name)
 
-    def letter(self, latex: str) -> str:
-        return given_mathml(latex)
+    def letter(self, part: tree.Letter) -> str:
+        return given_mathml(part.latex)
 
     def words(self, part: tree.Words) -> str:
         return f"<mtext>{html_text(part.text)}</mtext>"
@@ -555,6 +488,24 @@ def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE - L
         lines[-1].append((subtracted, term))
         used += size
     return [tree.SumOf(tuple(line)) for line in lines]
+
+
+def latex_lines(formula: tree.Formula, names: Notation) -> list[str]:
+    """LaTeX of a formula; of a long sum in lines, each with its sign."""
+    lines = [latex(x, names) for x in sums_in_lines(formula, names)]
+    return [lines[0], *(x if x.startswith("-") else f"+ {x}" for x in lines[1:])]
+
+
+def mathml_lines(formula: tree.Formula, names: Notation) -> list[str]:
+    """The same in MathML; the sign with which a further line begins is spaced as it is between terms."""
+    first, *others = sums_in_lines(formula, names)
+    found = [mathml(first, names)]
+    for line in others:
+        subtracted = isinstance(line, tree.SumOf) and line.terms[0][0]
+        shown = mathml(line, names)
+        sign = MINUS_SIGN if subtracted else "+"
+        found.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
+    return found
 
 
 def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.Formula]:

@@ -20,7 +20,7 @@ from ..printing.formula import DIGITS
 from ..runtime.argument_checks import unknown
 from ..targets import FORMATS
 from .readable import Readable
-from .writers import COLUMNS, equations_text, latex_lines
+from .writers import COLUMNS, equations_text, latex_formulas
 
 _MATLAB_WORDS = "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
 _MATLAB_WORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
@@ -87,7 +87,7 @@ def write_format(equations: Readable, form: str) -> str:
     if form not in FORMATS:
         raise unknown("format", form, FORMATS)
     if form == "latex":
-        return "\n".join(f"\\[\n{line}\n\\]" for line in latex_lines(equations)) + "\n"
+        return "\n".join(f"\\[\n{line}\n\\]" for line in latex_formulas(equations)) + "\n"
     if form == "text":
         return equations_text(equations, COLUMNS, 1_000_000, DIGITS) + "\n"
     return _Code(equations, LANGUAGES[form], form).file()

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from ..base.latex import SUPERSCRIPTS, read_latex, text_form
 from ..base.notation import Notation
 from ..base.texts import fold, html_text, visible
-from ..printing import latex, mathml, sums_in_lines, text
+from ..printing import latex, latex_lines, mathml, mathml_lines, text
 from ..printing.formula import DIGITS, ROUNDED, MatrixOf, times
-from ..printing.writers import TIGHT, row, sum_line
+from ..printing.writers import TIGHT, row
 from .printed import (
     FOLDED,
     SAMPLED,
@@ -374,7 +374,7 @@ def _block(inside: str) -> str:
 def _line(names: Notation, line: PrintedLine) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
     label = mathml(line.left, names)
-    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(line.right, names))]
+    lines = mathml_lines(line.right, names)
     if len(lines) == 1:
         return _block(row(label, "<mo>=</mo>", lines[0]))
     cells = [
@@ -388,7 +388,7 @@ def _line(names: Notation, line: PrintedLine) -> str:
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
 
 
-def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
+def latex_formulas(equations: Readable, digits: int = DIGITS) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
     printed = PrintedEquations(equations, digits)
     lines = [line for item in printed.items() for line in _latex(item, printed.page_names)]
@@ -398,7 +398,7 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
 
 def equations_latex(equations: Readable) -> str:
     """The same as Jupyter prints it, each formula in a line of its own."""
-    lines = latex_lines(equations, ROUNDED)
+    lines = latex_formulas(equations, ROUNDED)
     if len(lines) == 1:
         return f"$\\displaystyle {lines[0]}$"
     return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
@@ -410,12 +410,10 @@ def _text(words: str) -> str:
 
 def _broken(names: Notation, line: PrintedLine) -> str:
     """A formula; a long sum in lines of its terms."""
-    label, lines = latex(line.left, names), sums_in_lines(line.right, names)
-    shown = [latex(line, names) for line in lines]
-    if len(shown) == 1:
-        return f"{label} = {shown[0]}"
-    others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
-    body = r" \\ & \quad ".join([shown[0], *others])
+    label, lines = latex(line.left, names), latex_lines(line.right, names)
+    if len(lines) == 1:
+        return f"{label} = {lines[0]}"
+    body = r" \\ & \quad ".join(lines)
     return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
 
 
