@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -170,19 +170,8 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
                     sizes[j] = max(sizes[j], sizes[k])
             if safely_positive(pivots, sizes):
                 return []
-    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
-    scales = functions.scales.q
-    independent = [names.index(name) for name in mobility.independent]
     worst: tuple[float, np.ndarray, IdleMotion | None] | None = None
-    for sample in mobility.samples:
-        q = np.array(sample)
-        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
-        if not np.isfinite(M).all():
-            continue
-        try:
-            B = partition(functions.scaled_jacobian(q), r, independent).B if functions.m else np.eye(n)
-        except PartitionError:
-            continue  # rank is lost here, and another configuration will do
+    for q, M, B in _inertia_at_samples(functions, mobility, tree):
         embedded = B.T @ M @ B
         sizes, modes = algebra.eigh(correlated(embedded))
         if sizes[0] > LEAST or (m.negative and np.abs(sizes).min() > LEAST):
@@ -197,7 +186,7 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             idle = None
             if not alone.size:
                 what = "negative inertia" if sizes[0] < -LEAST else "no inertia"
-                idle = IdleMotion(q, motion * scales, what, numbers)
+                idle = IdleMotion(q, motion * functions.scales.q, what, numbers)
             worst = float(sizes[0]), np.abs(motion), idle
     if worst is None:
         raise EvaluationError(
@@ -219,6 +208,26 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
             problems.append(m.problem(path, message, REMEDY, "EG-NO-INERTIA"))
     return problems
+
+
+def _inertia_at_samples(
+    functions: ConstraintFunctions, mobility: Mobility, tree: TreeEquations
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """q, M in the scales of the coordinates, and the motions B that the constraints allow, where these are known."""
+    kinematics, n, scales = functions.kinematics, functions.n, functions.scales.q
+    entries = [x for row in tree.mass_matrix for x in row]
+    mass = compile_evaluator(entries, (*kinematics.names, *functions.values, "t"))
+    independent = [kinematics.velocity_labels.index(name) for name in mobility.independent]
+    for sample in mobility.samples:
+        q, flat = np.array(sample), mass([*sample, *functions.values.values(), 0.0])
+        M = np.array(flat, dtype=float).reshape(n, n) * np.outer(scales, scales)
+        if not np.isfinite(M).all():
+            continue
+        try:
+            B = partition(functions.scaled_jacobian(q), mobility.rank, independent).B if functions.m else np.eye(n)
+        except PartitionError:
+            continue  # rank is lost here, and another configuration will do
+        yield q, M, B
 
 
 # -- digits that rounding leaves ---------------------------------------------------------------------------------------
@@ -256,20 +265,10 @@ def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquatio
     if n == r or m.negative:
         return 1.0
     numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
-    functions = ConstraintFunctions(kinematics, numbers)
-    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
-    scales = functions.scales.q
-    independent = [names.index(name) for name in mobility.independent]
     best = 0.0
-    for sample in mobility.samples:
-        q = np.array(sample)
-        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
-        try:
-            B = partition(functions.scaled_jacobian(q), r, independent).B if functions.m else np.eye(n)
-            root = np.sqrt(np.maximum((B**2 * np.abs(M.diagonal())[:, None]).sum(axis=0), TINY))
-            best = max(best, float(algebra.eigvalsh((B.T @ M @ B) / np.outer(root, root))[0]))
-        except EvaluationError:
-            continue  # rank is lost here, or nothing is finite
+    for _, M, B in _inertia_at_samples(ConstraintFunctions(kinematics, numbers), mobility, tree):
+        root = np.sqrt(np.maximum((B**2 * np.abs(M.diagonal())[:, None]).sum(axis=0), TINY))
+        best = max(best, float(algebra.eigvalsh((B.T @ M @ B) / np.outer(root, root))[0]))
         if best >= WORTH_A_WORD:
             break
     return best

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from ..base.texts import visible
@@ -20,22 +20,17 @@ from ..records import dataclass
 _PARTS = re.compile(r"(\$[^$]+\$|`[^`]+`)")
 
 
-class Span(NamedTuple):
-    """A piece of a text: ``kind`` is 'text', 'name' or 'math'."""
-
-    kind: str
-    text: str
-
-
-def spans(text: str) -> Iterator[Span]:
-    """The pieces of a text."""
+def written(text: str, math: Callable[[str], str], name: Callable[[str], str], plain: Callable[[str], str]) -> str:
+    """A text whose formulas, names and other pieces are written so."""
+    found = ""
     for part in _PARTS.split(visible(text)):
         if part[:1] == "$" and len(part) > 2:
-            yield Span("math", part[1:-1])
+            found += math(part[1:-1])
         elif part[:1] == "`" and len(part) > 2:
-            yield Span("name", part[1:-1])
-        elif part:
-            yield Span("text", part)
+            found += name(part[1:-1])
+        else:
+            found += plain(part)
+    return found
 
 
 class PutIn(NamedTuple):

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ..base.inline_pictures import image_html
 from ..base.texts import html_text
 from ..printing import given_mathml
-from .document import DrawnPicture, Folded, FormulaLine, Piece, Printer, Section, Sentence, Table, spans
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Printer, Section, Sentence, Table, written
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
 
@@ -68,13 +68,7 @@ def escaped(text: str) -> str:
 
 
 def _tex_text(text: str) -> str:
-    found = []
-    for kind, part in spans(text):
-        if kind == "math":
-            found.append(f"${part}$")
-        else:
-            found.append(rf"\texttt{{{escaped(part)}}}" if kind == "name" else escaped(part))
-    return "".join(found)
+    return written(text, "${}$".format, lambda name: rf"\texttt{{{escaped(name)}}}", escaped)
 
 
 def _tex_piece(piece: Piece, printer: Printer, picture: str | None) -> str:
@@ -173,13 +167,9 @@ def write_html(title: str, sections: Sequence[Section], printer: Printer) -> str
 
 
 def _html(text: str) -> str:
-    found = []
-    for kind, part in spans(text):
-        if kind == "math":
-            found.append(f"<math>{given_mathml(part)}</math>")
-        else:
-            found.append(f"<code>{html_text(part)}</code>" if kind == "name" else html_text(part))
-    return "".join(found)
+    return written(
+        text, lambda x: f"<math>{given_mathml(x)}</math>", lambda x: f"<code>{html_text(x)}</code>", html_text
+    )
 
 
 def _html_piece(piece: Piece, printer: Printer) -> str:
@@ -232,13 +222,7 @@ def write_markdown(title: str, sections: Sequence[Section], printer: Printer) ->
 
 
 def _markdown_text(text: str) -> str:
-    found = []
-    for kind, part in spans(text):
-        if kind == "math":
-            found.append(f"${part}$")
-        else:
-            found.append(f"`{part}`" if kind == "name" else _MARKDOWN_SPECIAL.sub(r"\\\1", part))
-    return "".join(found)
+    return written(text, "${}$".format, "`{}`".format, lambda x: _MARKDOWN_SPECIAL.sub(r"\\\1", x))
 
 
 def _markdown_piece(piece: Piece, printer: Printer) -> str:
