@@ -227,8 +227,6 @@ class JoinedAngles:
                 kinds[ka, kb] = x
         for (rest, a, b), kinds in found.items():
             yield from self._sums(rest, a, b, kinds)
-            if a == b:
-                yield from self._squares(rest, a, kinds)
 
     def _pairs(self, monomial: Monomial) -> Iterator[tuple[Monomial, int, int]]:
         above = [f for f in monomial if f[1] > 0]
@@ -256,16 +254,6 @@ class JoinedAngles:
             change = {self._product(rest, (first[0], a), (first[1], b)): -x}
             change = add(change, {self._product(rest, (second[0], a), (second[1], b)): -y})
             yield add(change, multiply(self.of_angle(made, angle), {rest: x}))
-
-    def _squares(self, rest: Monomial, a: Frozen, kinds: dict[tuple[str, str], Number]) -> Iterator[Poly]:
-        """x - x sin^2 = x cos^2, and the like; x sin^2 + y cos^2 = x + (y - x) cos^2."""
-        for kind, other in (("sin", "cos"), ("cos", "sin")):
-            x = kinds.get((kind, kind))
-            if x is None:
-                continue
-            change = {self._product(rest, (kind, a), (kind, a)): -x}
-            change = add(change, {rest: x})
-            yield add(change, {self._product(rest, (other, a), (other, a)): -x})
 
 
 # -- polynomials -------------------------------------------------------------------------------------------------------
