@@ -254,19 +254,6 @@ def with_signs(poly: Poly, atoms: Atoms) -> Poly:
     return poly
 
 
-def factors_with_signs(poly: Poly, atoms: Atoms) -> Poly:
-    """The same of products of factored sums, each by itself."""
-    result: Poly = {}
-    for monomial, x in poly.items():
-        below = [a for a, n in monomial if _is_below(a, n, atoms)]
-        term: Poly = {monomial: x}
-        for atom in below:
-            ((m, y),) = term.items()
-            term = _of_factor(m, y, atom, atoms) or term
-        result = add(result, term)
-    return result
-
-
 def _is_below(atom: int, n: Fraction | int, atoms: Atoms) -> bool:
     return atoms.table[atom].kind == "abs" and n < 0 and n % 2 == 1
 
@@ -286,7 +273,7 @@ def _sign_divided_by(poly: Poly, atom: int, atoms: Atoms) -> Poly:
         while rest < 0 and once is not None and (twice := _quotient(once, divisor)) is not None:  # x^2 is |x|^2
             left, once, rest = twice, _quotient(twice, divisor), rest + 2
         if rest < 0 and once is not None:
-            left, made = once, _sign(outer, rest, atom, atoms, "sum")
+            left, made = once, _sign(outer, rest, atom, atoms)
         else:
             made = {join(outer, ((atom, rest),)): 1}
         if left is not above:
@@ -305,35 +292,11 @@ def _quotient(above: Poly, divisor: Poly) -> Poly | None:
     return multiply(above, {inverse(monomial): ratio(1, x)})
 
 
-def _sign(outer: Monomial, power: Fraction | int, atom: int, atoms: Atoms, kind: str) -> Poly:
-    """outer sign(x) |x|^(power + 1) of the magnitude |x| that is an atom; a sum in it is an atom of the kind."""
+def _sign(outer: Monomial, power: Fraction | int, atom: int, atoms: Atoms) -> Poly:
+    """outer sign(x) |x|^(power + 1) of the magnitude |x| that is an atom."""
     rest = join(outer, ((atom, power + 1),)) if power != -1 else outer
     sign = atoms.id(MADE, atoms.table[atom].what)
-    return {atoms.without_squared_signs(join(rest, ((sign, 1),)), kind): 1}
-
-
-def _of_factor(monomial: Monomial, x: Number, atom: int, atoms: Atoms) -> Poly | None:
-    """A product with the sign of what stands in it as a factor and in a magnitude below; None where none does."""
-    power = dict(monomial)[atom]
-    divisor = dict(atoms.table[atom].what[0])
-    outer = tuple(f for f in monomial if f[0] != atom)
-    if len(divisor) == 1:
-        quotient = _quotient({outer: x}, divisor)
-        return None if quotient is None else multiply(quotient, _sign((), power, atom, atoms, "factor"))
-    for factor, n in outer:
-        kind, what = atoms.table[factor]
-        if kind == "factor" and n >= 1 and (times := _times(dict(what), divisor)) is not None:
-            rest = join(outer, ((factor, -1),))
-            return multiply({ONE: x * times}, _sign(rest, power, atom, atoms, "factor"))
-    return None
-
-
-def _times(a: Poly, b: Poly) -> Number | None:
-    """The number a / b; None where it is none."""
-    if a.keys() != b.keys():
-        return None
-    times = {ratio(a[m], b[m]) for m in a}
-    return times.pop() if len(times) == 1 else None
+    return {atoms.without_squared_signs(join(rest, ((sign, 1),)), "sum"): 1}
 
 
 # -- products as they were formed --------------------------------------------------------------------------------------
@@ -372,14 +335,12 @@ class Literal:
             return scaled(parts[0], -1)
         if kind in ("mul", "absorb"):
             product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
-            product = dict(
+            return dict(
                 self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()
             )
-            return factors_with_signs(product, self.atoms)
         if kind == "div" and parts[1]:
             ((below, x),) = self._one_term(parts[1]).items()
-            quotient = multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
-            return factors_with_signs(quotient, self.atoms)
+            return multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
         if kind == "sqrt" and parts[0] and next(iter(parts[0])) != ONE:
             return {((self.atoms.id("factor", freeze(parts[0])), Fraction(1, 2)),): 1}
         if kind in ("sin", "cos"):
@@ -429,7 +390,7 @@ class Mixed:
 
     def _whole(self, parts: Parts) -> Poly:
         """Both together, with common factors taken out."""
-        return self.factoring.factored(add(factors_with_signs(parts.kept, self.atoms), self.simplified(parts.out)))
+        return self.factoring.factored(add(parts.kept, self.simplified(parts.out)))
 
     def _parts(self, i: int) -> Parts:
         kind, *args = self.expansion.graph.nodes[i]
