@@ -83,9 +83,9 @@ FAULTS = (
         "tests/mechanics/test_lagrangians.py::test_dissipation_brakes[lagrange]",
     ),
     Fault(
-        "articulated-release", "Articulated.released",
-        "turn[i] * push_d[j]",
-        "push[i] * turn_d[j]",
+        "articulated-release", "Articulated._with_square",
+        "(self.coupling, turn, push_d)",
+        "(self.coupling, push, turn_d)",
         "I - U U^T / D: the coupling block of U U^T is transposed",
         "tests/mechanics/test_random_trees.py::test_tree_equals_pinocchio[1-False-recursive]",
         "tests/mechanics/test_random_trees.py::test_tree_equals_pinocchio[2-False-recursive]",
@@ -179,7 +179,7 @@ FAULTS = (
     ),
     Fault(
         "reduction-particular", "VelocityTransformation.force",
-        "-f + _dot(row, self.acceleration_offset)",
+        "-f + dot(row, self.acceleration_offset)",
         "-f",
         "the embedded force shown in SymPy lacks M a_p of loops that turn",
         "tests/mechanics/test_lagrangians.py::test_one_equation_in_the_crank_angle[0.8-embedding]",
