@@ -21,7 +21,7 @@ STEPPERS = (
 CONTACTS = ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
 CYTHON = (
     *("model", "numbers", "batches", "python", "kernel", "calls", "lanes", "steppers"),
-    *("journeys", "integrators", "ensembles"),
+    *("journeys", "called", "integrators", "ensembles"),
 )
 
 #: Headers of the solvers, which models include whose functions are not all straight-line code.

@@ -14,8 +14,9 @@ from ..base.algebra import Array
 from ..errors import EomgenError, MissingDependencyError, UsageError, cannot
 from ..runtime.inputs import Forcing
 from ..runtime.late import eager
-from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
+from ..simulation.compiled import stepper_options
 from ..simulation.events import WAIT, Events
+from ..simulation.integrate import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO
 from ..simulation.simulate import simulate
 from .given_cases import UNASSEMBLED, Cases, assemble_states
 

@@ -104,7 +104,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         long (*callback)(void *, const double *) noexcept nogil
         void *callback_data
         eomgen_function jacobian, meeting
-        int n_q
+        int n_q, n_beside
+        int (*ask)(void *, double, const double *, double *, double *) noexcept nogil
         long differentiations, factorizations
         const eomgen_series *series
         int order, side, expanded, stopped
@@ -112,6 +113,9 @@ cdef extern from "eomgen_steppers.h" nogil:
         const char *name
         int rows_K, rows_F, error_order, squares, expands
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
+        void (*prepare)(eomgen_run *) noexcept nogil
+        void (*begin)(eomgen_run *) noexcept nogil
+        int (*step)(eomgen_run *) noexcept nogil
     const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor
     long eomgen_further(const eomgen_method *, long, const eomgen_series *)
     const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
@@ -175,7 +179,7 @@ include "_ensembles.pxi"
 include "_contacts.pxi"
 
 MAKERS = {
-    "timed": timed, "state": state, "motion": Motion, "stepper": Stepper, "journey": Journey, "integrator": Integrator,
+    "timed": timed, "state": state, "motion": Motion, "stepper": Stepper, "journey": Journey, "called": CalledJourney, "integrator": Integrator,
     "march": march, "solve_contacts": solve_contacts,
 }  # of a Model, whose context they take
 if EOMGEN_OWN_TABLE != NULL:

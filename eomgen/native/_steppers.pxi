@@ -142,8 +142,8 @@ cdef class Stepper:
         cdef Model model = context.model
         cdef const eomgen_model *table = model.table
         cdef const eomgen_kernel *rhs = model.kernel("rhs")
-        cdef int n = rhs.n_in
-        self.method = model.method(method)
+        cdef int n = len(y0)
+        self.method = &CALLED if method == "called" else model.method(method)
         self.context, self.held = context, []
         if isinstance(atol, float):
             self.atol = numbers_of([atol] * n)
@@ -155,7 +155,9 @@ cdef class Stepper:
             self.run.jacobian = model.kernel("jacobian").call
         if "meeting_time" in model.places:
             self.run.meeting = model.kernel("meeting_time").call
-        self.run.n_q = model.n_q
+        self.run.n_q, self.run.n_beside = model.n_q, n - rhs.n_in
+        if method != "called" and n != rhs.n_in:
+            raise ValueError(f"y0 must have shape ({rhs.n_in},)")
         cdef const eomgen_series *series = seen_series(model.series)
         self.run.series = series
         length += eomgen_further(self.method, n, series)
@@ -276,4 +278,5 @@ def march(Context context not None, t, h, x, u=None, out=None, error=ValueError)
 
 
 include "_journeys.pxi"
+include "_called.pxi"
 include "_integrators.pxi"

@@ -1,12 +1,8 @@
-"""Right-hand side, corners of the inputs -> times and states, through the module's own steppers.
-
-The whole loop runs in C, events and inputs included; Python looks in every few milliseconds, for the progress line and
-for an interrupt.
-"""
+"""The module's own steppers: whether a run takes them, its arguments, single steps, classes for SciPy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,31 +17,14 @@ from ..runtime.argument_checks import check_names, fitting, read_plain, read_vec
 from ..runtime.inputs import Forcing
 from ..runtime.late import eager
 from ..runtime.refusals import refuse_rigid
-from .events import Events, warn_of_unknown
-from .integrate import KEPT, Solution
-from .integrate import MESSAGES as WORDS
+from .events import Events
+from .integrate import require_one
 from .run_arguments import IMPLICIT, check_tolerances, declare, longest_step, own_step
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .bound_run import Progress
-
-# -- runs --------------------------------------------------------------------------------------------------------------
-
-# The whole loop runs in C, events and inputs included; Python looks in every few milliseconds, for the progress line
-# and for an interrupt.
-
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
-ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
-STATUS = {ENDED: 0, TERMINAL: 1}  #: SciPy's
-TOO_SMALL = "Required step size is less than spacing between numbers."
-MESSAGES = {
-    ENDED: WORDS[0],
-    TERMINAL: WORDS[1],
-    STOPPED: "The run was interrupted.",
-    RESET_FAILED: "The state after an event cannot be evaluated, or cannot be brought onto the constraints.",
-}
 
 
 def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
@@ -103,76 +82,6 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
     atol = np.empty(n)
     atol[:] = given["atol"]
     return {"rtol": require_one(given["rtol"]), "atol": atol, **limits}
-
-
-def require_one(rtol: Any) -> float:
-    """A relative tolerance as compiled methods take it, or a UsageError."""
-    if not isinstance(rtol, float):
-        raise ill_shaped(f"rtol must be one number for a compiled method, not of shape {rtol.shape}")
-    return rtol
-
-
-def integrate_compiled(
-    module: BoundModel,
-    forcing: Forcing,
-    nodes: Sequence[float],
-    x0: Array,
-    method: str,
-    t_eval: Array | None,
-    dense: bool,
-    options: dict[str, Any],
-    watch: Progress | None,
-    look: Callable[[float, Array, int], None] | None = None,
-    events: Events | None = None,
-) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
-    """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
-
-    Returns
-    -------
-    Solution
-    (status, t, x) or None
-        The last evaluation that failed.
-    exception or None
-        What stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
-    """
-    core: Any = module.core  # one with steppers
-    start, end = nodes[0], nodes[-1]
-    events = events if events is not None and len(events) else None
-    plan = {
-        "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
-        "trail": KEPT if module.layout.rank else 0,
-        "watch": None if watch is None else watch.look,
-        "stall_check": look,
-    }  # fmt: skip
-    steps = require_one(options["rtol"]), options["atol"], options.get("max_step", inf), options.get("first_step", 0.0)
-    journey = core.journey(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
-    status = journey.travel()
-    while status in (WAITING, RESET_FAILED) and events is not None:
-        k = next((k for k, node in enumerate(nodes[1:-1]) if (node - journey.t) * (end - start) >= 0.0), len(nodes) - 2)
-        forcing.enter(nodes[k], nodes[k + 1])  # as the compiled loop has it
-        after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
-        if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
-            break
-        status = journey.jump(after) or journey.travel()
-    if forcing:
-        forcing.enter(start, end)  # who asks for inputs from here on asks for those of the whole run
-    times, states, notes = journey.outcome()
-    if events is not None and journey.raised is None:
-        warn_of_unknown([events.names[i] for i in journey.unknown()])
-    if status == ZENO and events is not None:
-        raise events.crowded(journey.t, journey.resets)
-    t_events, x_events = [], []
-    if events is not None:
-        which = notes[:, 0]
-        t_events = [notes[which == i, 1] for i in range(len(events))]
-        x_events = [np.ascontiguousarray(notes[which == i, 2:].T) for i in range(len(events))]
-    counts = {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations}
-    trail = None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T))
-    solution = Solution(
-        times, states, t_events, x_events, journey.dense() if dense else None, STATUS.get(status, -1),
-        MESSAGES.get(status, TOO_SMALL), counts, (start, journey.t), trail, journey.finite,
-    )  # fmt: skip
-    return solution, journey.failure, journey.raised
 
 
 # -- arguments of plain runs -------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..errors import SimulationError, cannot, no_such
-from ..numeric.roots import find_root
 from ..runtime.inputs import Forcing
 from ..runtime.trajectory import Span, Start
-from .events import UNWATCHED, Events, RunEvent
+from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath
+from .integrate import MESSAGES, TERMINAL, integrate
 from .kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
 from .run_arguments import find_span, ordered_times
 
@@ -62,10 +62,9 @@ def follow_drivers(
     watched = Events(module.layout, events)
     if watched.resets:
         raise cannot(f"{module.name} has no degree of freedom: its drivers move it, and no event can reset its state")
-    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
-    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
+    return simulate_driven(bound, (start, end), initial, forcing, stored, watched, given)
 
 
 def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
@@ -86,7 +85,7 @@ def simulate_driven(
     initial: Start,
     forcing: Forcing,
     t_eval: Array | None,
-    events: Sequence[RunEvent],
+    events: Events,
     given: Mapping[str, Any],
 ) -> KinematicAnalysis:
     """The motion over a span; see :func:`~.simulate.simulate`.
@@ -98,7 +97,7 @@ def simulate_driven(
     span : (float, float)
     t_eval : (n_t,) array, optional
         Within the span, in order.
-    events : sequence of RunEvent
+    events : Events
     given : mapping
         Options meant for an integrator; tolerances and steps have no meaning here.
 
@@ -146,7 +145,7 @@ def simulate_driven(
         s = sense * (t - start)
     run = _DrivenRun(followed, forcing, start, sense)
     t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [followed.end]])))
-    message, status = ("A termination event occurred.", 1) if last is not None else ("The end was reached.", 0)
+    message, status = (MESSAGES[TERMINAL], 1) if last is not None else ("The end was reached.", 0)
     if last is not None:
         kept = s < last
         s, t = s[kept], t[kept]
@@ -158,7 +157,7 @@ def simulate_driven(
         s,
         t_events,
         x_events,
-        {"status": status, "message": message, "span": ends, "event_names": [event.name for event in events]},
+        {"status": status, "message": message, "span": ends, "event_names": list(events.names)},
     )
 
 
@@ -167,38 +166,40 @@ class _DrivenRun:
 
     def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float) -> None:
         self.followed, self.forcing, self.start, self.sense = followed, forcing, start, sense
+        self.known: dict[float, tuple[Array, Array, Array]] = {}
 
-    def state(self, s: float) -> Array:
-        q, v, _ = self.followed.motion(np.array([s]), None)
-        return np.concatenate([q[:, 0], v[:, 0]])
+    def find(self, events: Events, grid: Array) -> tuple[list[Array], list[Array], float | None]:
+        """Times and states of events, and where a terminal one ends the run, with the grid as steps."""
+        if not len(events):
+            return [], [], None
+        module, end = self.followed.driven.module, self.start + self.sense * self.followed.end
+        times, motion = self.start + self.sense * grid, self.followed.motion(grid, None)
+        self.known = dict(zip(times.tolist(), zip(*(part.T for part in motion), strict=True), strict=True))
+        found, _, raised = integrate(
+            module, self.forcing, [self.start, end], self.state(self.start), partial(_Steps, self), np.empty(0), False,
+            {}, events, rates=self.rates,
+        )  # fmt: skip
+        if raised is not None:
+            raise raised
+        last = self.sense * (found.ends[1] - self.start) if found.status == 1 else None
+        return found.t_events, found.x_events, last
 
-    def _value(self, event: RunEvent, s: float) -> float:
-        return event(self.start + self.sense * s, self.state(s))
+    def at(self, t: float) -> tuple[Array, Array, Array]:
+        """Position, velocities and accelerations at a time."""
+        if t in self.known:
+            return self.known[t]
+        q, v, a = self.followed.motion(np.array([self.sense * (t - self.start)]), None)
+        return q[:, 0], v[:, 0], a[:, 0]
 
-    def find(self, events: Sequence[RunEvent], grid: Array) -> tuple[list[Array], list[Array], float | None]:
-        """Times and states of events, and where a terminal one ends the run."""
-        found: list[list[float]] = [[] for _ in events]
-        if events:
-            q, v, _ = self.followed.motion(grid, None)
-            states = np.concatenate([q, v])
-        last: float | None = None
-        for event, places in zip(events, found, strict=True):
-            values = [event(self.start + self.sense * s, x) for s, x in zip(grid, states.T, strict=True)]
-            for k in range(len(grid) - 1):
-                if k and values[k] == 0.0:
-                    continue  # found where the interval before ends
-                up, down = values[k] <= 0.0 <= values[k + 1], values[k] >= 0.0 >= values[k + 1]
-                if (up and event.direction >= 0) or (down and event.direction <= 0):
-                    low, high = float(grid[k]), float(grid[k + 1])
-                    places.append(find_root(partial(self._value, event), low, high, values[k], values[k + 1]))
-            if event.terminal and len(places) >= event.terminal:
-                ends = places[int(event.terminal) - 1]
-                last = ends if last is None else min(last, ends)
-        kept = [np.array([s for s in places if last is None or s <= last]) for places in found]
-        times = [self.start + self.sense * s for s in kept]
-        width = self.followed.driven.layout.n_x
-        states_at = [np.array([self.state(float(s)) for s in places]).reshape(-1, width).T for places in kept]
-        return times, states_at, last
+    def state(self, t: float) -> Array:
+        """x (n_x,)."""
+        return np.concatenate(self.at(t)[:2])
+
+    def rates(self, t: float, x: Array) -> Array:
+        """x' (n_x,)."""
+        q, v, a = self.at(t)
+        space = self.followed.driven.layout.space
+        return np.concatenate([v if space is None else space.rates(q, v), a])
 
     def keep(
         self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
@@ -223,3 +224,21 @@ class _DrivenRun:
             x_events=x_events,
             sample=sample,
         )
+
+
+class _Steps:
+    """Steps along a followed path, with the calls of SciPy's OdeSolver."""
+
+    def __init__(self, run: _DrivenRun, _: Any, t: float, x: Array, end: float) -> None:
+        self.run, self.t_old, self.t, self.y, self.t_bound, self.status = run, t, t, x, end, "running"
+        self.left = iter([at for at in run.known if run.sense * (at - t) > 0.0])
+
+    def step(self) -> None:
+        """To the next point."""
+        self.t_old, self.t = self.t, next(self.left)
+        self.y = self.run.state(self.t)
+        self.status = "finished" if self.t == self.t_bound else "running"
+
+    def dense_output(self) -> Callable[[float], Array]:
+        """The state at a time."""
+        return self.run.state

@@ -12,15 +12,14 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from math import ceil, isfinite, nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from math import ceil, isfinite
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.algebra import Array
 from ..base.limits.constraints import MEASURED
-from ..base.limits.numbers import TINY
-from ..base.limits.runs import AHEAD, CROWD, CROWDED, EARLIEST, INSTANT, MOST_STEPS, TOUCHING, WHOLE
+from ..base.limits.runs import CROWD, EARLIEST, INSTANT, MOST_STEPS, WHOLE
 from ..base.texts import shown
 from ..base.value_rules import as_count
 from ..errors import (
@@ -39,14 +38,14 @@ from ..runtime.argument_checks import as_real, check_names, require_mapping, req
 from ..runtime.inputs import read_text
 from ..runtime.layout import Layout
 from ..runtime.refusals import require_switched
-from ..runtime.tapes import Expression, joined, player
+from ..runtime.tapes import Expression, joined
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.inputs import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
-STOP = 3  #: an integrator stops there and goes on, from another state or the same
+PAUSE = 3  #: the loop stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
 
 
@@ -60,15 +59,15 @@ class RunEvent:
 
     Parameters
     ----------
-    function : callable f(t, x)
-        With SciPy's attributes, unless these are given.
+    function : callable f(t, x), or None
+        The user's, with SciPy's attributes unless these are given; None where the loop itself evaluates it.
     name : str
     terminal : int
         The run ends when it has happened so often; 0: never.
     direction : {1, -1, 0}
         Rising, falling, both; or UNWATCHED.
-    action : {GO_ON, RESET, WAIT, STOP}
-        Whether the model's kernel gives a new state, or an impact does; STOP in Python's own loops.
+    action : {GO_ON, RESET, WAIT}
+        Whether the model's kernel gives a new state, or an impact does.
     """
 
     def __init__(
@@ -79,52 +78,33 @@ class RunEvent:
         direction: float | None = None,
         action: int = GO_ON,
     ) -> None:
-        if not callable(function):
-            raise ill_typed(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
-        require_time_and_state("an event", function)
+        if function is not None:
+            if not callable(function):
+                raise ill_typed(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
+            require_time_and_state("an event", function)
         self.function, self.action = function, action
         self.name = name or str(getattr(function, "__name__", type(function).__name__))
         self.terminal = _times(self.name, getattr(function, "terminal", None) if terminal is None else terminal)
         given = getattr(function, "direction", 0) if direction is None else direction
         self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
-        self.left: tuple[float, float] | None = None  #: time of the last reset, and the side of zero it led to
-        self.known = False  #: whether it has had a value other than NaN
-        self.source: tuple[Together, int] | None = None  #: what gives the values of several events, and its place there
-        self.users = False  #: whether the function is the user's, who must give a number wherever the run comes
 
     def __call__(self, t: float, x: Array, for_slope: bool = False) -> float:
-        """The value at time t and state x; right after a reset, one on the side to which it led.
+        """The value of the user's function at time t and state x.
 
         Raises
         ------
         UsageError
-            The user's function gives no number, or one that is not finite, unless it is ``for_slope``: off the path.
+            It is no number, or one that is not finite, unless it is ``for_slope``: off the path.
         """
-        value = self.function(t, x.copy())  # a function may change what it is given
-        found: Any = as_real(value) if self.users else value
-        if self.users and (found is None or found.ndim or not (for_slope or isfinite(found))):
+        value = self.function(t, x)
+        found: Any = as_real(value)
+        if found is None or found.ndim or not (for_slope or isfinite(found)):
             text = shown(value if found is None or found.ndim else float(found))
             raise no_number(
                 f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
             )
-        return self.seen_value(t, float(found))
-
-    def seen_value(self, t: float, value: float) -> float:
-        """The same where the function's value is known."""
-        if not isfinite(value):
-            return nan
-        self.known = True
-        if self.left is not None and abs(t - self.left[0]) <= instant(t):
-            return self.left[1] * max(abs(value), TINY)
-        return value
-
-
-class Together(NamedTuple):
-    """Values of several events, which cost little more than that of one."""
-
-    values: Callable[[float, Array], Sequence[float] | Array]  #: (t, x) -> all of them
-    columns: Callable[[Array, Array], Array] | None = None  #: k times and states (n_x, k) -> (n, k), if that is cheaper
+        return float(found)
 
 
 class Events:
@@ -155,7 +135,6 @@ class Events:
                 self.formulas.append(_of_text(layout, one, name))
             else:
                 self.functions.append(RunEvent(one, name or ""))
-                self.functions[-1].users = True
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
         taken: dict[str, int] = {}
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
@@ -176,12 +155,16 @@ class Events:
         """Whether an event changes the state."""
         return any(event.action != GO_ON for event in self.model)
 
+    @property
+    def every(self) -> list[RunEvent]:
+        """In the order of their names."""
+        return [*self.model, *(event for event, _ in self.formulas), *self.functions]
+
     def encode(self) -> dict[str, Any] | None:
         """As the compiled loop takes them; None if there are none."""
         if not self.names:
             return None
-        every = [*self.model, *(event for event, _ in self.formulas), *self.functions]
-        texts = [formula for _, formula in self.formulas]
+        every, texts = self.every, [formula for _, formula in self.formulas]
         return {
             "model": len(self.model),
             "tape": joined(text.tape for text in texts) if texts else None,
@@ -192,24 +175,6 @@ class Events:
             "crowd": crowd_of([event.action for event in every]),
             "resets": self.layout.metadata.get("resets", []) if self.model else [],
         }
-
-    def listed(self, module: BoundModel, forcing: Forcing) -> list[RunEvent]:
-        """The same as functions f(t, x), for SciPy's methods."""
-        kernel = module.kernels.timed("events", nan=True) if self.model else None
-        found: list[RunEvent] = []
-        every = _of_kernel(kernel, forcing)
-        for i, event in enumerate(self.model):
-            function = _unwatched if event.direction == UNWATCHED else _value_of(kernel, forcing, i)
-            found.append(RunEvent(function, self.names[i], event.terminal, event.direction, event.action))
-            found[-1].source = None if event.direction == UNWATCHED else (every, i)
-        p = module.p
-        texts = None
-        if len(self.formulas) > 1:
-            texts = Together(player(joined(formula.tape for _, formula in self.formulas), p))
-        for i, (event, formula) in enumerate(self.formulas):
-            found.append(RunEvent(formula.function(p), event.name, event.terminal, event.direction))
-            found[-1].source = None if texts is None else (texts, i)
-        return [*found, *self.functions]
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
         """The state after the events that happened at time t."""
@@ -271,24 +236,14 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Ex
     direction = options.get("direction") or 0
     if direction not in (-1, 0, 1):
         raise no_choice(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
-    event = RunEvent(_only_in_c, name or text, options.get("terminal"), direction)
+    event = RunEvent(None, name or text, options.get("terminal"), direction)
     return event, read_text(layout, text, f"event {name or text!r}")
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
     action = RESET if event.get("resets") else WAIT if event.get("restitution") is not None else GO_ON
     direction = int(event.get("direction") or 0) if chosen or action != GO_ON else UNWATCHED
-    return RunEvent(_only_in_c, str(event["name"]), int(event.get("terminal") or 0), direction, action)
-
-
-def _only_in_c(t: float, x: Array) -> float:
-    """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
-    raise cannot("an event given by name or text has values only in a run; give a function f(t, x) instead")
-
-
-def _unwatched(t: float, x: Array) -> float:
-    """In place of the value of an event that is not watched: SciPy's methods find no zero in it."""
-    return nan
+    return RunEvent(None, str(event["name"]), int(event.get("terminal") or 0), direction, action)
 
 
 def _times(name: str, given: Any) -> int:
@@ -329,145 +284,6 @@ def warn_of_unknown(names: Sequence[str]) -> None:
             "nothing was found; look for a logarithm, root or quotient outside its domain",
             stacklevel=calls_within() + 1,
         )
-
-
-def _of_kernel(kernel: Any, forcing: Forcing) -> Together:
-    """The kernel of the model's events, which gives all of them, at one time or at several."""
-    if not forcing:
-        return Together(kernel, kernel)
-
-    def columns(t: Array, x: Array) -> Array:
-        u = np.stack([forcing(at, state) for at, state in zip(t.tolist(), x.T, strict=True)], axis=1)
-        return np.asarray(kernel(t, x, u=u))
-
-    return Together(lambda t, x: kernel(t, x, u=forcing(t, x)), columns)
-
-
-def _value_of(kernel: Any, forcing: Forcing, i: int) -> Callable[[float, Array], float]:
-    if forcing:
-        return lambda t, x: float(kernel(t, x, u=forcing(t, x))[i])
-    return lambda t, x: float(kernel(t, x)[i])
-
-
-# -- values of events --------------------------------------------------------------------------------------------------
-
-
-AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call
-
-
-class EventValues:
-    """Values of events, at one state or each at its own.
-
-    Parameters
-    ----------
-    events : sequence of RunEvent
-    """
-
-    def __init__(self, events: Sequence[RunEvent]) -> None:
-        self.events = events
-        self.together: dict[int, tuple[Together, list[int]]] = {}  #: what gives several values, and of which events
-        self.alone: list[int] = []
-        for i, event in enumerate(events):
-            if event.source is None:
-                self.alone.append(i)
-            else:
-                self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
-
-    def __call__(self, t: float, x: Array, for_slope: bool = False) -> Array:
-        """The values (n,) of all events at a time and state; ``for_slope``: for a difference quotient, off the path."""
-        g = np.empty(len(self.events))
-        for i in self.alone:
-            g[i] = self.events[i](t, x, for_slope)
-        for together, places in self.together.values():
-            values = together.values(t, x)
-            for i in places:
-                event = self.events[i]
-                g[i] = event.seen_value(t, float(values[event.source[1]]))  # type: ignore[index]
-        return g
-
-    def each(self, asked: Sequence[int], times: Array, states: Array) -> list[float]:
-        """The value of event asked[k] at times[k] and states[k], for every k."""
-        values: dict[int, float] = {}
-        for together, places in self.together.values():
-            if together.columns is None or len(asked) < 2:
-                continue
-            watched = set(places)
-            mine = [k for k, i in enumerate(asked) if i in watched]
-            size = max(AT_ONCE // len(places), 1)
-            for part in (mine[n : n + size] for n in range(0, len(mine), size)):
-                table = together.columns(times[part], np.ascontiguousarray(states[part].T))
-                for column, k in enumerate(part):
-                    event = self.events[asked[k]]
-                    values[k] = event.seen_value(float(times[k]), float(table[event.source[1], column]))  # type: ignore[index]
-        return [values[k] if k in values else self.events[i](float(times[k]), states[k]) for k, i in enumerate(asked)]
-
-
-# -- resets ------------------------------------------------------------------------------------------------------------
-
-
-class Resets:
-    """What an integrator that starts anew at each reset has to remember.
-
-    Parameters
-    ----------
-    events : sequence of RunEvent
-    rhs : callable
-        (t, x) -> x'.
-    start, end : float
-        Of the run (s).
-    """
-
-    def __init__(
-        self, events: Sequence[RunEvent], rhs: Callable[[float, Array], Array], start: float, end: float
-    ) -> None:
-        self.events, self.rhs, self.span = events, rhs, end - start
-        self.count, self.crowded, self.last = 0, 0, np.inf
-        self.most = crowd_of([event.action for event in events])
-
-    def note(self, t: float, before: Array, after: Array, fired: Sequence[int]) -> None:
-        """Take note of events that happened at time t and led from one state to another.
-
-        Raises
-        ------
-        ZenoError
-            Resets follow each other ever faster, or lead nowhere.
-        """
-        self.count += 1
-        self.crowded = self.crowded + 1 if abs(t - self.last) < CROWDED * abs(self.span) else 0
-        self.last = t
-        for e in fired:
-            event = self.events[e]
-            came, goes = (self.rate(event, t, state) for state in (before, after))
-            stuck = not abs(goes) > TOUCHING * abs(came) or (event.action == WAIT and goes < 0.0)
-            stuck = stuck and abs(event(t, after)) <= TOUCHING * abs(came * self.span)  # not where its value jumped
-            again = event.direction * came < 0.0  # the zero it just left
-            if event.action in (RESET, WAIT) and (stuck or again):
-                self.crowded = self.most
-            event.left = (t, self.side(event, t, after))
-        if self.crowded >= self.most:
-            raise self.endless()
-
-    def endless(self) -> ZenoError:
-        """The error for resets that never end."""
-        return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action != GO_ON])
-
-    def rate(self, event: RunEvent, t: float, x: Array) -> float:
-        """How fast an event's value changes along the motion, in the direction of the run."""
-        h = AHEAD * self.span
-        event.left = None
-        return float((event(t + h, x + h * np.asarray(self.rhs(t, x)), for_slope=True) - event(t, x)) / abs(h))
-
-    def side(self, event: RunEvent, t: float, x: Array) -> float:
-        """The side of zero, 1 or -1, to which the value of an event goes that is zero now; 0 where it stays.
-
-        Its rate tells; where it has none, as that of a body at rest, the value after a midpoint step of the run.
-        """
-        rate = self.rate(event, t, x)
-        if rate != 0.0:
-            return float(np.sign(rate))
-        h = AHEAD**0.5 * self.span
-        middle = x + 0.5 * h * np.asarray(self.rhs(t, x))
-        return float(np.sign(event(t + h, x + h * np.asarray(self.rhs(t + 0.5 * h, middle)), for_slope=True)))
 
 
 # -- clocks of sampled states ------------------------------------------------------------------------------------------

@@ -17,9 +17,9 @@ from ..runtime.inputs import Forcing
 from ..runtime.late import eager
 from ..runtime.refusals import refuse_moreau, refuse_rigid
 from .bound_run import Crawling, Run, StallCheck
-from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
+from .compiled import can_run, stepper_options
 from .events import Events
-from .integrate import choose_solver
+from .integrate import RESET_FAILED, TOO_SMALL, choose_solver
 from .run_arguments import check_method, check_tolerances, declare, own_step
 from .simulate import simulate
 

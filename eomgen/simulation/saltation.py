@@ -32,7 +32,7 @@ from ..errors import NoDerivativeError, cannot
 from ..numeric.projection import minimum_norm
 from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
 from ..runtime.inputs import Forcing
-from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
+from .events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
 from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, assembly_rows, keep_consistent
 
 if TYPE_CHECKING:
@@ -321,73 +321,65 @@ class Saltation:
                 "expression as a text"
             )
         self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
-        self.module, self.n = run.module, run.module.n_x
-        every = events.listed(self.module, run.forcing)
-        self.listed = [(i, event) for i, event in enumerate(every) if event.direction != UNWATCHED]
-        self.names = [events.names[i] for i, _ in self.listed]
-        sources = {id(event.source[0]): self._shared(event.source[0]) for event in every if event.source is not None}
-        self.watched = [self._of_both(event, name) for (_, event), name in zip(self.listed, self.names, strict=True)]
-        for (_, event), both in zip(self.listed, self.watched, strict=True):
-            both.source = None if event.source is None else (sources[id(event.source[0])], event.source[1])
+        self.module, self.n, self.names = run.module, run.module.n_x, events.names
+        self.every, self.crowded = events.every, events.crowded
         self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
         self.found: list[EventSlopes] = []
 
-    def _of_both(self, event: RunEvent, name: str) -> RunEvent:
-        """The same event of z = [x; S], at which the integrator stops whatever it does: rates may jump there."""
-        action = STOP if event.action == GO_ON else event.action
-        return RunEvent(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
+    def __len__(self) -> int:
+        return len(self.every)
 
-    def _shared(self, source: Together) -> Together:
-        """What gives several values, of z too."""
-        n, columns = self.n, source.columns
-        every = None if columns is None else lambda t, z: columns(t, np.ascontiguousarray(z[:n]))
-        return Together(lambda t, z: source.values(t, z[:n]), every)
+    def encode(self) -> dict[str, Any] | None:
+        """The events, at each of which the loop stops, whatever it does: rates may jump there."""
+        encoded = self.events.encode()
+        actions = [PAUSE if event.action == GO_ON else event.action for event in self.every]
+        return encoded and {**encoded, "action": actions, "resets": []}
 
-    def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
+    def reset(self, module: BoundModel, forcing: Forcing, t: float, z: Array, fired: Sequence[int]) -> Array:
         """z = [x; S] right after events that happened at time t."""
         changed: list[str] = []
-        fixed = all(self._is_fixed(t, *self.run.split(z), self.listed[own][0], self.names[own]) for own in fired)
-        for own in sorted(fired, key=lambda own: self.listed[own][1].action != GO_ON):
-            after = self._pass(t, z, own)
-            changed += [self.names[own]] if after is not z else []
+        fixed = all(self._is_fixed(t, *self.run.split(z), index) for index in fired)
+        for index in sorted(fired, key=lambda index: self.every[index].action != GO_ON):
+            after = self._pass(t, z, index)
+            changed += [self.names[index]] if after is not z else []
             z = after
         if len(changed) > 1 and not fixed:
             raise self._at_once(t, changed)
         return z
 
-    def _pass(self, t: float, z: Array, own: int) -> Array:
+    def _pass(self, t: float, z: Array, index: int) -> Array:
         """z right after one event; z itself where the event changes nothing."""
-        forcing, (index, event) = self.run.forcing, self.listed[own]
+        forcing, event, name = self.run.forcing, self.every[index], self.names[index]
         raw, S = self.run.split(z)
         x, S = self._consistent(t, raw, S)
         before, after = self._sides(t, x)
         changes = event.action != GO_ON or bool(np.abs(before - after).max() > 0.0)
-        fixed = self._is_fixed(t, x, S, index, self.names[own])
+        fixed = self._is_fixed(t, x, S, index)
         if changes and not fixed:
-            self._refuse_ends(t, own)
-            self._refuse_others(t, x, own, before)
-        dt = np.zeros(S.shape[1]) if fixed else self._time(t, x, S, index, before, self.names[own], changes)
+            self._refuse_ends(t, index)
+            self._refuse_others(t, x, index, before)
+        dt = np.zeros(S.shape[1]) if fixed else self._time(t, x, S, index, before, changes)
         move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)
         if not changes:
-            self.found.append(EventSlopes(self.names[own], t, x, x, dt, move.x, move.x))
+            self.found.append(EventSlopes(name, t, x, x, dt, move.x, move.x))
             return z
         x_after, d_after = x, move.x
         if event.action != GO_ON:
             x_after = self.events.reset(self.module, forcing, t, x, [index])
             d_after = self._after(t, x, move, x_after, index)
             after = self._sides(t, x_after)[1]
-        self.found.append(EventSlopes(self.names[own], t, x, x_after, dt, move.x, d_after))
+        self.found.append(EventSlopes(name, t, x, x_after, dt, move.x, d_after))
         x_after, S = self._consistent(t, x_after, d_after - np.multiply.outer(after, dt))
         return self.run.joined(x_after, S)
 
-    def stop(self, t: float, z: Array, own: int) -> None:
+    def stop(self, t: float, z: Array, index: int) -> None:
         """Note an event that ended the run."""
         x, S = self._consistent(t, *self.run.split(z))
         before = self._sides(t, x)[0]
-        self._refuse_others(t, x, own, before)
-        dt = self._time(t, x, S, self.listed[own][0], before, self.names[own], True)
+        self._refuse_others(t, x, index, before)
+        dt = self._time(t, x, S, index, before, True)
         moved = S + np.multiply.outer(before, dt)
-        self.found.append(EventSlopes(self.names[own], t, x, x, dt, moved, moved))
+        self.found.append(EventSlopes(self.names[index], t, x, x, dt, moved, moved))
 
     def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
         forcing = self.run.forcing
@@ -423,13 +415,13 @@ class Saltation:
                 )
 
     # -- the time of an event -------------------------------------------------------------------------------------
-    def _is_fixed(self, t: float, x: Array, S: Array, index: int, name: str) -> bool:
+    def _is_fixed(self, t: float, x: Array, S: Array, index: int) -> bool:
         """Whether an event is a sampling time that no change moves."""
         clocks = [clock["event"] for clock in self.module.metadata.get("clocks", [])]
         if index not in clocks:
             return False
         gradient = self._gradient(t, x, index)
-        return not self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u).any()
+        return not self.run.move(t, x, S).along(gradient, f"event {self.names[index]}", self.module.layout.u).any()
 
     def _gradient(self, t: float, x: Array, index: int) -> Array:
         """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
@@ -439,7 +431,15 @@ class Saltation:
         every, n_u = self.formulas[index - first](t, x), self.module.layout.n_u
         return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
 
-    def _rate(self, t: float, x: Array, index: int, f: Array, name: str) -> float:
+    def _value(self, t: float, x: Array, index: int) -> float:
+        """An event's value."""
+        first = len(self.events.model)
+        if index < first:
+            kernel = self.module.kernels.timed("events", nan=True)
+            return float(kernel(t, x, u=self.run.forcing(t, x) if self.run.forcing else None)[index])
+        return float(self.events.formulas[index - first][1].function(self.module.p)(t, x))
+
+    def _rate(self, t: float, x: Array, index: int, f: Array) -> float:
         """How fast an event's value changes along rates f (n_x,)."""
         layout = self.module.layout
         u = np.zeros((layout.n_u, 1))
@@ -447,15 +447,15 @@ class Saltation:
             by_t, by_x, _ = self.run.inputs(t, x)
             u = (by_t + by_x @ f)[:, None]
         flow = Move(f[:, None], np.ones(1), u, np.zeros((layout.n_p, 1)))
-        return float(flow.along(self._gradient(t, x, index), f"event {name}", layout.u)[0, 0])
+        return float(flow.along(self._gradient(t, x, index), f"event {self.names[index]}", layout.u)[0, 0])
 
-    def _time(self, t: float, x: Array, S: Array, index: int, f: Array, name: str, needed: bool) -> Array:
+    def _time(self, t: float, x: Array, S: Array, index: int, f: Array, needed: bool) -> Array:
         """The derivatives (k,) of the time of an event; NaN where they do not exist and nothing depends on them."""
-        gradient, rate = self._gradient(t, x, index), self._rate(t, x, index, f, name)
+        gradient, rate, name = self._gradient(t, x, index), self._rate(t, x, index, f), self.names[index]
         h = ASIDE * (self.span[1] - self.span[0])
         earlier = x - h * f
         with np.errstate(all="ignore"):
-            bend = (rate - self._rate(t - h, earlier, index, self._f(t - h, earlier), name)) / h
+            bend = (rate - self._rate(t - h, earlier, index, self._f(t - h, earlier))) / h
         error = self._error(x, gradient)
         if needed and t == self.span[0]:
             raise self._at_an_end(t, name, "start")
@@ -515,14 +515,13 @@ class Saltation:
 
     def _refuse_others(self, t: float, x: Array, own: int, f: Array) -> None:
         """Refuse another event at the same instant that changes the state or ends the run."""
-        for other, (index, event) in enumerate(self.listed):
-            if other == own or (event.action == GO_ON and not event.terminal):
+        for other, event in enumerate(self.every):
+            if other == own or event.direction == UNWATCHED or (event.action == GO_ON and not event.terminal):
                 continue
-            value = float(event.function(t, x))
+            value = self._value(t, x, other)
             if np.isnan(value):
                 continue
-            gradient = self._gradient(t, x, index)
-            rate = self._rate(t, x, index, f, self.names[other])
+            gradient, rate = self._gradient(t, x, other), self._rate(t, x, other, f)
             onward = rate if self.span[1] >= self.span[0] else -rate
             if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:
                 continue  # it has just happened, and leaves

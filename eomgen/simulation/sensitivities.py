@@ -23,10 +23,9 @@ from ..runtime.inputs import Forcing
 from ..runtime.late_start import start_slopes
 from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
 from ..runtime.trajectory import Span, Start
-from .bound_run import Crawling, Run, StallCheck, describe_crawl
-from .events import Events, told_by_the_caller, warn_of_unknown
+from .bound_run import Crawling, StallCheck, describe_crawl
+from .events import Events, told_by_the_caller
 from .integrate import Solution, choose_solver, integrate, require_end
-from .meetings import limited
 from .recording import record
 from .run_arguments import DEFAULTS, check_tolerances, find_span, find_state, longest_step, ordered_times
 from .saltation import Saltation, Variational
@@ -129,7 +128,7 @@ def sensitivities(
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
     follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0), follows)
-    solver = limited(Run(bound, forcing), choose_solver(method), stop >= start)
+    solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
@@ -144,9 +143,11 @@ def sensitivities(
     stall_check = StallCheck(start, stop, x0, layout.n_q, longest, troubled, rates, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-            solution = integrate(
-                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter
+            solution, _, raised = integrate(
+                bound, forcing, nodes, z0, solver, times, False, settings, salts, None, stall_check.look, run
             )
+        if raised is not None:
+            raise raised
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x)
         trouble = "; ".join(fail.trouble(crawl.x, crawl.t) or ())
@@ -156,17 +157,13 @@ def sensitivities(
         cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)
         raise SimulationError(f"{title} stopped: {solution.message} {cause or ''}".strip()) from cause
     require_end(solution, stop)
-    warn_of_unknown([event.name for event in salts.watched if not event.known])
     if solution.status == 1:
         _note_end(salts, solution)
     n, k = layout.n_x, len(columns.names)
     kept = _distinct(solution)
-    t_events, x_events = [np.empty(0)] * len(watched), [np.empty((n, 0))] * len(watched)
-    for (i, _), event_times, found in zip(salts.listed, solution.t_events, solution.x_events, strict=True):
-        t_events[i], x_events[i] = event_times, found[:n]
     steps = None if solution.steps is None else (solution.steps[0], solution.steps[1][:n])
     states = solution._replace(
-        t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events, steps=steps
+        t=solution.t[kept], x=solution.x[:n, kept], x_events=[found[:n] for found in solution.x_events], steps=steps
     )
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
     trajectory = record(bound, forcing, states, title, settings, watched.names)
@@ -223,7 +220,7 @@ def _inputs(run: Variational, t: float, x: Array) -> SlopesNow | None:
 
 def _note_end(salts: Saltation, solution: Solution) -> None:
     """Note the event that ended the run, the last one that can."""
-    ending = [k for k, event in enumerate(salts.watched) if event.terminal and len(solution.t_events[k])]
+    ending = [k for k, event in enumerate(salts.every) if event.terminal and len(solution.t_events[k])]
     last = max(ending, key=lambda k: abs(float(solution.t_events[k][-1] - solution.ends[0])))
     salts.stop(float(solution.t_events[last][-1]), solution.x_events[last][:, -1], last)
 

@@ -23,8 +23,8 @@ from ..runtime.inputs import Forcing
 from ..runtime.option_types import Number, SolverOptions
 from ..runtime.trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
-from .compiled import can_run, integrate_compiled, settle
-from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, told_by_the_caller, warn_of_unknown
+from .compiled import can_run, settle
+from .events import WAIT, Events, is_told_by_the_caller, told_by_the_caller
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .recording import record, warn_of_limits
 from .run_arguments import (
@@ -221,9 +221,9 @@ def simulate(
         if words and not is_told_by_the_caller():
             warnings.warn(words, stacklevel=calls_within() + 1)
     if "contact_shapes" in bound.metadata:
-        from .meetings import begin
+        from .meetings import warn_of_depth
 
-        solver = begin(run, solver, (start, end), x0)
+        warn_of_depth(bound, start, x0, forcing(start, x0) if forcing else None)
     if usual is None:
         given = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
@@ -246,23 +246,17 @@ def simulate(
         require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     run.begin(start, end, x0, longest, numbers)
     try:
-        if compiled:
-            solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, run.look, watched
-            )
-            run.last = None if failure is None else ("rhs", *failure)
-            if isinstance(raised, KeyboardInterrupt):
-                raise Interrupted(solution) from raised
-            if raised is not None:
-                raise raised
-        else:
-            with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-                listed = watched.listed(bound, forcing)
-                solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, run.stall_check,
-                    partial(watched.reset, bound, forcing), forcing.enter,
-                )  # fmt: skip
-                warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
+        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+            solution, failure, raised = integrate(
+                bound, forcing, nodes, x0, title if compiled else solver, stored, dense_output, settings, watched,
+                watch, run.look, None if compiled else run.watched(watch),
+            )  # fmt: skip
+        if failure is not None:
+            run.last = ("rhs", *failure)
+        if isinstance(raised, KeyboardInterrupt):
+            raise Interrupted(solution) from raised
+        if raised is not None:
+            raise raised
     except Interrupted as interrupt:
         solution = interrupt.solution
         raise SimulationInterrupted(

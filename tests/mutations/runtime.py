@@ -203,9 +203,9 @@ FAULTS = (
         "tests/runs/test_reactions.py::test_a_drive_on_a_cut_slider_reacts_on_both_bodies",
     ),
     Fault(
-        "driven-event-direction", "_DrivenRun.find",
-        "(up and event.direction >= 0) or (down and event.direction <= 0)",
-        "(up and event.direction <= 0) or (down and event.direction >= 0)",
+        "driven-event-direction", "Events.encode",
+        "[event.direction for event in every]",
+        "[-event.direction for event in every]",
         "events of driven runs happen in the other direction",
         "tests/runs/test_kinematic_analysis.py::test_events_of_driven_runs_are_located",
     ),

@@ -66,7 +66,6 @@ TOUCHING = 1e-9  #: part of its size at which the value of an event counts as ze
 INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end
 WHOLE = 1e-6  #: a counter of samples this near to a whole number is one: rounding of times moves it by less
 EARLIEST = 1e-3  #: (s) stands for the time where that is less
-AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken: the root of its rounding
 
 # -- inputs ----------------------------------------------------------------------------------------------------------
 MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is differenced: the cube root of eps

@@ -8,6 +8,10 @@
 int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
 {
 #ifndef EOMGEN_ALONE
+    if (run->ask != NULL) {
+        run->stopped = run->stopped || run->ask(run->callback_data, t, y, NULL, k) != 0;
+        return 0;
+    }
     if (run->until_callback == 0) {
         run->until_callback = run->callback(run->callback_data, &run->t);
         run->stopped = run->until_callback <= 0;
@@ -85,6 +89,12 @@ static void keep_closed(eomgen_run *run)
 void eomgen_start(const eomgen_method *method, eomgen_run *run)
 {
     run->interpolates = 0;
+#ifndef EOMGEN_ALONE
+    if (run->ask != NULL) {
+        method->begin(run);
+        return;
+    }
+#endif
     eomgen_evaluate(run, run->t, run->y, run->f);
     keep_closed(run);
     if (!(run->h_abs > 0.0) && !method->expands) {
@@ -114,9 +124,10 @@ double eomgen_longest(eomgen_run *run)
 #ifndef EOMGEN_ALONE
     if (run->meeting != NULL) { /* backwards in time velocities are opposite, accelerations are not */
         double *const motion = run->K;
-        memcpy(motion, run->y, (size_t)run->n * sizeof(double));
-        memcpy(motion + run->n, run->f + run->n_q, (size_t)(run->n - run->n_q) * sizeof(double));
-        for (int i = run->n_q; i < run->n; i++) {
+        const int n = run->n - run->n_beside;
+        memcpy(motion, run->y, (size_t)n * sizeof(double));
+        memcpy(motion + n, run->f + run->n_q, (size_t)(n - run->n_q) * sizeof(double));
+        for (int i = run->n_q; i < n; i++) {
             motion[i] *= run->direction;
         }
         if (run->signals != NULL) {

@@ -1,5 +1,4 @@
-/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again.
-   Python's loop does the same: simulation/integrate.py. */
+/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again. */
 #include <math.h>
 #include <string.h>
 
@@ -35,7 +34,7 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
     const double moment = RUNS_INSTANT * fmax(fabs(run->t), RUNS_EARLIEST); /* a step this short shows rounding only */
     const int side = ev->leaving[i], back = !seen && ev->g_new[i] * side < 0.0 && fabs(run->t - run->t_old) > moment;
     ev->leaving[i] = seen || back ? 0 : side;
-    if (back && ev->direction[i] * side <= 0 && ev->action[i] != EOMGEN_GO_ON) {
+    if (back && ev->direction[i] * side <= 0 && (ev->action[i] == EOMGEN_RESET || ev->action[i] == EOMGEN_WAIT)) {
         ev->crowded = ev->crowd;
     }
     return back ? add(ev, n, i, run->t_old, run->t_old, side, 0.0) : n;

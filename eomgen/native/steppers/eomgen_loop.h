@@ -17,7 +17,8 @@
 enum {
     EOMGEN_GO_ON = 0,
     EOMGEN_RESET = 1, /* the model's kernel `resets` gives new values of some states */
-    EOMGEN_WAIT = 2   /* the run waits for the caller to call eomgen_jump */
+    EOMGEN_WAIT = 2,  /* the run waits for the caller to call eomgen_jump: an impact, after which a value at zero rises */
+    EOMGEN_PAUSE = 3  /* it waits too, and may go on as it was */
 };
 
 /* Events: zeros of values, first those of the model's kernel `events`, then of a tape, then of the caller. */
@@ -32,7 +33,7 @@ typedef struct {
     const int *action;    /* n */
     eomgen_function resets, project; /* of the model; NULL: none, no constraints */
     int n_resets;
-    const int *reset_of, *reset_x; /* n_resets: the event, and the state that gets the value */
+    const int *reset_of, *reset_x; /* n_resets: the event, and the state that gets the value; 0 of them: the caller resets */
     double *values_reset;          /* n_resets, work */
     double *g, *g_new, *slope, *slope_new, *size, *trial, *y; /* n each, work; y: states */
     long *count;                   /* n: how often each happened */

@@ -59,7 +59,9 @@ typedef struct {
     void *callback_data;
     eomgen_function jacobian;     /* of implicit methods */
     eomgen_function meeting;      /* of (q, v, a): a time in which no shapes meet, and 4 numbers, or NULL; n_q: coordinates */
-    int n_q;
+    int n_q, n_beside;            /* states behind those of the model, as derivatives by parameters */
+    /* Of a method that steps by functions of the caller: the inputs into u, or x' into f, the other is NULL; not 0: stop. */
+    int (*ask)(void *callback_data, double t, const double *y, double *u, double *f);
     long differentiations, factorizations;
     const eomgen_series *series;  /* of Taylor's method */
     int order;                    /* of its next step */

@@ -60,13 +60,19 @@ static void keep_piece(const eomgen_method *method, eomgen_run *run, eomgen_jour
 int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
 {
     eomgen_events *const ev = j->events;
+    int changes = 0;
+    for (int i = 0; i < ev->n; i++) {
+        changes = changes || (ev->fired[i] && ev->action[i] != EOMGEN_PAUSE);
+    }
     run->h_abs = 0.0;
     eomgen_start(method, run);
     store_step(run, j);
-    ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
-    ev->last_reset = run->t;
-    j->resets++;
-    return eomgen_depart(run, ev) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
+    if (changes) {
+        ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
+        ev->last_reset = run->t;
+        j->resets++;
+    }
+    return (eomgen_depart(run, ev) && changes) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */
@@ -137,7 +143,7 @@ int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         return EOMGEN_TERMINAL;
     }
     for (int i = 0; stop && i < j->events->n; i++) {
-        if (j->events->fired[i] && j->events->action[i] == EOMGEN_WAIT) {
+        if (j->events->fired[i] && (j->events->action[i] != EOMGEN_RESET || j->events->n_resets == 0)) {
             return EOMGEN_WAITING;
         }
     }

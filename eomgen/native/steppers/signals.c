@@ -34,6 +34,12 @@ double eomgen_table_value(const eomgen_signal *s, double t, double hold)
 
 void eomgen_force(eomgen_run *run, double t, const double *y)
 {
+#ifndef EOMGEN_ALONE
+    if (run->ask != NULL) {
+        run->stopped = run->ask(run->callback_data, t, y, run->u, NULL) != 0 || run->stopped;
+        return;
+    }
+#endif
     for (int i = 0; i < run->n_u; i++) {
         const eomgen_signal *const s = run->signals + i;
 #ifndef EOMGEN_ALONE
