@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from judges import first
+from sweeps import METHODS
 
 import eomgen as eg
 
@@ -62,21 +63,26 @@ CUTTABLE: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("joint", CUTTABLE, ids=lambda j: f"{j['type']}-{j.get('axis', 'z')}")
 def test_tree_and_cut_joint_agree(joint: dict[str, Any]) -> None:
-    tree = model(joint).compile(target="numpy")
+    with_tree, loop = model(joint), model(None, joint)
+    for coordinate, force in (("j_z", 1.3), ("j_3", -0.7)) if joint["type"] == "cylindrical" else ():
+        for m in (with_tree, loop):
+            m.actuator(f"along_{coordinate}", coordinate, value=force)
+    tree = with_tree.compile(target="numpy")
     names = [name for name in tree.q_names if name != "swing"]
-    loop = model(None, joint)
     report = loop.check()
     n = len(tree.q_names)
     assert report.loop_joints == ["j"]
     assert report.degrees_of_freedom == report.gruebler_kutzbach == n
     assert report.constraints == report.rank == 7 - n
     closed = loop.compile(target="numpy")
+    others = [loop.compile(method, target="numpy") for method in METHODS[1:] if joint["type"] == "cylindrical"]
     random = np.random.default_rng(4)
     for _ in range(3):
         values = {name: float(random.uniform(0.2, 1.2)) for name in [*names, "swing"]}
         values |= {f"{name}_dot": float(random.uniform(-2, 2)) for name in [*names, "swing"]}
         x, y = tree.x0(**values), closed.x0(**values)
-        same_motion(tree, x, closed, y)
+        for one in (closed, *others):
+            same_motion(tree, x, one, y)
         assert np.abs(closed.constraints(y[: closed.n_q])).max() < 1e-10
 
 

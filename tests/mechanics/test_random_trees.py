@@ -1,4 +1,4 @@
-"""Random trees of every joint type by every method: Pinocchio, MuJoCo, Newton and Euler from poses, power."""
+"""Random trees of every joint type by every method: Pinocchio, Newton and Euler from poses, power."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from itertools import product
 from typing import Any
 
 import judges
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 from random_models import PITCH, SPATIAL, SUFFIXES, Judge, Random, energy_rate, random_model, seed_with, states_of
-from scipy.spatial.transform import Rotation
 from sweeps import METHODS, TARGETS, part_of
 
 import eomgen as eg
@@ -162,58 +160,6 @@ def test_sums_over_bodies_equal_pinocchio(seed: int) -> None:
             (mod.centroidal_inertia(q), data.Ig.inertia),
         ):
             assert np.abs(ours - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
-
-
-# -- MuJoCo ------------------------------------------------------------------------------------------------------------
-def mujoco_text(made: Random) -> str:
-    """A random tree of hinges and slides, in MuJoCo's format: body frames stand at the outer markers."""
-
-    def numbers(*values: Any) -> str:
-        return " ".join(repr(float(x)) for x in np.concatenate([np.atleast_1d(v) for v in values]))
-
-    def body(k: int, base_R: np.ndarray, base_r: np.ndarray) -> str:
-        R, r = base_R @ made.outer[k].rotation, base_r + base_R @ made.outer[k].position
-        inner = made.inner[k]  # body frame seen from the joint frame
-        R_b, r_b = inner.rotation.T, -inner.rotation.T @ inner.position
-        I = R_b @ made.inertias[k] @ R_b.T
-        full = numbers(np.diag(I), I[0, 1], I[0, 2], I[1, 2])
-        kind = {"revolute": "hinge", "prismatic": "slide"}[made.kinds[k]]
-        children = "".join(body(j, R_b, r_b) for j, parent in enumerate(made.parents) if parent == k)
-        turn = numbers(np.roll(Rotation.from_matrix(R).as_quat(), 1))
-        return (
-            f'<body pos="{numbers(r)}" quat="{turn}"><joint name="q{k}" type="{kind}" axis="0 0 1"/>'
-            f'<inertial pos="{numbers(r_b + R_b @ made.centers[k])}" mass="{numbers(made.masses[k])}" '
-            f'fullinertia="{full}"/>{children}</body>'
-        )
-
-    roots = "".join(body(k, np.eye(3), np.zeros(3)) for k, parent in enumerate(made.parents) if parent < 0)
-    gravity = numbers(made.gravity)
-    return f'<mujoco><option gravity="{gravity}"/><compiler angle="radian"/><worldbody>{roots}</worldbody></mujoco>'
-
-
-@pytest.mark.quick
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
-def test_an_arm_of_hinges_and_slides_equals_mujoco(method: str) -> None:
-    made = random_model(2, bodies=5, types=("revolute", "prismatic"))
-    assert set(made.kinds) == {"revolute", "prismatic"}
-    assert len(set(made.parents)) > 3
-    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
-    model = mujoco.MjModel.from_xml_string(mujoco_text(made))
-    data = mujoco.MjData(model)
-    n = mod.n_q
-    order = [model.joint(name).dofadr[0] for name in mod.q_names]
-    random = np.random.default_rng(2)
-    for _ in range(4):
-        x = random.uniform(-1, 1, 2 * n)
-        data.qpos[order], data.qvel[order] = x[:n], x[n:]
-        mujoco.mj_forward(model, data)
-        full = np.zeros((n, n))
-        for row, unit in zip(full, np.eye(n), strict=True):  # M is symmetric; mj_mulM is there in every version
-            mujoco.mj_mulM(model, data, row, unit)
-        M, h = full[np.ix_(order, order)], data.qfrc_bias[order]
-        np.testing.assert_allclose(mod.mass_matrix(x[:n]), M, rtol=0, atol=1e-11 * np.abs(M).max())
-        np.testing.assert_allclose(mod.bias(0.0, x), h, rtol=0, atol=1e-11 * np.abs(h).max())
-        judges.agree(mod.rhs(0.0, x)[n:], data.qacc[order], 1e-11, float(np.linalg.cond(M)))
 
 
 # -- Newton and Euler from differences of poses ------------------------------------------------------------------------

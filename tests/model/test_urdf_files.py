@@ -129,6 +129,13 @@ def test_dry_friction_acts_where_it_is_requested() -> None:
         assert not np.delete(added, elbow).any()
 
 
+def test_damping_and_dry_friction_are_two_numbers(tmp_path: Path) -> None:
+    text = two_links({}).replace('damping="0.5"', 'damping="0.5" friction="0.2"')
+    module = urdf(tmp_path, text).compile(target="numpy", kernels=["bias"])
+    ahead, back = (module.bias(0.0, [0.0, 0.3, 0.0, rate]) for rate in (2.0, -2.0))
+    np.testing.assert_allclose((ahead - back) / 2, [0.0, 0.5 * 2.0], atol=1e-12)  # what is even is centrifugal
+
+
 def test_drives_are_in_the_units_of_their_joints(tmp_path: Path) -> None:
     """Without gravity: a torque on the hinge alone and a force on the slide alone, Newton and Euler by hand."""
     text = f"""<robot name="arm"><link name="base"/><link name="upper">{INERTIAL}</link>

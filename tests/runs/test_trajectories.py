@@ -157,6 +157,12 @@ class Remembering:
         return 1e-9 * self.calls
 
 
+def test_the_drift_of_the_energy_is_what_drag_takes():
+    """E = exp(-2 c t) / 2 of a mass of 1 kg at 1 m/s, in parts of the largest T."""
+    run = compiled("oscillator").bind({"c": 0.7}).simulate(2.0, {"s_dot": 1.0}, rtol=1e-10, atol=1e-12)
+    assert run.energy_drift == pytest.approx(1.0 - np.exp(-2 * 0.7 * 2.0), rel=1e-8)
+
+
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_run_that_cannot_be_made_again_is_refused(target):
     module, push, runs = compiled("oscillator", target), {"gain": 1.0}, []
