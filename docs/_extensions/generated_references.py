@@ -148,7 +148,7 @@ class Constructs(SphinxDirective):
                 attributes = " ".join(names.get(name, name) for name in row.attributes)
                 groups.setdefault((row.fate, row.why), []).append(f"`{element}` {_cell(attributes)}".strip())
         lines = ["| | | elements and attributes |", "|---|---|---|"]
-        lines += [f"| {_cell(fate)} | {_cell(why)} | {'; '.join(found)} |" for (fate, why), found in groups.items()]
+        lines += [f"| {fate} | {why} | {'; '.join(found)} |" for (fate, why), found in groups.items()]
         return self.parse_text_to_nodes("\n".join(lines))
 
 
