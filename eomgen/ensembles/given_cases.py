@@ -19,8 +19,8 @@ from ..errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped
 from ..runtime.argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
 from ..runtime.initial import Initial
 from ..runtime.kernels import Kernels
-from ..runtime.late_start import fixed_told, late_values, tell_fixed
 from ..runtime.refusals import require_switched
+from ..runtime.start_values import silent, values_at, warn_of_fixed
 from ..runtime.trajectory import last_state
 from ..simulation.events import at_next_samples, require_agreement
 from ..simulation.run_arguments import find_state
@@ -193,7 +193,7 @@ def collect_cases(
     k = next(iter(lengths.values()), 1)
     if states is None:
         declared = (*module.layout.initial, *module.layout.initial_outputs)
-        tell_fixed(module.layout, p, [name for name in declared if name not in values])
+        warn_of_fixed(module.layout, p, [name for name in declared if name not in values])
     require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
@@ -222,7 +222,7 @@ def assemble_states(
     words : list of str
         Why, for each of these in order.
     """
-    with fixed_told():  # for all runs, when their cases were collected
+    with silent():  # for all runs, when their cases were collected
         x, reasons = _assemble_all(module, cases, t, forcing_of)
     if module.metadata.get("clocks"):
         for k in set(range(cases.count)) - reasons.keys():
@@ -281,7 +281,7 @@ def _assemble_all(
 
 def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array, dict[int, str]]:
     """The states where each named value is an entry of them, whatever the others are."""
-    late = {name: value for name, value in late_values(module.layout, cases.p).items() if np.ndim(value)}
+    late = {name: value for name, value in values_at(module.layout, cases.p).items() if np.ndim(value)}
     values = late | cases.values
     scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in values.items()}
     shared: dict[str, Any] = {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}

@@ -25,9 +25,9 @@ from ..errors import (
 )
 from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
 from ..runtime.inputs import Forcing, Table
-from ..runtime.late_start import fixed_told, start_slopes, tell_fixed
 from ..runtime.layout import bounds_of
 from ..runtime.refusals import refuse_rigid
+from ..runtime.start_values import silent, start_slopes, warn_of_fixed
 from ..runtime.tapes import Expression
 from ..simulation.simulate import simulate
 from .experiments import Experiment, read_experiments, read_sigma
@@ -428,7 +428,7 @@ def fit(
         raise no_choice(f"derivatives must be {' or '.join(DERIVATIVES)}, not {derivatives!r}")
     experiments = read_experiments(module, data, initial, inputs)
     problem = _Problem(module, experiments, parameters, {"method": method, "rtol": rtol, "atol": atol})
-    problem.tell_fixed()
+    problem.warn_of_fixed()
     limits = _bounds(problem, bounds)
     columns = list(dict.fromkeys(name for one in experiments for name in one.columns))
     known = read_sigma(sigma, columns)
@@ -484,13 +484,13 @@ class _Problem:
                 if one.inputs and name in one.inputs:
                     raise at_odds(f"input {name} is given, and cannot be found too; leave it out of one of them")
 
-    def tell_fixed(self) -> None:
+    def warn_of_fixed(self) -> None:
         """Warn, once for all runs, of initial values that are not given and cannot follow from the parameters."""
         module, layout = self.module, self.module.layout
         p = np.where([name in self.names for name in module.p_names], np.nan, module.p)  # whatever they will be
         by_name = [one.initial or () for one in self.experiments if isinstance(one.initial, Mapping | None)]
         declared = [name for name in (*layout.initial, *layout.initial_outputs) if name not in self.initial_names]
-        tell_fixed(layout, p, [name for name in declared if any(name not in given for given in by_name)])
+        warn_of_fixed(layout, p, [name for name in declared if any(name not in given for given in by_name)])
 
     def _bound(self, name: str) -> float:
         """The value that holds now."""
@@ -528,7 +528,7 @@ class _Problem:
         """The run of an experiment."""
         from ..simulation.simulate import simulate
 
-        with fixed_told():
+        with silent():
             return simulate(self.module, **self.arguments(values, one))
 
     def residuals(self, values: Array, told: bool = False) -> Array:
@@ -559,7 +559,7 @@ class _Problem:
         parts = []
         for one in self.experiments:
             arguments = self.arguments(values, one)
-            with fixed_told():
+            with silent():
                 slopes = run_slopes(self.module, self.names, tuple(one.columns), arguments)
                 if slopes is None:
                     found = sensitivities(self.module, self.names, **arguments)

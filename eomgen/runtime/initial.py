@@ -28,7 +28,7 @@ from ..base.limits.constraints import (
 )
 from ..base.names import place_of_marker
 from ..base.picture_data import read_picture
-from ..errors import AssemblyError, UsageError, calls_within, cannot
+from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
 from ..numeric.assembly import (
     RESTARTS,
     ClosureSystem,
@@ -45,6 +45,7 @@ from ..numeric.ranks import parts, rank
 from .argument_checks import UnknownNameError, unknown, without_dots
 from .failure import place
 from .kernels import Kernels, constraint_system
+from .start_values import warn_of_fixed
 
 # -- rank at other parameters ------------------------------------------------------------------------------------------
 
@@ -480,8 +481,8 @@ class Initial:
 
         Declared values lead there but those to be `given`; unless ``rough``, it warns where they leave its branch.
         """
-        if (later := self.later(given, rough)) is not None:
-            return later
+        if (moved := self.moved_reference(given, rough)) is not None:
+            return moved
         declared = self.sort(self.layout.initial).positions
         try:
             return self.close_near(self.layout.q_reference, declared, restarts=2)
@@ -497,18 +498,55 @@ class Initial:
 
     def used(self, declared: dict[str, float]) -> dict[str, float]:
         """Declared values of which a start is made; refuses one that is no number with the parameters bound."""
-        return declared if self.layout.late is None else self.layout.late.used(declared)
+        if self.layout.rebound is not None:
+            p, undefined = self.layout.rebound
+            if bad := [undefined[name] for name in declared if name in undefined]:
+                given = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.layout.p, p, strict=True))
+                raise not_finite(f"{bad[0]} is no number with {given}: {TO_BE_FINITE}")
+            warn_of_fixed(self.layout, p, declared)
+        return declared
 
-    def later(self, given: Iterable[str], rough: bool) -> Array | None:
-        """Where drivers by this time, or later parameters, bring the reference position; None without, or blocked."""
+    def moved_reference(self, given: Iterable[str], rough: bool) -> Array | None:
+        """Where drivers by this time, or bound parameters, bring the reference position; None without, or blocked."""
         if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
-            return None if self.layout.late is None else self.layout.late.follow(self, given, rough)
+            return None if self.layout.rebound is None else self._at_parameters(given, rough)
         first = Initial(self.kernels).reference(given, rough)
         try:
             return follow(self.system.at(0.0), first, {}, self.t)
         except AssemblyError as error:
             self.tell_branch(f"the position at t = {self.t:.6g} s", error)
             return None
+
+    def _at_parameters(self, given: Iterable[str], rough: bool) -> Array | None:
+        """The reference position with the initial values of now, but those to be `given`; None if they are as declared.
+
+        The values are followed from those at the declared parameters; where these do not close the loops of now, from
+        the closed position nearest to them.  Where that is blocked, the loops are closed anew, with a warning unless
+        ``rough``.
+        """
+        layout, system = self.layout, self.system
+        declared = {**layout.metadata["initial"], **layout.metadata.get("initial_outputs", {})}
+        before = self.sort({name: declared[name] for name in layout.initial}).positions
+        now = self.sort(layout.initial).positions
+        if before == now:
+            return None
+        known = [name for name in given if name in (*system.names, *system.cut.names)]
+        wanted = now = {name: value for name, value in now.items() if name not in known}
+        blocked = start = None
+        ways: tuple[dict[str, float], ...] = (before, {})
+        for held in ways:
+            try:
+                start = system.close(layout.q_reference, held).q
+                wanted = self.compatible(start, known, now) if known else now
+                return self.follow(start, wanted)
+            except AssemblyError as error:
+                blocked = error
+        found = self.close_near(layout.q_reference, wanted)
+        changed = {name: value for name, value in wanted.items() if value != before.get(name)}
+        # where they stand still at the reference, it is on no branch of theirs
+        if start is not None and not rough and len(self.compatible(start, (), changed)) == len(changed):
+            self.tell_branch(", ".join(f"{name} = {value:.6g}" for name, value in changed.items()), blocked)
+        return found
 
     def tell_branch(self, what: str, error: AssemblyError | None) -> None:
         """Warn that a position was found by closing the loops anew."""
@@ -529,9 +567,9 @@ class Initial:
         if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
             return self.system.with_values(layout.q_reference, {**self.used(declared), **given})
         if not given:
-            if (later := self.later((), rough)) is None:
+            if (moved := self.moved_reference((), rough)) is None:
                 return self.close_near(layout.q_reference, self.used(declared))
-            return self.follow(later, self.used(self.compatible(later, {}, declared)))
+            return self.follow(moved, self.used(self.compatible(moved, {}, declared)))
         try:
             start = self.reference(given, rough)
         except AssemblyError:

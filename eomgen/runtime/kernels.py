@@ -17,6 +17,7 @@ from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
 from .refusals import require_projection, require_velocities
+from .start_values import at_parameters
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -55,9 +56,7 @@ class Kernels:
             scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, ill_shaped)
             self.layout = layout = layout.sized(scales(np.empty(0)))
         if p is not None and not layout.metadata.keys().isdisjoint(("start_terms", "start_fixed")):
-            from .late_start import started
-
-            self.layout = layout = started(layout, self.context.p)
+            self.layout = layout = at_parameters(layout, self.context.p)
         self.fail = Fail(self)
         self._derivatives: dict[str, Timed] = {}
 

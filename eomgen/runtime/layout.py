@@ -121,7 +121,9 @@ class Layout:
         The JSON text of model.json, or what it holds.
     """
 
-    late: Any = None  #: a LateStart where initial values follow from parameters bound later
+    #: where initial values follow from parameters: those bound later (n_p,), and which of these values are no numbers
+    #: there and stay as declared, by section and name
+    rebound: tuple[Array, dict[str, str]] | None = None
 
     def __init__(self, metadata: str | Mapping[str, Any]) -> None:
         data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)

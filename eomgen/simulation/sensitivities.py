@@ -20,8 +20,8 @@ from ..runtime.argument_checks import check_names, read_names, read_number, requ
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.inputs import Forcing
-from ..runtime.late_start import start_slopes
 from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
+from ..runtime.start_values import start_slopes
 from ..runtime.trajectory import Span, Start
 from .bound_run import Crawling, StallCheck, describe_crawl
 from .events import Events, told_by_the_caller
