@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..base.algebra import Array, Indices
 from ..base.limits.analyses import BESIDE, NULL
 from ..base.limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, TIKHONOV
 from ..errors import AssemblyError
-from .projection import largest, within
+from .projection import largest
 from .ranks import rank
 from .scales import Position, Scales, settle
 
@@ -144,7 +144,8 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | 
             damping = min(0.1 * damping, size)
             damping = 0.0 if damping < TIKHONOV else damping
     rounded = system.scales.rounding(q, J)
-    return q, min(largest(e), ACCEPTED) if within(e, ACCEPTED, rounded) else largest(e)
+    accepted = bool((np.abs(e) <= np.maximum(ACCEPTED, rounded)).all())
+    return q, min(largest(e), ACCEPTED) if accepted else largest(e)
 
 
 def _step(K: Array, f: Array, damping: float | None, top: float) -> Array:
@@ -459,29 +460,6 @@ SHIFTED = 6  #: places around the guess where what is found lies beside it
 ROUGH = 30  #: steps that turn what is not guessed
 
 
-class Guess(NamedTuple):
-    """Rough values of coordinates, and how far a position is from them."""
-
-    system: ConstraintSystem
-    start: Array  #: (n_q,) with the values of the tree's coordinates
-    velocities: Indices  #: those that move these coordinates
-    cut: WantedValues | None  #: coordinates of cut joints
-
-    @classmethod
-    def of(cls, system: ConstraintSystem, start: Array, guess: Mapping[str, float]) -> Guess:
-        """The values of a guess; ``start`` says where all other coordinates are."""
-        moved = np.unique(system.scales.velocities(system.indices(guess)))
-        return cls(system, system.with_values(start, guess), moved, system.wanted(guess))
-
-    def distances(self, q: Array) -> Array:
-        """Scaled distances (k,) of a position from the guessed values."""
-        found = self.system.scales.distance(q, self.start)[self.velocities]
-        if self.cut is None:
-            return found
-        y = self.cut.difference(self.cut.evaluate(q)[0]) / self.cut.scales
-        return np.concatenate([found, y])
-
-
 @np.errstate(all="ignore")
 def close_nearest(
     system: ConstraintSystem,
@@ -509,9 +487,15 @@ def close_nearest(
     Assembly or None
         Its distance is that of the guessed coordinates, the largest.  None where no attempt closes the loops.
     """
-    rough = {name: value for name, value in guess.items() if name not in given}
-    aim = Guess.of(system, system.with_values(start, given), rough)
+    rough, scales = {name: value for name, value in guess.items() if name not in given}, system.scales
+    aim, cut = system.with_values(start, {**given, **rough}), system.wanted(rough)
+    guessed = np.unique(scales.velocities(system.indices(rough)))  # velocities that move coordinates of the tree
     free, held = system.closure(given), system.closure({**given, **rough})
+
+    def distances(q: Array) -> Array:
+        """Scaled distances of a position from the guessed values."""
+        gaps = scales.distance(q, aim)[guessed]
+        return gaps if cut is None else np.append(gaps, cut.difference(cut.evaluate(q)[0]) / cut.scales)
 
     def attempt(place: Array, count: int, first: ClosureSystem | None) -> Assembly | None:
         if first is not None:
@@ -519,26 +503,20 @@ def close_nearest(
         q, residual = close(free, system.with_values(place if adjust is None else adjust(place), given))
         if not closed(residual) or not system.aligned(q):
             return None
-        return Assembly(q, residual, count, float(np.linalg.norm(aim.distances(q))))
+        return Assembly(q, residual, count, float(np.linalg.norm(distances(q))))
 
-    best = attempt(aim.start, 0, free._replace(equations=aim.cut) if aim.cut else None)
-    for count, (place, enough) in enumerate(_places(aim, free, held), 1):
+    best = attempt(aim, 0, free._replace(equations=cut) if cut else None)
+    # other places of what is not guessed, then of all that may move, while the best position is farther than that
+    turned = islice(starts(aim, held.free, scales, TURNED), TURNED if held.free.any() else 0)
+    shifted = islice(starts(aim, free.free, scales, 4 * SHIFTED), 1, SHIFTED + 1)
+    places = chain(((place, MEASURED) for place in turned), ((place, BESIDE) for place in shifted))
+    for count, (place, enough) in enumerate(places, 1):
         if best is not None and best.distance <= enough:
             break
         found = attempt(place, count, held)
         if found is not None and (best is None or _nearer(found, best, free)):
             best = found
-    return best and best._replace(distance=largest(aim.distances(best.q)))
-
-
-def _places(aim: Guess, free: ClosureSystem, held: ClosureSystem) -> Iterator[tuple[Array, float]]:
-    """Where to begin: other places of what is not guessed, then of all that may move; and the distance of a position
-    beside which no further one is looked for."""
-    scales = aim.system.scales
-    for place in islice(starts(aim.start, held.free, scales, TURNED), TURNED if held.free.any() else 0):
-        yield place, MEASURED
-    for place in islice(starts(aim.start, free.free, scales, 4 * SHIFTED), 1, SHIFTED + 1):
-        yield place, BESIDE
+    return best and best._replace(distance=largest(distances(best.q)))
 
 
 def _nearer(found: Assembly, best: Assembly, free: ClosureSystem) -> bool:

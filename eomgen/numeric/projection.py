@@ -15,11 +15,6 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
 
 
-def within(e: Array, limit: float, rounded: Array) -> bool:
-    """Whether each scaled residual (m,) is at most the limit, or what rounding leaves of it (m,)."""
-    return bool((np.abs(e) <= np.maximum(limit, rounded)).all())
-
-
 def least(J: Array, y: Array) -> Array:
     """The least x, (n,) or (n, k), with J x = y.
 
