@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
 
-from ..base.algebra import Array
+from ..base.algebra import Array, Indices
 from ..errors import too_large
 from ..numeric.projection import largest
 from .argument_checks import unknown
@@ -188,17 +188,23 @@ class Columns:
 
     def _unwrapped(self, found: Array, angles: Array) -> Array:
         """Angles of cut joints (k, n_t), whose turns count along the steps of the run, whatever times are stored."""
-        t, x, u = (self.t[:0],) * 3 if self._steps is None or not len(angles) else self._steps()
-        if not len(t):
+        passed = self._passed() if len(angles) else None
+        if passed is None:
             return np.unwrap(found, axis=-1)
+        t, x, u, order = passed
         n = self.module.layout.n_q
         kernel = self.module.kernels.motion("loop_coordinates")
         between = kernel(x[:n], x[n:], np.zeros_like(x[n:]), u=u if u.size else None, t=t)[0, angles]
-        forward = 1.0 if t[-1] >= t[0] else -1.0
-        order = np.argsort(forward * np.concatenate([t, self.t]), kind="stable")
         turned = np.empty((len(angles), len(order)))
         turned[:, order] = np.unwrap(np.concatenate([between, found], axis=-1)[:, order], axis=-1)
         return turned[:, len(t) :]
+
+    def _passed(self) -> tuple[Array, Array, Array, Indices] | None:
+        """t, x and u that the run passed besides those stored, and the order of both together; None if not kept."""
+        t, x, u = (self.t[:0],) * 3 if self._steps is None else self._steps()
+        forward = 1.0 if len(t) and t[-1] >= t[0] else -1.0
+        order = np.argsort(forward * np.concatenate([t, self.t]), kind="stable")
+        return (t, x, u, order) if len(t) else None
 
     @property
     def has_energies(self) -> bool:

@@ -51,9 +51,14 @@ METHOD = "kinematic"
 class MotionColumns(Columns):
     """Columns of a motion whose accelerations are known, and come from no force.  NaN where it is not defined."""
 
-    def __init__(self, module: BoundModel, t: Array, x: Array, u: Array, a: Array) -> None:
+    def __init__(
+        self, module: BoundModel, t: Array, x: Array, u: Array, a: Array, passed: tuple[Any, ...] | None = None
+    ) -> None:
         super().__init__(module, t, x, u)
-        self.a = a
+        self.a, self._between = a, passed
+
+    def _passed(self) -> Any:
+        return self._between
 
     @cached_property
     def slopes(self) -> Array:
@@ -173,18 +178,20 @@ def keep(
     *,
     u: Array | None = None,
     header: Mapping[str, Any] | None = None,
+    passed: tuple[Any, ...] | None = None,
     **rest: Any,
 ) -> KinematicAnalysis:
     """Put an analysis together from its pieces; ``asked`` points were asked for.
 
-    ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``rest`` what a Trajectory takes.
+    ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``passed`` what was
+    passed besides these points, as columns take it, ``rest`` what a Trajectory takes.
     """
     module = driven.module
     q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
     x = np.concatenate([q, v])
     if u is None:
         u = np.repeat(module.u[:, None], len(t), axis=1)
-    columns = MotionColumns(module, t, x, u, a)
+    columns = MotionColumns(module, t, x, u, a, passed)
     complete = describe(module) | {
         "method": METHOD,
         "rtol": None,
@@ -578,7 +585,7 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
     stop: Singular | None = None
     known_range = KnownRange(asked.t, asked.y)
     extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
-    count = 0
+    count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
     for first, last in pieces:
         t, y = float(asked.t[first]), asked.y[:, first]
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
@@ -594,13 +601,20 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
         index = first + taken
         columns.append(followed.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
         count += len(taken)
+        points += [(done + p.s, path.at(p.s)[0], p.q) for p in followed.continuation.points if followed.holds(p.s)]
+        places.append(done + along[taken])
+        done += length
         found += followed.singular
         if followed.stop is not None:
             stop = followed.stop
             found.append(followed.stop)
             break
         q = columns[-1][0][:, -1] if len(taken) else q
-    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led])
+    along_all, times, positions = (np.array(part) for part in zip(*points, strict=True))
+    x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
+    order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
+    passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
+    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led], passed=passed)
     if count < n and not partial:
         gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
         error = PartitionError(

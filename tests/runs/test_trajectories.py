@@ -270,3 +270,6 @@ def test_a_cut_joint_counts_its_turns_along_the_run_whatever_is_stored(times: li
     assert run["P"][-1] == pytest.approx(whole["P"][-1], abs=1e-7)
     assert whole.at(times)["P"] == pytest.approx(run["P"], abs=1e-7)
     assert run["P"][-1] == pytest.approx(run["c"][-1] - run["theta"][-1], abs=1e-9)  # both ends turn about z
+    for to in (20.0, -20.0):
+        led = module.kinematic_analysis(theta=[0.3, to])
+        assert led["P"] - led["P"][0] == pytest.approx(led["c"] - led["c"][0] - (led["theta"] - 0.3), abs=1e-9)
