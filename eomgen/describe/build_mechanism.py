@@ -16,7 +16,6 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
 from .bodies import check_bodies, check_display, read_body, read_body_shapes
-from .build_cams import check_turns, declare_contacts
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates, with_locks
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
@@ -34,7 +33,7 @@ from .build_states import (
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
-from .element_entry import Surroundings, build_elements, own_states
+from .element_entry import Surroundings, build_elements, check_turns, declare_contacts, own_states
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .given_equations import build_equations, check_energies, declare_equations

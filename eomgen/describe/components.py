@@ -17,12 +17,11 @@ from ..elements import kinds
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from ..joints import JOINTS
-from .build_cams import needs_point
 from .build_joints import coordinate_names, sketch
 from .build_states import CLOSED, COUNTER, SAMPLED, is_switched
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
-from .element_entry import states_of
+from .element_entry import needs_point, states_of
 from .fields import ADDED, COMPONENT
 from .names import fault_of_name, function_words, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named

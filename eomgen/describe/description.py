@@ -99,6 +99,14 @@ class Description:
         self.sections[section].append(entry)
         return entry
 
+    def declare(self, parameters: Mapping[str, Any], inputs: Mapping[str, Any], used: Sequence[str]) -> None:
+        """Declare inputs and parameters with their values, None for none, and what else is used as parameters."""
+        for name in dict.fromkeys((*parameters, *used)):
+            value = parameters.get(name)
+            self.add("parameters", name, {} if value is None else {"value": value})
+        for name, value in inputs.items():
+            self.add("inputs", name, {} if value is None else {"value": value})
+
     def note_renamed(self, renamed: dict[str, dict[str, str]]) -> None:
         """Keep the names that an import changed, and note them."""
         self.renamed = renamed

@@ -102,14 +102,11 @@ def describe_equations(
     values, driven = named("parameters", parameters), named("inputs", inputs)
     known = {part + rate for part in (*names, *speeds) for rate in RATES}
     known |= {*driven, *given.get("intermediates", ()), *given.get("multipliers", ())}
+    known.add("t")
     declared = ("coordinates", "velocities", "multipliers")
-    found = sorted({part for key in given if key not in declared for part in _names_in(given[key])})
-    for parameter in [*values, *(part for part in found if part not in values)]:
-        if parameter not in known and parameter != "t":
-            value = values.get(parameter)
-            description.add("parameters", parameter, {} if value is None else {"value": value})
-    for source, value in driven.items():
-        description.add("inputs", source, {} if value is None else {"value": value})
+    found = {part for key in given if key not in declared for part in _names_in(given[key])}
+    own = {name: value for name, value in values.items() if name not in known}
+    description.declare(own, driven, sorted(found - known))
     give_latex(description, "equations", latex)
     return description
 

@@ -84,14 +84,8 @@ def describe_lagrangian(
     others = [name for name in _symbols(given, rates=True) if name not in {*known, *values}]
     rates = [name for name in others if split_rate(name)[0] in stems]
     known |= set(rates)
-    for parameter in [*values, *(p for p in _symbols(given) if p not in values)]:
-        if parameter not in known:
-            value = values.get(parameter)
-            description.add("parameters", parameter, {} if value is None else {"value": value})
-    for source, value in driven.items():
-        description.add("inputs", source, {} if value is None else {"value": value})
-    for rate in rates:
-        description.add("inputs", rate, {})
+    own = {name: value for name, value in values.items() if name not in known}
+    description.declare(own, driven | dict.fromkeys(rates), [name for name in _symbols(given) if name not in known])
     give_latex(description, "lagrangian", latex)
     return description
 
