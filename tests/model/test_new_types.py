@@ -12,7 +12,7 @@ import pytest
 import eomgen as eg
 from eomgen.base.value_rules import POSITIVE
 from eomgen.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
-from eomgen.describe import schema
+from eomgen.describe import model_schema
 from eomgen.elements.dimensions import LENGTH, STIFFNESS
 from eomgen.elements.element_type import element, key
 from eomgen.elements.kinds import MarkerReference, Scalar
@@ -131,7 +131,7 @@ def test_its_method_file_schema_and_documentation_follow() -> None:
     assert "share : hundredths, optional" in m.hardening_spring.__doc__
     assert "Add a spring that hardens." in m.hardening_spring.__doc__
     found = next(
-        one for one in schema.model_schema()["properties"]["forces"]["additionalProperties"]["oneOf"]
+        one for one in model_schema()["properties"]["forces"]["additionalProperties"]["oneOf"]
         if one["properties"]["type"] == {"const": "hardening_spring"}
     )  # fmt: skip
     assert found["properties"]["share"] == {
