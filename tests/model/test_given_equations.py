@@ -83,6 +83,17 @@ def test_constraints_with_given_rates(target: str) -> None:
         )
 
 
+def test_what_no_velocity_changes_is_closed_by_the_nearest_coordinates() -> None:
+    """Two points that stay on circles about the origin by their rates: from beside them along the radius."""
+    module = eg.Model.from_equations(
+        "dials", ["a", "b", "c", "d"], velocities=["v", "w"],
+        rates={"a": "-b*v", "b": "a*v", "c": "-d*w", "d": "c*w"}, mass_matrix=[["2", 0], [0, "3"]], forcing=[0, 0],
+        constraints=["a**2 + b**2 - 1", "c**2 + d**2 - 4"],
+    ).compile(target="numpy")  # fmt: skip
+    on = np.array([np.cos(0.4), np.sin(0.4), 2.0 * np.cos(2.0), 2.0 * np.sin(2.0), 0.3, -0.2])
+    np.testing.assert_allclose(module.project(on * [1.3, 1.3, 0.7, 0.7, 1, 1]), on, atol=1e-12)
+
+
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("blade", [False, True])
 @pytest.mark.parametrize(("n", "k"), [(3, 2), (1, 2), (2, 3), (7, 6)])

@@ -223,4 +223,18 @@ FAULTS = (
         "a row gives more than one dependent coordinate",
         "tests/code/test_accelerations.py::test_the_embedded_mass_matrix_is_that_of_the_motions_left[n_four_bar]",
     ),
+    Fault(
+        "c-mend-sign", "C mend",
+        "q[k] -= part * change[k];",
+        "q[k] += part * change[k];",
+        "what no velocity changes is moved away from the constraints",
+        "tests/model/test_given_equations.py::test_what_no_velocity_changes_is_closed_by_the_nearest_coordinates",
+    ),
+    Fault(
+        "c-mend-rows", "C add_left",
+        "change[k] -= AT(GRADIENT)[i * NQ + k] * e[i];",
+        "change[k] -= AT(GRADIENT)[k] * e[i];",
+        "what no velocity changes is moved along the first constraint alone",
+        "tests/model/test_given_equations.py::test_what_no_velocity_changes_is_closed_by_the_nearest_coordinates",
+    ),
 )  # fmt: skip
