@@ -1,13 +1,9 @@
-"""A function of one number -> where it is 0, and where it is least.
-
-Each search yields the places at which it wants the value, so that many of them can be asked for together.
-"""
+"""A function of one number -> where it is 0, and where it is least."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from math import isnan
-from typing import TypeVar
 
 from ..base.limits.numbers import EPS
 
@@ -15,17 +11,14 @@ STEPS = 100  #: of one search for a root
 GOLDEN = 0.3819660112501051
 SECTIONS = 60  #: of one search for a minimum
 
-Found = TypeVar("Found")
-#: Yields places, is sent the value of one function there, and returns what it looked for.
-Search = Generator[float, float, Found]
 
+def find_root(value: Callable[[float], float], a: float, b: float, fa: float, fb: float) -> float:
+    """A root between two places with values of different sign; the last place where the value is no number.
 
-def search_root(a: float, b: float, fa: float, fb: float) -> Search[tuple[float, float, float, float]]:
-    """A root between two places with values of different sign and the value there, and the same of its other side.
-
-    It ends where the value is no number.  R. P. Brent, Algorithms for Minimization without Derivatives, 1973,
-    chapter 4; to four roundings.
+    R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4; to four roundings.
     """
+    if fa == 0.0:
+        return a
     c, fc, d = a, fa, b - a
     e = d
     for _ in range(STEPS):
@@ -51,41 +44,25 @@ def search_root(a: float, b: float, fa: float, fb: float) -> Search[tuple[float,
                 d = e = m
         a, fa = b, fb
         b += d if abs(d) > tolerance else tolerance if m > 0.0 else -tolerance
-        fb = yield b
+        fb = value(b)
         if isnan(fb):
             break
-    return b, fb, c, fc
+    return b
 
 
-def search_least(
-    left: float, at: float, right: float, best: float, width: float, below: bool = False, sense: float = 1.0
-) -> Search[tuple[float, float]]:
-    """The least of ``sense`` times a value, and where; or the first that is 0, or ``below`` 0.  Golden section."""
+def find_least(value: Callable[[float], float], left: float, right: float, width: float) -> float:
+    """Where a value is least between two places, to a width, or 0.  Golden section."""
+    at = 0.5 * (left + right)
+    best = value(at)
     for _ in range(SECTIONS):
-        if best < 0.0 or (best == 0.0 and not below) or abs(right - left) <= width:
+        if best <= 0.0 or abs(right - left) <= width:
             break
         low = abs(at - left) > abs(right - at)
         t = at + GOLDEN * ((left if low else right) - at)
-        value = sense * (yield t)
-        if value < best:
+        found = value(t)
+        if found < best:
             left, right = (left, at) if low else (at, right)
-            best, at = value, t
+            best, at = found, t
         else:
             left, right = (t, right) if low else (left, t)
-    return best, at
-
-
-def carry_out(search: Search[Found], value: Callable[[float], float]) -> Found:
-    """What a search finds of one function."""
-    try:
-        place = next(search)
-        while True:
-            place = search.send(value(place))
-    except StopIteration as end:
-        found: Found = end.value
-        return found
-
-
-def find_root(value: Callable[[float], float], low: float, high: float, f_low: float, f_high: float) -> float:
-    """A root between two places with values of different sign."""
-    return low if f_low == 0.0 else carry_out(search_root(low, high, f_low, f_high), value)[0]
+    return at

@@ -120,6 +120,7 @@ class Events:
     def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
+        self.over = False  #: whether the last reset ended the run
         self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
         self.model: list[RunEvent] = []
         self.formulas: list[tuple[RunEvent, Expression]] = []
@@ -197,7 +198,7 @@ class Events:
         after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
         return after
 
-    def crowded(self, t: float, count: int) -> ZenoError:
+    def crowded(self, t: float, count: int) -> SimulationError:
         """The error for resets that never end."""
         return self.crowded_near(t, count, [event.name for event in self.model if event.action != GO_ON])
 

@@ -28,7 +28,7 @@ from ..errors import EomgenError
 from ..numeric.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
 from ..numeric.continuation import ASTRAY, Continuation, Point, Tangent, interpolate
 from ..numeric.projection import largest
-from ..numeric.roots import SECTIONS, carry_out, find_root, search_least
+from ..numeric.roots import SECTIONS, find_least, find_root
 from ..numeric.scales import Scales
 from ..runtime.kernels import constraint_system
 
@@ -405,9 +405,7 @@ def _worst(continuation: DrivenContinuation, interpolant: ChangePointInterpolant
     def quality(s: float) -> float:
         return continuation.curve.tangent(s, interpolant.at(s)[0]).quality
 
-    middle = 0.5 * (low + high)
-    width = (high - low) * 0.6**SECTIONS
-    return carry_out(search_least(low, middle, high, quality(middle), width), quality)[1]
+    return find_least(quality, low, high, (high - low) * 0.6**SECTIONS)
 
 
 def find_stop(continuation: DrivenContinuation, last: Point) -> tuple[float, Point]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from ..base.algebra import Array
-from ..errors import SimulationError, ZenoError, ill_shaped, no_choice
+from ..errors import SimulationError, ill_shaped, no_choice
 from ..runtime.argument_checks import require, unknown
 from ..runtime.inputs import Forcing
 from .events import warn_of_unknown
@@ -140,6 +140,7 @@ class Watched(Protocol):
     """Events of a run, as :class:`~.events.Events` has them."""
 
     names: list[str]
+    over: bool  #: whether the last reset ended the run
 
     def __len__(self) -> int: ...
 
@@ -149,7 +150,7 @@ class Watched(Protocol):
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
         """The state after events that happened at time t."""
 
-    def crowded(self, t: float, count: int) -> ZenoError:
+    def crowded(self, t: float, count: int) -> SimulationError:
         """The error for resets that never end."""
 
 
@@ -231,7 +232,8 @@ def integrate(
             after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
             if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
                 break
-            status = journey.jump(after) or journey.travel()
+            jumped = journey.jump(after)
+            status = TERMINAL if events.over else jumped or journey.travel()
     except KeyboardInterrupt as interrupt:  # in a reset
         status, raised = STOPPED, interrupt
     finally:

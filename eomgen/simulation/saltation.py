@@ -322,7 +322,7 @@ class Saltation:
             )
         self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
         self.module, self.n, self.names = run.module, run.module.n_x, events.names
-        self.every, self.crowded = events.every, events.crowded
+        self.every, self.crowded, self.over = events.every, events.crowded, False
         self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
         self.found: list[EventSlopes] = []
 

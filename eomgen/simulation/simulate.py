@@ -179,7 +179,7 @@ def simulate(
         size = check_method(method, step)
         declared = declare(module)
         method, last = declared["method"] if method is None else method, float(declared["end"])
-        watched = Events(module.layout, events)
+        watched = events if isinstance(events, Events) else Events(module.layout, events)
         if controllers is not None:
             from .events import ControlledEvents
 
