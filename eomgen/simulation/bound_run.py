@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, cached_property, partial
+from functools import cached_property
 from threading import Timer
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -414,7 +414,7 @@ class Run:
         """What ends the run where its steps lead nowhere, made when first looked at."""
 
         first, kept = self._first
-        return StallCheck(*first, partial(_troubled, self.module), lambda t, x: self.watched(None)(t, x), kept)
+        return StallCheck(*first, self.troubled, lambda t, x: self.watched(None)(t, x), kept)
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of further steps."""
@@ -455,7 +455,7 @@ class Run:
 
     def troubled(self, t: float, x: Array) -> bool:
         """Whether a state is at a singularity that can be named."""
-        return _troubled(self.module, t, x)
+        return self.module.kernels.fail.trouble(x, t) is not None
 
     def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
         """The error for a run whose steps led nowhere."""
@@ -483,18 +483,6 @@ class Run:
         return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
 
 
-def _troubled(module: BoundModel, t: float, x: Array) -> bool:
-    return module.kernels.fail.trouble(x, t) is not None
-
-
 def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
     """What shows the progress of a run: if that is asked for, or by default on a terminal."""
-    shown, wanted = _progress()
-    return shown(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-
-
-@cache
-def _progress() -> tuple[type[Progress], Callable[[bool | None], bool]]:
-    """The class of what shows progress and the function that tells whether to, found once: a run starts with them."""
-
-    return Progress, wanted
+    return Progress(start, end, 0.0 if progress else PATIENCE) if wanted(progress) else None

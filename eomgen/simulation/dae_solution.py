@@ -24,7 +24,7 @@ from .bound_run import Crawling, Run
 from .events import Events
 from .integrate import integrate, require_end
 from .recording import record
-from .run_arguments import check_step, check_tolerances, find_span, find_state, ordered_times
+from .run_arguments import check_step, check_tolerances, find_state, ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -80,56 +80,39 @@ class Dae(DaeForm):
         ZenoError
             Events that reset the state follow each other ever faster.
         """
-        tolerances = {"rtol": rtol, "atol": atol}
-        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, events, tolerances, options)
-
-
-def integrate_dae(
-    module: BoundModel,
-    span: Span,
-    initial: Start,
-    parameters: Any,
-    inputs: Mapping[str, Any] | None,
-    t_eval: Any,
-    events: Any,
-    tolerances: Mapping[str, Any],
-    options: Mapping[str, Any],
-) -> Trajectory:
-    """One run; see :meth:`Dae.solve`."""
-    refuse_rigid(module.layout, "dae.solve")
-    ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
-    for name in OWN:
-        if name in options:
-            raise at_odds(f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate")
-    if not DaeForm(module).n_y:
-        raise cannot(f"{module.name} has no unknowns that IDA could solve for; use simulate")
-    forcing = Forcing(module.layout, inputs)
-    start, end = find_span(span, float(module.metadata["simulation"]["end"]))
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
-    forcing.begin(start, end)
-    tolerances = {**tolerances, "rtol": check_tolerances(module.n_x, np.inf, tolerances)["rtol"]}
-    watched = Events(module.layout, events)
-    x0 = find_state(bound, initial, start, forcing)
-    times = None if t_eval is None else ordered_times(t_eval, start, end, DaeForm(module).n_y)
-    if options.get("max_step"):
-        require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
-    run = Run(bound, forcing)
-    make = partial(_Steps, bound, forcing, end, partial(ida.IDA, **tolerances), options)
-    nodes = [start, *forcing.corners(start, end), end]
-    try:
-        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+        module = self._module
+        refuse_rigid(module.layout, "dae.solve")
+        ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
+        for name in OWN:
+            if name in options:
+                raise at_odds(
+                    f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate"
+                )
+        if not DaeForm(module).n_y:
+            raise cannot(f"{module.name} has no unknowns that IDA could solve for; use simulate")
+        bound, forcing, start, end = set_up(module, span, parameters, inputs)
+        forcing.begin(start, end)
+        tolerances = {"rtol": check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol})["rtol"], "atol": atol}
+        watched = Events(module.layout, events)
+        x0 = find_state(bound, initial, start, forcing)
+        times = None if t_eval is None else ordered_times(t_eval, start, end, DaeForm(module).n_y)
+        if options.get("max_step"):
+            require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
+        run = Run(bound, forcing)
+        make = partial(_Steps, bound, forcing, end, partial(ida.IDA, **tolerances), options)
+        nodes = [start, *forcing.corners(start, end), end]
+        try:
             solution, _, raised = integrate(
                 bound, forcing, nodes, x0, make, times, False, {}, watched, rates=run.watched(None)
             )
-        if raised is not None:
-            raise raised
-    except Crawling as crawl:
-        raise run.gave_up(crawl, end, "IDA", dict(tolerances)) from None
-    if solution.status < 0:
-        raise SimulationError(f"IDA stopped at t = {solution.ends[1]:.6g} s of {end:.6g} s: {solution.message}")
-    require_end(solution, end)
-    return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)
+            if raised is not None:
+                raise raised
+        except Crawling as crawl:
+            raise run.gave_up(crawl, end, "IDA", dict(tolerances)) from None
+        if solution.status < 0:
+            raise SimulationError(f"IDA stopped at t = {solution.ends[1]:.6g} s of {end:.6g} s: {solution.message}")
+        require_end(solution, end)
+        return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)
 
 
 class _Steps:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +15,9 @@ from ..runtime.inputs import Forcing
 from ..runtime.trajectory import Span, Start
 from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath
-from .integrate import MESSAGES, TERMINAL, integrate
+from .integrate import integrate
 from .kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
-from .run_arguments import find_span, ordered_times
+from .run_arguments import ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -55,16 +55,27 @@ def follow_drivers(
                 f"method 'kinematic' is for mechanisms without degrees of freedom; {module.name} has {module.n_dof}"
             )
         return None
-    forcing = Forcing(module.layout, inputs)
-    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
+    bound, forcing, start, end = set_up(module, span, parameters, inputs)
     watched = Events(module.layout, events)
     if watched.resets:
         raise cannot(f"{module.name} has no degree of freedom: its drivers move it, and no event can reset its state")
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
-    given = {key: value for key, value in options.items() if value is not None}
-    return simulate_driven(bound, (start, end), initial, forcing, stored, watched, given)
+    for name, value in options.items():
+        if value is not None and name not in ("rtol", "atol", "max_step", "first_step"):  # of no meaning here
+            raise no_such(
+                f"a run of a mechanism that drivers move entirely has no option {name!r}; give method= "
+                "too to integrate it"
+            )
+    motion = _follow(bound, initial, forcing, start, end)
+    found, _, raised = integrate(
+        bound, forcing, [start, end], motion.state(start), partial(_Steps, motion), stored, False, {}, watched,
+        rates=motion.rates,
+    )  # fmt: skip
+    if raised is not None:
+        raise raised
+    ends = [start, float(found.t[-1]) if found.t.size else start]
+    header = {"status": found.status, "message": found.message, "span": ends, "event_names": list(watched.names)}
+    return motion.keep(found.t, found.t_events, found.x_events, header)
 
 
 def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
@@ -79,27 +90,8 @@ def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method:
     return led
 
 
-def simulate_driven(
-    module: BoundModel,
-    span: tuple[float, float],
-    initial: Start,
-    forcing: Forcing,
-    t_eval: Array | None,
-    events: Events,
-    given: Mapping[str, Any],
-) -> KinematicAnalysis:
-    """The motion over a span; see :func:`~.simulate.simulate`.
-
-    Parameters
-    ----------
-    module : BoundModel
-        With the parameters and constant inputs of the run bound.
-    span : (float, float)
-    t_eval : (n_t,) array, optional
-        Within the span, in order.
-    events : Events
-    given : mapping
-        Options meant for an integrator; tolerances and steps have no meaning here.
+def _follow(module: BoundModel, initial: Start, forcing: Forcing, start: float, end: float) -> _Motion:
+    """The motion over a span.
 
     Raises
     ------
@@ -108,13 +100,6 @@ def simulate_driven(
     SimulationError
         The drivers come to a position from which they cannot go on.
     """
-    for name in given:
-        if name not in ("rtol", "atol", "max_step", "first_step"):
-            raise no_such(
-                f"a run of a mechanism that drivers move entirely has no option {name!r}; give method= "
-                "too to integrate it"
-            )
-    start, end = span
     nothing = np.empty(0)
     if initial is None:
         t0, q = start_from(module, None, start)
@@ -134,62 +119,31 @@ def simulate_driven(
             f"the drivers cannot move further at t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
             "change the drivers' values, or the dimensions"
         )
-    own = followed.nodes[followed.nodes <= followed.end]
-    if t_eval is None:
-        s = np.unique(
-            np.concatenate([own, np.linspace(0.0, followed.end, FEWEST)]) if len(own) < FEWEST else [*own, followed.end]
-        )
-        t = start + sense * s
-    else:
-        t = t_eval
-        s = sense * (t - start)
-    run = _DrivenRun(followed, forcing, start, sense)
-    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [followed.end]])))
-    message, status = (MESSAGES[TERMINAL], 1) if last is not None else ("The end was reached.", 0)
-    if last is not None:
-        kept = s < last
-        s, t = s[kept], t[kept]
-        if t_eval is None:
-            s, t = np.append(s, last), np.append(t, start + sense * last)
-    ends = [start, float(t[-1]) if t.size else start]
-    return run.keep(
-        t,
-        s,
-        t_events,
-        x_events,
-        {"status": status, "message": message, "span": ends, "event_names": list(events.names)},
-    )
+    own = followed.nodes[followed.nodes < followed.end]
+    if len(own) < FEWEST - 1:
+        own = np.unique(np.concatenate([own, np.linspace(0.0, followed.end, FEWEST)[:-1]]))
+    times = np.append(start + sense * own, end)
+    return _Motion(followed, forcing, start, sense, times)
 
 
-class _DrivenRun:
-    """Samples of one followed path as states."""
+class _Motion:
+    """A followed path as a motion over time, known at some times."""
 
-    def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float) -> None:
+    def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float, times: Array) -> None:
         self.followed, self.forcing, self.start, self.sense = followed, forcing, start, sense
         self.known: dict[float, tuple[Array, Array, Array]] = {}
+        self.known = dict(zip(times.tolist(), zip(*(part.T for part in self.over(times)), strict=True), strict=True))
 
-    def find(self, events: Events, grid: Array) -> tuple[list[Array], list[Array], float | None]:
-        """Times and states of events, and where a terminal one ends the run, with the grid as steps."""
-        if not len(events):
-            return [], [], None
-        module, end = self.followed.driven.module, self.start + self.sense * self.followed.end
-        times, motion = self.start + self.sense * grid, self.followed.motion(grid, None)
-        self.known = dict(zip(times.tolist(), zip(*(part.T for part in motion), strict=True), strict=True))
-        found, _, raised = integrate(
-            module, self.forcing, [self.start, end], self.state(self.start), partial(_Steps, self), np.empty(0), False,
-            {}, events, rates=self.rates,
-        )  # fmt: skip
-        if raised is not None:
-            raise raised
-        last = self.sense * (found.ends[1] - self.start) if found.status == 1 else None
-        return found.t_events, found.x_events, last
+    def over(self, t: Array) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations (n, k) at times (k,)."""
+        return self.followed.motion(self.sense * (t - self.start), None)
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
-        """Position, velocities and accelerations at a time."""
+        """The same at one time."""
         if t in self.known:
             return self.known[t]
-        q, v, a = self.followed.motion(np.array([self.sense * (t - self.start)]), None)
-        return q[:, 0], v[:, 0], a[:, 0]
+        q, v, a = (part[:, 0] for part in self.over(np.array([t])))
+        return q, v, a
 
     def state(self, t: float) -> Array:
         """x (n_x,)."""
@@ -202,34 +156,22 @@ class _DrivenRun:
         return np.concatenate([v if space is None else space.rates(q, v), a])
 
     def keep(
-        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
+        self, t: Array, t_events: Sequence[Array], x_events: Sequence[Array], header: dict[str, Any]
     ) -> KinematicAnalysis:
-        """The trajectory at parameters s."""
-        motion = self.followed.motion(s, None)
-        sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
-            times, self.sense * (times - self.start), [], [], header
-        )
+        """The trajectory at times (k,)."""
+        motion = self.over(t)
+        sample = partial(self.keep, t_events=(), x_events=(), header=header)
         u = self.forcing.sample(t, np.concatenate(motion[:2]))
         return keep(
-            self.followed.driven,
-            t,
-            [motion],
-            self.followed.singular,
-            None,
-            len(t),
-            (),
-            u=u,
-            header=header,
-            t_events=t_events,
-            x_events=x_events,
-            sample=sample,
-        )
+            self.followed.driven, t, [motion], self.followed.singular, None, len(t), (), u=u, header=header,
+            t_events=t_events, x_events=x_events, sample=sample,
+        )  # fmt: skip
 
 
 class _Steps:
     """Steps along a followed path, with the calls of SciPy's OdeSolver."""
 
-    def __init__(self, run: _DrivenRun, _: Any, t: float, x: Array, end: float) -> None:
+    def __init__(self, run: _Motion, _: Any, t: float, x: Array, end: float) -> None:
         self.run, self.t_old, self.t, self.y, self.t_bound, self.status = run, t, t, x, end, "running"
         self.left = iter([at for at in run.known if run.sense * (at - t) > 0.0])
 

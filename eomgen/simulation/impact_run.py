@@ -20,7 +20,7 @@ from ..runtime.refusals import refuse_rigid
 from ..runtime.trajectory import Span, Start, Trajectory
 from .events import WAIT, Events, RunEvent
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
-from .run_arguments import find_span, find_state
+from .run_arguments import find_state, set_up
 from .simulate import simulate
 
 if TYPE_CHECKING:
@@ -299,12 +299,9 @@ def simulate_impacts(
         raise cannot(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
         )
-    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound, forcing, start, end = set_up(module, span, parameters, inputs)
     if end < start:
         raise cannot(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
-    forcing = Forcing(module.layout, inputs)
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
     forcing.begin(start, end)
     events = GapEvents(Gaps(bound, tuple(found), forcing if forcing else None), found, rough, most, end)
     before = find_state(bound, initial, start, forcing)

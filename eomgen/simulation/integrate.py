@@ -8,6 +8,7 @@ within a step, and a run goes on from what a reset made of its state.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import nullcontext
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -43,20 +44,6 @@ class Solution(NamedTuple):
     ends: tuple[float, float]  #: first and last time reached
     steps: tuple[Array, Array] | None = None  #: (k,), (n_x, k) of every step, where others are stored; k = 0: too many
     finite: bool = False  #: whether the states are known to be finite
-
-
-class Interrupted(KeyboardInterrupt):
-    """An interrupt inside an integration, with what there was.
-
-    Parameters
-    ----------
-    solution : Solution
-        The steps up to there.
-    """
-
-    def __init__(self, solution: Solution) -> None:
-        super().__init__()
-        self.solution = solution
 
 
 class Joined:
@@ -224,16 +211,19 @@ def integrate(
         plan["inputs"] = forcing if forcing else None
         journey = core.called("called", module.kernels.context, start, x0, end, 0.0, 0.0, inf, 0.0, (), plan)
     status, raised = 0, None
+    quiet = nullcontext() if isinstance(method, str) else np.errstate(all="ignore")  # NaN of a failure shortens a step
     try:
-        status = journey.travel()
-        while status in (WAITING, RESET_FAILED) and events is not None:
-            k = next((k for k, at in enumerate(nodes[1:-1]) if (at - journey.t) * (end - start) >= 0.0), len(nodes) - 2)
-            forcing.enter(nodes[k], nodes[k + 1])  # as the loop has it
-            after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
-            if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
-                break
-            jumped = journey.jump(after)
-            status = TERMINAL if events.over else jumped or journey.travel()
+        with quiet:
+            status = journey.travel()
+            while status in (WAITING, RESET_FAILED) and events is not None:
+                later = (k for k, at in enumerate(nodes[1:-1]) if (at - journey.t) * (end - start) >= 0.0)
+                k = next(later, len(nodes) - 2)
+                forcing.enter(nodes[k], nodes[k + 1])  # as the loop has it
+                after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
+                if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
+                    break
+                jumped = journey.jump(after)
+                status = TERMINAL if events.over else jumped or journey.travel()
     except KeyboardInterrupt as interrupt:  # in a reset
         status, raised = STOPPED, interrupt
     finally:

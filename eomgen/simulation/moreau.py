@@ -64,7 +64,7 @@ from .events import Events, is_told_by_the_caller
 from .integrate import Solution
 from .meetings import deep_start
 from .recording import record
-from .run_arguments import check_step, find_span, find_state, ordered_times
+from .run_arguments import check_step, find_state, ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -472,14 +472,11 @@ def step_rigidly(
     keep = given.get("contact_forces", False)
     if keep is not True and keep is not False:
         raise ill_typed(f"contact_forces must be True or False, not {shown(keep)}")
-    forcing = Forcing(module.layout, inputs)
-    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound, forcing, start, end = set_up(module, span, parameters, inputs)
     if end < start:
         raise cannot("method moreau runs forwards only: impacts cannot be undone")
     require_steps("step", h, start, end)
     _require_no_others(module, events)
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
     forcing.begin(start, end)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     require_room("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")

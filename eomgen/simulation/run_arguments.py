@@ -197,6 +197,17 @@ def declare(module: BoundModel) -> dict[str, Any]:
     return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
 
 
+def set_up(
+    module: BoundModel, span: Span, parameters: Any, inputs: Mapping[str, Any] | None
+) -> tuple[BoundModel, Forcing, float, float]:
+    """The module with the values of a run bound, its inputs over time, start and end (s)."""
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(declare(module)["end"]))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    return bound, forcing, start, end
+
+
 def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
     """The model's own ``max_step`` (s), which implicit methods do not need; empty without."""
     own = module.metadata.get("simulation", {}).get("max_step")

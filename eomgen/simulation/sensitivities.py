@@ -27,7 +27,7 @@ from .bound_run import Crawling, StallCheck, describe_crawl
 from .events import Events, told_by_the_caller
 from .integrate import Solution, choose_solver, integrate, require_end
 from .recording import record
-from .run_arguments import DEFAULTS, check_tolerances, find_span, find_state, longest_step, ordered_times
+from .run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
 from .saltation import Saltation, Variational
 from .sensitivity_start import (
     Sensitivities,
@@ -101,12 +101,8 @@ def sensitivities(
     require_projection(module.layout)
     refuse_rigid(module.layout, "sensitivities")
     check_names("option of sensitivities", options, OPTIONS, ("method", "rtol", "atol", "t_eval", "events"))
-    forcing = Forcing(module.layout, inputs)
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
+    bound, forcing, start, stop = set_up(module, span, parameters, inputs)
     layout = bound.layout
-    declared: Any = bound.metadata.get("simulation", {}).get("end") or DEFAULTS["end"]
-    start, stop = find_span(span, float(declared))
     corners = forcing.corners(start, stop)
     nodes = [start, *corners, stop]
     forcing.enter(*nodes[:2])
@@ -142,10 +138,9 @@ def sensitivities(
     rates = lambda t, x: bound.rhs(t, x, u=forcing(t, x))  # noqa: E731
     stall_check = StallCheck(start, stop, x0, layout.n_q, longest, troubled, rates, numbers)
     try:
-        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-            solution, _, raised = integrate(
-                bound, forcing, nodes, z0, solver, times, False, settings, salts, None, stall_check.look, run
-            )
+        solution, _, raised = integrate(
+            bound, forcing, nodes, z0, solver, times, False, settings, salts, None, stall_check.look, run
+        )
         if raised is not None:
             raise raised
     except Crawling as crawl:

@@ -25,7 +25,7 @@ from ..runtime.trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
 from .compiled import can_run, settle
 from .events import WAIT, Events, is_told_by_the_caller, told_by_the_caller
-from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
+from .integrate import Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .recording import record, warn_of_limits
 from .run_arguments import (
     IMPLICIT,
@@ -214,11 +214,10 @@ def simulate(
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
-    if any(event.action == WAIT for event in watched.model):
+    if any(event.action == WAIT for event in watched.model) and not is_told_by_the_caller():
         from .impact import describe_negative_gaps
 
-        words = describe_negative_gaps(bound, start, x0, watched.declared, forcing)
-        if words and not is_told_by_the_caller():
+        if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
             warnings.warn(words, stacklevel=calls_within() + 1)
     if "contact_shapes" in bound.metadata:
         from .meetings import warn_of_depth
@@ -246,23 +245,19 @@ def simulate(
         require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     run.begin(start, end, x0, longest, numbers)
     try:
-        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-            solution, failure, raised = integrate(
-                bound, forcing, nodes, x0, title if compiled else solver, stored, dense_output, settings, watched,
-                watch, run.look, None if compiled else run.watched(watch),
-            )  # fmt: skip
+        solution, failure, raised = integrate(
+            bound, forcing, nodes, x0, title if compiled else solver, stored, dense_output, settings, watched,
+            watch, run.look, None if compiled else run.watched(watch),
+        )  # fmt: skip
         if failure is not None:
             run.last = ("rhs", *failure)
         if isinstance(raised, KeyboardInterrupt):
-            raise Interrupted(solution) from raised
+            raise SimulationInterrupted(
+                f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
+                lambda: record(bound, forcing, solution, title, settings, watched.names),
+            ) from raised
         if raised is not None:
             raise raised
-    except Interrupted as interrupt:
-        solution = interrupt.solution
-        raise SimulationInterrupted(
-            f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
-            lambda: record(bound, forcing, solution, title, settings, watched.names),
-        ) from interrupt.__cause__
     except EvaluationError as error:  # of a reset
         event, watched.last = watched.last, ""
         raise SimulationError(f"{title} stopped{event}: {error}") from error
