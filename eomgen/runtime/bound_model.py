@@ -29,7 +29,6 @@ from .refusals import refuse_reaction_laws, refuse_states
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
-    from .tree_motion import DependentMotion
 
 
 class InverseDynamicsDerivatives(NamedTuple):
@@ -436,8 +435,8 @@ class BoundModel:
     # kinematics
 
     @cached_property
-    def _path(self) -> tuple[DependentMotion, Callable[[float], Array]]:
-        from .tree_motion import DependentMotion
+    def _path(self) -> tuple[Any, Callable[[float], Array]]:
+        from .minimal import DependentMotion
 
         return DependentMotion(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
 
@@ -481,7 +480,7 @@ class BoundModel:
         self.layout.require_minimal_form()
         if p is not None or u is not None:
             return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
-        from .tree_motion import motions
+        from .minimal import motions
 
         path, reference = self._path
         start = None if guess is None else read_numbers("guess", guess)

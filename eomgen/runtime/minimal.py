@@ -1,23 +1,268 @@
-"""States x = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
+"""Independent coordinates and velocities -> the motion of the whole tree, and the equations of motion in them alone.
+
+From a known closed position the independent coordinates are led along a straight line, each point being found by one
+Newton iteration of the kernel ``kinematics``, so that the branch stays the same.
+"""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..errors import PartitionError, at_odds, ill_shaped, no_number
+from ..base.limits.analyses import FOLLOWED
+from ..errors import (
+    EvaluationError,
+    PartitionError,
+    ProjectionError,
+    at_odds,
+    ill_shaped,
+    no_number,
+    too_large,
+)
+from ..numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
+from ..numeric.projection import largest
 from .argument_checks import read_number, read_numbers
 from .argument_names import both_names
+from .failure import place
+from .kernels import Kernels
+from .layout import Layout
 from .refusals import require_switched
-from .tree_motion import STEP, DependentMotion
 
-if TYPE_CHECKING:
-    from .bound_model import BoundModel
+# -- the motion of the whole tree --------------------------------------------------------------------------------------
+
+STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration is asked for
+EARLY = 1000  #: steps after which a way is refused that is too long at the present rate of the dependent coordinates
+JUMP = 0.6  #: largest scaled change of any coordinate in one iteration; more may be another branch
+
+
+class IndependentPath:
+    """Closed positions while the independent coordinates go along a straight line; s is the scaled distance.
+
+    Parameters
+    ----------
+    motion : DependentMotion
+    start : (n_q,) array
+        A closed position.
+    target : (n_dof,) array
+        Independent coordinates at the end.
+    t : float
+    """
+
+    def __init__(self, motion: DependentMotion, start: Array, target: Array, t: float) -> None:
+        self.motion, self.target, self.t = motion, target, t
+        self.scales, self.origin = motion.layout.scales, start[motion.layout.independent_q]
+        way = target - self.origin
+        self.length = float(np.abs(way / motion.scales_i).max(initial=0.0))
+        self.rate = way / (self.length or 1.0)
+        self.failed = np.empty(0)  # what the kernel gave where it found nothing
+        n_q, n = len(start), len(self.scales.q)
+        self.drifts = bool(self._kinematics(0.0, np.zeros_like(way), start)[n_q : n_q + n].any())
+
+    def at(self, s: float) -> Array:
+        """Independent coordinates."""
+        return self.target if s == self.length else self.origin + s * self.rate
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess, by one Newton iteration of the kernel."""
+        n_q = len(guess)
+        found = self._kinematics(s, self.rate, guess)
+        if not np.isfinite(found).all():
+            self.failed = found
+            return None
+        q, v = found[:n_q], found[n_q : n_q + len(self.scales.q)]
+        if self.drifts:  # the time stands still here
+            v = v - self._kinematics(s, np.zeros_like(self.rate), q)[n_q : n_q + len(v)]
+        return Point(s, q, Tangent(v))
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position."""
+        found = self.solve(s, q)
+        return Tangent(np.zeros_like(self.scales.q)) if found is None else found.tangent
+
+    def _kinematics(self, s: float, rate: Array, guess: Array) -> Array:
+        rest = np.zeros(self.motion.layout.n_states)  # states stand still
+        x = np.concatenate([self.at(s), rate, rest, np.zeros_like(rate), rest, guess])
+        return np.asarray(self.motion.kernel(x, t=self.t))
+
+
+class DependentMotion:
+    """Solves the dependent coordinates of one model, never switching branch silently."""
+
+    def __init__(self, kernels: Kernels) -> None:
+        self.layout = layout = kernels.layout
+        self.fail = kernels.fail
+        if layout.rank:
+            self.kernel = kernels.state("kinematics", nan=True)
+        self.scales_i = layout.scales.q[layout.independent_moving]
+
+    def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:
+        """[q, v, a] (3 n,) by one Newton iteration from a guess, wherever it leads."""
+        layout = self.layout
+        if not layout.rank:
+            q, motion = np.empty(layout.n_q), np.empty((2, layout.n_v))
+            q[layout.independent_q] = q_i
+            motion[:, layout.independent] = v_i, a_i
+            return np.concatenate([q, motion.ravel()])
+        result = self.kernel(np.concatenate([q_i, v_i, a_i, guess]), t=t)
+        if not np.isfinite(result).all():
+            raise self._blocked(q_i, result)
+        return result
+
+    def motion(self, q_i: Array, v_i: Array, a_i: Array, near: Array, t: float) -> Array:
+        """[q, v, a] (3 n,) from a closed position not farther than one step."""
+        if not self.layout.rank:
+            return self.newton(q_i, v_i, a_i, near, t)
+        result = self.kernel(np.concatenate([q_i, v_i, a_i, near]), t=t)
+        if np.abs(self.layout.scales.distance(result[: self.layout.n_q], near)).max() <= JUMP:  # False for NaN
+            return result
+        return self.newton(q_i, v_i, a_i, self.follow(near, q_i, t), t)
+
+    def follow(self, start: Array, target: Array, t: float) -> Array:
+        """From a closed q along the straight line to independent values."""
+        if not self.layout.rank:
+            return start
+        path = IndependentPath(self, start, target, t)
+        self._require_near(target, path.length)
+        continuation = Continuation(path, start, fewest=1)
+        self._go_on(continuation, target, path.length)
+        found = continuation.reach(path.length)
+        if found is None:
+            raise self._too_far(target, self._blocked(path.at(continuation.points[-1].s), path.failed))
+        return found.q
+
+    def follow_all(self, start: Array, targets: Array) -> list[Array]:
+        """The same for columns of targets (n_dof, k), at t = 0.
+
+        With one degree of freedom all columns lie on one line.  It is followed once, over points at whole distances
+        from the start, so that the result of a column does not depend on the others.
+        """
+        if len(self.layout.independent_q) != 1 or not self.layout.rank:
+            return [self.follow(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
+        origin, unit, n_q = start[self.layout.independent_q], self.scales_i[0], self.layout.n_q
+        lengths = (targets[0] - origin[0]) / unit
+        self._require_near(targets[:, np.abs(lengths).argmax()], float(np.abs(lengths).max()))
+        result = np.full((n_q, len(lengths)), np.nan)
+        for sense in (1.0, -1.0):
+            chosen = np.flatnonzero((lengths >= 0.0) == (sense > 0.0))
+            if not chosen.size:
+                continue
+            path = IndependentPath(self, start, origin + sense * unit, 0.0)
+            path.length = np.inf  # it has no end of its own
+            way = Continuation(path, start, fewest=1)
+            farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
+            while not way.blocked and way.points[-1].s <= farthest:
+                self._go_on(way, targets[:, chosen[0]], np.floor(way.points[-1].s) + 1.0)
+            guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
+            x = np.concatenate([targets[:, chosen], np.zeros((2 * self.layout.n_dof, len(chosen))), guesses])
+            found = self.kernel(x, t=0.0)[:n_q]
+            for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
+                near = np.abs(path.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
+                result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
+        return list(result.T)
+
+    def _go_on(self, way: Continuation, target: Array, end: float) -> None:
+        """Follow a way to s = end; refuse one on which the dependent coordinates move farther than can be followed."""
+        if way.to(end, steps=EARLY) or way.blocked:
+            return
+        here = way.points[-1]
+        rate = largest(here.tangent.rate / self.layout.scales.q)
+        self._require_near(target, (end - here.s) * rate, LONG * STEPS)
+        if not way.to(end) and not way.blocked:
+            self._require_near(target, np.inf)
+
+    def _require_near(self, target: Array, length: float, most: float = FOLLOWED) -> None:
+        if not length <= most:
+            raise too_large(
+                f"the path to {self._place(target)} is {length:.3g} rad or length scales long, and at most "
+                f"{most:g} "
+                "are allowed, in small steps that stay on the branch; give a nearer position (without whole turns), "
+                "or guess=, a position to start from"
+            )
+
+    def _place(self, target: Array) -> str:
+        return place([self.layout.velocity_labels[i] for i in self.layout.independent_moving], target).removeprefix(
+            ", "
+        )
+
+    def _blocked(self, target: Array, found: Array) -> EvaluationError:
+        """Why the step to independent values failed."""
+        if np.isfinite(found).all() or self.kernel.failure is None:
+            words = f"the position {self._place(target)} lies on another branch, or too near to a dead centre"
+            return ProjectionError(words, 0.0, target)
+        status, t, x = self.kernel.failure
+        error = self.fail.exception("kinematics", status, t, x)
+        return type(error)(f"{self._place(target)}: {error}", t, target)
+
+    def _too_far(self, target: Array, error: EvaluationError) -> EvaluationError:
+        return type(error)(f"the path to {self._place(target)} is blocked at {error}", error.time, target)
+
+
+def motions(
+    path: DependentMotion,
+    reference: Callable[[float], Array],
+    given: Sequence[ArrayLike | None],
+    guess: Array | None,
+    t: Array,
+) -> tuple[Array, Array, Array]:
+    """Positions, velocities and accelerations of the whole tree, each column for itself.
+
+    Parameters
+    ----------
+    path : DependentMotion
+    reference : callable
+        t -> the closed position (n,) to start from.
+    given : three arrays (n_dof,) or (n_dof, k), or None
+        q_i, v_i, a_i; None is zero.
+    guess : (n,) array, optional
+        Start of Newton's iteration instead of following from there.
+    t : () or (k,) array
+
+    Returns
+    -------
+    q, v, a : (n,) or (n, k) arrays
+    """
+    layout = path.layout
+    n_q, n, size = layout.n_q, layout.n_v, len(layout.independent_q)
+    labels, width = ("q_i", "v_i", "a_i"), n_q + 2 * n
+    arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, given, strict=True)]
+    columns = max((part.shape[1:] for part in arrays if part is not None), key=len, default=())
+    parts = []
+    for name, part in zip(labels, arrays, strict=True):
+        full = np.zeros((size, *columns)) if part is None else part
+        if full.shape not in ((size,), (size, *columns)) or full.ndim > 2:
+            raise ill_shaped(f"{name} must have shape ({size},) or ({size}, k), not {full.shape}")
+        if not np.isfinite(full).all():
+            raise no_number(f"{name} must be finite")
+        parts.append(np.broadcast_to(full if full.shape[1:] == columns else full[:, None], (size, *columns)))
+    q, v, a = (part if columns else part[:, None] for part in parts)
+    v, a = (np.concatenate([part, np.zeros((layout.n_states, part.shape[1]))]) for part in (v, a))
+    if t.shape not in ((), q.shape[1:]):
+        raise ill_shaped(f"t must be a number or have shape {q.shape[1:]}, one a position, not {t.shape}")
+    times = np.broadcast_to(t, q.shape[1:])
+    if guess is not None:
+        if guess.shape != (layout.n_q,):
+            raise ill_shaped(f"guess must have shape ({layout.n_q},), not {guess.shape}")
+        near = [guess] * q.shape[1]
+    elif (times == 0.0).all():
+        near = path.follow_all(reference(0.0), q)
+    else:  # driven constraints have another reference at each time
+        near = [path.follow(reference(float(time)), q[:, j], float(time)) for j, time in enumerate(times)]
+    solve = path.motion if guess is None else path.newton
+    result = np.empty((n_q + 2 * n, q.shape[1]))
+    for j in range(q.shape[1]):
+        result[:, j] = solve(q[:, j], v[:, j], a[:, j], near[j], float(times[j]))
+    if not columns:
+        result = result[:, 0]
+    moving = layout.moving
+    return result[:n_q], result[n_q : n_q + moving], result[n_q + n : n_q + n + moving]
+
+
+# -- the minimal form --------------------------------------------------------------------------------------------------
 
 AMPLIFIED = 10.0  #: v_d / v_i above which a dead centre is near
 REMEMBERED = 7  #: calls that the next one is compared with, less one
@@ -59,8 +304,8 @@ class Minimal:
     n_x : int
     """
 
-    def __init__(self, module: BoundModel) -> None:
-        layout = module.layout
+    def __init__(self, module: Any) -> None:
+        layout: Layout = module.layout
         layout.require_minimal_form()
         self._module = module
         self._layout = layout
