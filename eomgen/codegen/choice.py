@@ -11,7 +11,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.schedule import count
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..kinematics.wrenches import drives_cut_joint
+from ..kinematics.wrenches import cut_drives
 from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
 from .loop_systems import BodyLoops, EmbeddedLoops, LoopBlocks, estimate
 from .program import Limits
@@ -47,7 +47,7 @@ class Choice:
 
 def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
     """Derive by ``embedding`` and by ``recursive``; keep the one whose right-hand side takes fewer operations."""
-    if drives_cut_joint(kinematics):  # its inertia couples branches: what recursion cannot have
+    if cut_drives(kinematics):  # its inertia couples branches: what recursion cannot have
         return METHODS["embedding"](kinematics), None
     if kinematics.constraints.labels:
         return _choose_with_constraints(kinematics, mobility)

@@ -23,7 +23,7 @@ from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import motion_axes, near_pairs
 from ..kinematics.topology import acceleration_name
-from ..kinematics.wrenches import drives_cut_joint, find_wrenches
+from ..kinematics.wrenches import cut_drives, find_wrenches
 from .factor import has_long_paths
 from .reactions import multiplier_values
 
@@ -86,7 +86,7 @@ class SystemTerms:
         self.preferred: tuple[int, ...] = independent_places(k, mobility)
         #: per velocity the next one towards ground (-1: none), always a smaller index; a drive on a cut joint ties
         #: branches, so that all are one chain
-        self.parent: tuple[int, ...] = tuple(range(-1, len(k.v) - 1)) if drives_cut_joint(k) else k.parent
+        self.parent: tuple[int, ...] = tuple(range(-1, len(k.v) - 1)) if cut_drives(k) else k.parent
         self.centroidal = _centroidal(k)  #: (18 + 3n,) or none without mass
         self.quaternion_slots = k.quaternion_slots  #: where Euler parameters start in q, their angular velocity in v
         #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with each other

@@ -40,8 +40,8 @@ from ..kinematics.tree import SpatialInertia
 from ..kinematics.wrenches import (
     applied_wrenches,
     coordinate_forces,
+    cut_drives,
     drive_inertias,
-    drives_cut_joint,
     kinetic_energy,
     potential_energy,
 )
@@ -229,7 +229,7 @@ class Composite(NamedTuple):
 def can_differentiate(kinematics: Kinematics) -> bool:
     """Whether the formulas of this file hold for a mechanism's tree."""
     mechanism = kinematics.mechanism
-    if mechanism.lagrangian is not None or mechanism.given is not None or drives_cut_joint(kinematics):
+    if mechanism.lagrangian is not None or mechanism.given is not None or cut_drives(kinematics):
         return False
     places = coordinate_places(kinematics)
     for link in kinematics.links:

@@ -16,7 +16,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from ..kinematics.wrenches import drive_inertias
+from ..kinematics.wrenches import cut_drives, drive_inertias
 from .analytical import form_energies, generalized_forces
 from .tree_equations import TreeEquations
 
@@ -51,16 +51,6 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         potential_energy=potential,
         canonical=(*momenta, *rates),
     )
-
-
-def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
-    """Inertias of drives on coordinates of cut joints."""
-    joints = kinematics.mechanism.joints
-    return [
-        (s.coordinates[0], s.armature)
-        for s in joints
-        if s.armature is not None and s.coordinates[0] not in kinematics.velocity_labels
-    ]
 
 
 def _turned(kinematics: Kinematics, slopes: Sequence[Expr], momenta: Sequence[Expr]) -> list[Expr]:

@@ -30,8 +30,8 @@ from ..kinematics.tree import SpatialInertia
 from ..kinematics.wrenches import (
     applied_wrenches,
     coordinate_forces,
+    cut_drives,
     drive_inertias,
-    drives_cut_joint,
     kinetic_energy,
     potential_energy,
 )
@@ -60,7 +60,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     if count(shorter).total <= count(inverse).total:  # grouping symbols is work too
         inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
-    solve = None if drives_cut_joint(kinematics) else partial(solve_tree, kinematics, inertias, products, loads)
+    solve = None if cut_drives(kinematics) else partial(solve_tree, kinematics, inertias, products, loads)
     tree = solve() if solve is not None and not kinematics.constraints.labels else None
     return TreeEquations(
         method="recursive",

@@ -94,13 +94,14 @@ def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
     return found
 
 
-def drives_cut_joint(kinematics: Kinematics) -> bool:
-    """Whether a drive's inertia is on a cut joint, where it couples the coordinates of the tree through y_q.
+def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
+    """Inertias of drives on coordinates of cut joints, where they couple the coordinates of the tree through y_q.
 
     A loop can close without any row (two hinges on one axis), and its cut joint still turn a drive.
     """
     loop = kinematics.loop_coordinates.names
-    return any(spec.armature is not None and spec.coordinates[0] in loop for spec in kinematics.mechanism.joints)
+    drives = [(s.coordinates[0], s.armature) for s in kinematics.mechanism.joints if s.armature is not None]
+    return [(name, inertia) for name, inertia in drives if name in loop]
 
 
 Row6 = tuple[Expr, ...]  # force, moment
@@ -391,10 +392,8 @@ class JointWrenches:
         """Force elements and inertias of drives along coordinates of cut joints."""
         loop = self.kinematics.loop_coordinates
         loads = [(c.coordinate, c.value) for terms in self.kinematics.forces for c in terms.coordinate_loads]
-        for spec in self.specs:
-            if spec.armature is not None and spec.coordinates[0] in loop.names:
-                k = loop.names.index(spec.coordinates[0])
-                loads.append((spec.coordinates[0], -(spec.armature * loop.accelerations[k])))
+        for name, inertia in cut_drives(self.kinematics):
+            loads.append((name, -(inertia * loop.accelerations[loop.names.index(name)])))
         return [(name, value) for name, value in loads if name in loop.names]
 
 

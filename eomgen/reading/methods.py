@@ -24,7 +24,7 @@ from ..graph.tensors import solve_symmetric
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from ..kinematics.topology import acceleration_name
-from ..kinematics.wrenches import JointWrenches
+from ..kinematics.wrenches import JointWrenches, cut_drives
 from ..runtime.argument_checks import unknown
 from .quantities import Quantities, Row, Rows, require_bodies
 
@@ -452,10 +452,9 @@ class BodiesApart:
         multipliers = self._multipliers()
         loads = dict(FreeBodies(self.kinematics).along_cut)
         loop = self.kinematics.loop_coordinates
-        for spec in self.kinematics.mechanism.joints:  # the inertia of a drive takes a part of what drives the joint
-            if spec.armature is not None and (name := spec.coordinates[0]) in loop.names:
-                rotor = spec.armature * loop.accelerations[loop.names.index(name)]
-                loads[name] = loads.get(name, self.graph.zero) - rotor
+        for name, inertia in cut_drives(self.kinematics):  # takes a part of what drives the joint
+            rotor = inertia * loop.accelerations[loop.names.index(name)]
+            loads[name] = loads.get(name, self.graph.zero) - rotor
         found: list[Wrench] = []
         for cut in JointWrenches(self.kinematics).cut:
             ends = (cut.spec.predecessor.body, cut.spec.successor.body)
