@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.results import Result, plain, same_keys
 from ..base.texts import shown
 from ..errors import ill_typed, off_range
 from ..runtime.argument_checks import read_number, read_numbers, unknown
@@ -21,7 +23,8 @@ BEYOND = 0.05  #: of a length scale, a radian or a second past a limit, where th
 FAR = 100.0  #: length scales to search for a limit of a length
 
 
-class MotionRange(NamedTuple):
+@dataclass(frozen=True, repr=False)
+class MotionRange(Result):
     """The range of a coordinate from a position, on the same branch, with all other prescribed coordinates at rest.
 
     Attributes
@@ -37,6 +40,7 @@ class MotionRange(NamedTuple):
         Change points between the limits.
     """
 
+    KEYS = same_keys("name", "lower", "upper", "gaps")
     name: str
     lower: float
     upper: float
@@ -48,6 +52,19 @@ class MotionRange(NamedTuple):
     def unlimited(self) -> bool:
         """Whether no limit was found on either side."""
         return self.stops == (None, None)
+
+    def to_dict(self) -> dict[str, Any]:
+        stops = [None if stop is None else plain(stop.facts) for stop in self.stops]
+        return super().to_dict() | {"stops": stops}
+
+    @property
+    def title(self) -> str:
+        return f"range of {self.name}"
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        sides = zip(("lower", "upper"), (self.lower, self.upper), self.stops, self.gaps, strict=True)
+        return [(side, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for side, x, stop, gap in sides]
 
 
 def motion_range(

@@ -21,7 +21,7 @@ from ..base.limits.analyses import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
-from ..base.texts import as_text
+from ..base.results import Result, plain, same_keys
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
 from ..numeric.ranks import partition
 from ..runtime.argument_checks import read_names, read_numbers
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 
-@dataclass(frozen=True)
-class ActuatorForces:
+@dataclass(frozen=True, repr=False)
+class ActuatorForces(Result):
     """Forces of drives that produce a given motion.
 
     Attributes
@@ -68,11 +68,21 @@ class ActuatorForces:
         """Name -> force, as ``inputs=`` of ``simulate`` and ``u=`` take them where all drives are inputs."""
         return dict(zip(self.names, self.forces, strict=True))
 
+    KEYS = same_keys("multipliers", "reactions")
+    title = "Forces of the drives"
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        return [(name, f"{np.min(row):.6g} .. {np.max(row):.6g}" if np.ndim(row) else f"{row:.6g}")
+                for name, row in self.as_dict().items()]  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"forces": plain(self.as_dict())} | super().to_dict()
+
     def __repr__(self) -> str:
         if self.forces.ndim > 1:
             return f"<ActuatorForces of {', '.join(self.names)} at {self.forces.shape[1]} states>"
-        facts = [(name, f"{value:.6g}") for name, value in self.as_dict().items()]
-        return as_text("Forces of the drives", facts)
+        return super().__repr__()
 
 
 @np.errstate(all="ignore")

@@ -12,7 +12,8 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import DIFFERENCES
 from ..base.limits.constraints import STATE
-from ..base.texts import as_html, as_text, number, without_noise
+from ..base.results import Result, same_keys
+from ..base.texts import number, without_noise
 from ..errors import AssemblyError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.initial import Initial
@@ -21,16 +22,15 @@ from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled, requ
 from .balance import Balance, balance_forces, force_slopes
 from .linear import linearize
 from .linearization import Linearization, SecondOrder, stability_of_matrix, stiffness_errors, verdict
-from .search import Search, find_balance
+from .search import Search, SearchPoint, find_balance
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .search import Search, SearchPoint
 
 # -- the result --------------------------------------------------------------------------------------------------------
 
 
-class Equilibrium:
+class Equilibrium(Result):
     """A position in which all forces are in balance; ``eq["theta"]`` reads a coordinate or an unknown found.
 
     Attributes
@@ -60,17 +60,20 @@ class Equilibrium:
         Steps of Newton's iteration.
     """
 
+    KEYS = same_keys("coordinates", "unknowns", "supports", "forces", "steps", "eigenvalues", "stability")
+    coordinates: dict[str, float]
+    states: dict[str, float]
+    unknowns: dict[str, float]
+    forces: dict[str, float]
+    supports: dict[str, float]
+    linear: Linearization | None
+    eigenvalues: Any
+    stability: str
+    steps: int
+
     def __init__(self, module: BoundModel, t: float, x: Array, found: dict[str, Any]) -> None:
         self.module, self.t, self.x, self.q = module, t, x, x[: module.n_q]
-        self.coordinates: dict[str, float] = found["coordinates"]
-        self.states: dict[str, float] = found["states"]
-        self.unknowns: dict[str, float] = found["unknowns"]
-        self.forces: dict[str, float] = found["forces"]
-        self.supports: dict[str, float] = found["supports"]
-        self.linear: Linearization | None = found["linear"]
-        self.eigenvalues: Any = found["eigenvalues"]
-        self.stability: str = found["stability"]
-        self.steps: int = found["steps"]
+        vars(self).update(found)
 
     def __getitem__(self, name: str) -> float:
         values = {**self.coordinates, **self.states, **self.unknowns}
@@ -79,8 +82,11 @@ class Equilibrium:
         return values[name]
 
     @property
+    def title(self) -> str:
+        return f"Equilibrium of {self.module.name}"
+
+    @property
     def facts(self) -> list[tuple[str, str]]:
-        """Label and value of each line of the description."""
         layout = self.module.layout
         units = [layout.unit(name) for name in self.coordinates]
         typical = {"rad": 1.0, "m": layout.length}
@@ -96,12 +102,6 @@ class Equilibrium:
         lines.append(("largest force left", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))
         lines.append(("eigenvalues", ", ".join(number(value) for value in self.eigenvalues)))
         return [*lines, ("stability", self.stability)]
-
-    def __repr__(self) -> str:
-        return as_text(f"Equilibrium of {self.module.name}", self.facts)
-
-    def _repr_html_(self) -> str:
-        return as_html(f"Equilibrium of {self.module.name}", self.facts)
 
 
 def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:

@@ -11,7 +11,8 @@ from ..base import algebra
 from ..base.algebra import Array, Indices
 from ..base.limits.analyses import COUPLED, STILL
 from ..base.limits.numbers import EPS, TINY
-from ..base.texts import as_html, as_text, number
+from ..base.results import Result, ResultTable, same_keys
+from ..base.texts import number, without_noise
 from ..errors import cannot
 from ..runtime.argument_checks import require, unknown
 
@@ -298,7 +299,7 @@ def _is_dissipative(second: SecondOrder) -> bool:
 # -- the result --------------------------------------------------------------------------------------------------------
 
 
-class Linearization:
+class Linearization(Result):
     """Linear equations of the motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
 
     In the minimal form s holds the n_z independent displacements, then the n_dof independent velocities; in the full
@@ -325,6 +326,14 @@ class Linearization:
         Of w and z.
     """
 
+    KEYS = (
+        {"x": "state"}
+        | same_keys("states", "inputs", "outputs", "A", "B", "C", "D", "mass", "damping", "stiffness", "drift")
+        | {"velocities": "velocity_names", "positions": "position_names"}
+        | {"equilibrium": "is_equilibrium", "steady": "is_steady"}
+        | same_keys("eigenvalues", "stability")
+    )
+
     def __init__(
         self,
         layout: Layout,
@@ -350,6 +359,11 @@ class Linearization:
         self.tangent = tangent
         n_z = layout.n_q if tangent is None else len(states) - len(tangent.velocities)
         self.position_names, self.velocity_names = states[:n_z], states[n_z:]
+
+    @property
+    def state(self) -> dict[str, float]:
+        """x by name."""
+        return dict(zip(self.layout.x, self.x.tolist(), strict=True))
 
     @property
     def to_x(self) -> Array:
@@ -556,8 +570,11 @@ class Linearization:
         return control.ss(self.A, self.B, self.C, self.D, name=self.name, **names)
 
     @property
+    def title(self) -> str:
+        return f"Linearization of {self.name}"
+
+    @property
     def facts(self) -> list[tuple[str, str]]:
-        """Label and value of each line of the description."""
         kind = "equilibrium" if self.is_equilibrium else "steady motion" if self.is_steady else "no steady motion"
         lines = [("at", f"{kind}, t = {self.t:.6g} s"), ("states", ", ".join(self.states))]
         lines += [("inputs", ", ".join(self.inputs) or "-"), ("outputs", ", ".join(self.outputs) or "-")]
@@ -568,8 +585,18 @@ class Linearization:
         frozen = " (of the equations frozen at this time)" if kind == "no steady motion" and self.A.size else ""
         return [*lines, ("stability", self.stability + frozen)]
 
-    def __repr__(self) -> str:
-        return as_text(f"Linearization of {self.name}", self.facts)
-
-    def _repr_html_(self) -> str:
-        return as_html(f"Linearization of {self.name}", self.facts)
+    @property
+    def tables(self) -> list[ResultTable]:
+        """A, B, C and D, those that have entries."""
+        found = []
+        for title, rows, columns in (
+            ("A", self.states, self.states),
+            ("B", self.states, self.inputs),
+            ("C", self.outputs, self.states),
+            ("D", self.outputs, self.inputs),
+        ):
+            entries = iter(without_noise(getattr(self, title).ravel().tolist()))
+            if rows and columns:
+                lines = [[name, *(next(entries) for _ in columns)] for name in rows]
+                found.append(ResultTable(["", *columns], lines, title))
+        return found

@@ -20,7 +20,8 @@ from ..base.inline_pictures import image_html
 from ..base.limits.analyses import SYMMETRIC
 from ..base.limits.numbers import SHOWN_COMPLEX
 from ..base.notation import Notation
-from ..base.texts import as_html, as_text, html_text, number
+from ..base.results import Result, ResultTable, plain, same_keys
+from ..base.texts import html_table, html_text, number
 from ..errors import EomgenError, cannot, off_range
 from ..runtime.argument_checks import read_numbers
 from ..runtime.drawing import load_show
@@ -48,7 +49,7 @@ class Damped(NamedTuple):
     ratio: float  #: damping ratio, 1 or -1 for real eigenvalues, 0 for a zero
 
 
-class Modes:
+class Modes(Result):
     """Natural frequencies, mode shapes and damping of small motions about an equilibrium.
 
     First-order states stand still in the undamped modes; the damped ones are those of the whole model.
@@ -72,6 +73,8 @@ class Modes:
         The modes with damping and gyroscopic terms, slow ones first.
     linear : Linearization
     """
+
+    KEYS = same_keys("names", "squares", "frequencies", "hertz", "shapes", "rigid", "diverging")
 
     def __init__(self, linear: Linearization, module: BoundModel) -> None:
         assert linear.mass is not None
@@ -105,41 +108,46 @@ class Modes:
             found.append(Damped(complex(value), size, imaginary, ratio))
         return sorted(found, key=lambda mode: mode.frequency)
 
+    def to_dict(self) -> dict[str, Any]:
+        keys = ("eigenvalue", "frequency", "damped_frequency", "ratio")
+        return super().to_dict() | {"damped": [dict(zip(keys, map(plain, mode), strict=True)) for mode in self.damped]}
+
+    @property
+    def title(self) -> str:
+        return f"Modes of {self.name}"
+
+    def _frequency(self, k: int) -> tuple[str, str]:
+        """The frequency of a mode in rad/s and Hz, or what kind of motion it is instead."""
+        if self.frequencies[k] == 0.0:
+            return "rigid body" if self._still[k] else f"diverges, {np.sqrt(-self.squares[k]):.6g} 1/s", ""
+        return f"{self.frequencies[k]:.6g}", f"{self.hertz[k]:.6g}"
+
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """Label and value of each line of the description."""
         names = [name.removesuffix("_dot") for name in self.names]
         lines = []
-        for k, square in enumerate(self.squares):
+        for k in range(len(self.squares)):
             shape = ", ".join(f"{name} {x:.4g}" for name, x in zip(names, self.shapes[:, k], strict=True))
-            what = f"{self.frequencies[k]:.6g} rad/s, {self.hertz[k]:.6g} Hz"
-            if self.frequencies[k] == 0.0:
-                what = "rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s"
-            lines.append((f"mode {k + 1}", f"{what}: {shape}"))
-        for mode in self.damped:
-            shown = mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0
-            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {shown:.4g}"))
-        return lines
+            rate, hertz = self._frequency(k)
+            lines.append((f"mode {k + 1}", f"{rate} rad/s, {hertz} Hz: {shape}" if hertz else f"{rate}: {shape}"))
+        return lines + self._with_damping
 
-    def __repr__(self) -> str:
-        return as_text(f"Modes of {self.name}", self.facts)
+    @property
+    def _with_damping(self) -> list[tuple[str, str]]:
+        shown = ((mode.eigenvalue, mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0) for mode in self.damped)
+        return [("with damping", f"{number(value)}, ratio {ratio:.4g}") for value, ratio in shown]
 
     def _table(self) -> str:
         """Frequencies and shapes, a row for each mode, and the eigenvalues with damping, for notebooks."""
-        printed = Notation.of(self._module.metadata).html
         names = [name.removesuffix("_dot") for name in self.names[:COLUMNS]]
-        heads = ["mode", "rad/s", "Hz", *map(printed, names), *["..."] * (len(self.names) > COLUMNS)]
-        rows = []
-        for k, square in enumerate(self.squares):
-            found = [f"{self.frequencies[k]:.6g}", f"{self.hertz[k]:.6g}"]
-            if self.frequencies[k] == 0.0:
-                found = ["rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s", ""]
-            rows.append([str(k + 1), *found, *(f"{x:.4g}" for x in self.shapes[: len(names), k])])
-        cells = "".join(f"<tr>{''.join(f'<td>{x}</td>' for x in row)}</tr>" for row in rows)
-        head = "".join(f"<th>{x}</th>" for x in heads)
-        damped = [fact for fact in self.facts if fact[0] == "with damping"]
-        title = f"<b>{html_text(f'Modes of {self.name}')}</b>"
-        return f"{title}<table><tr>{head}</tr>{cells}</table>{as_html('', damped) if damped else ''}"
+        heads = [*map(Notation.of(self._module.metadata).html, names), *["..."] * (len(self.names) > COLUMNS)]
+        rows = [
+            [str(k + 1), *self._frequency(k), *(f"{x:.4g}" for x in self.shapes[: len(names), k])]
+            for k in range(len(self.squares))
+        ]
+        table = ResultTable(["mode", "rad/s", "Hz", *heads], rows).to_html(printed=True)
+        damped = html_table("", self._with_damping) if self.damped else ""
+        return f"<b>{html_text(self.title)}</b>{table}{damped}"
 
     @overload
     def animate(self, mode: int, file: str | Path, **options: Unpack[FilmOptions]) -> Path: ...

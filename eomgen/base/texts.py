@@ -199,7 +199,7 @@ def aligned_rows(rows: Sequence[tuple[str, str]]) -> list[str]:
     return lines
 
 
-# -- labels and values of a result as text, and as HTML for notebooks --------------------------------------------------
+# -- numbers of a result -----------------------------------------------------------------------------------------------
 
 
 def number(value: complex, digits: int = 6) -> str:
@@ -230,13 +230,3 @@ def without_noise(
     for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
         largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
     return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
-
-
-def as_text(title: str, facts: Sequence[tuple[str, str]]) -> str:
-    """Several aligned lines."""
-    return "\n".join([title, *aligned_rows(facts)])
-
-
-def as_html(title: str, facts: Sequence[tuple[str, str]]) -> str:
-    """A small table."""
-    return html_table(title, facts)

@@ -14,7 +14,7 @@ import click
 from ..base.names import hint
 from ..base.texts import visible
 from ..errors import UsageError
-from .output import USAGE, print_json, to_dict
+from .output import USAGE, name_options, print_json, to_dict
 
 #: verb -> what it does.
 VERBS = {
@@ -113,7 +113,7 @@ def _check_words(words: Sequence[str]) -> None:
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     """A warning without the place in Python, which is nothing of the user's."""
-    click.echo(f"warning: {visible(str(message))}", err=True)
+    click.echo(f"warning: {visible(name_options(str(message)))}", err=True)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:

@@ -15,10 +15,9 @@ from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, ill_ty
 from ..runtime.argument_checks import require, require_room
 from ..runtime.storage import split_head, write_netcdf
 from .options import Number, Prepared, analysis_verb, end_option, file_option, parse_number, require_folder
-from .output import finite, print_heading, print_json, print_table, say, stage
+from .output import stage
 
 if TYPE_CHECKING:
-    from ..ensembles.ensemble import Ensemble
     from ..module import Module
 
 SHOWN = 10  #: failures listed
@@ -110,29 +109,17 @@ def ensemble(
             found.save(out)
     if plot is not None:
         save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
-    files = [str(path) for path in (out, plot and plot[1]) if path]
-    _tell(work, found, sorted({**values, **axes}), files, as_json)
-
-
-def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], as_json: bool) -> None:
-    table = found.summary()
-    failures = found.failures()
-    if as_json:
-        print_json(
-            work.heading(float(found.t[-1])) | {"count": found.count, "varied": varied} |
-            {"steps": int(found.steps.sum()), "failures": [failure._asdict() for failure in failures], "files": files} |
-            {"summary": {name: {key: finite(x) for key, x in row.items()} for name, row in table.items()}}
-        )  # fmt: skip
-        return
-    print_heading(f"{found.count} runs to t = {found.t[-1]:g} s; varied: {', '.join(varied)}")
-    lines = [[name, *(f"{x:.6g}" for x in row.values())] for name, row in table.items()]
-    print_table(["at the end", "mean", "deviation", "least", "greatest"], lines, right=range(1, 5))
-    for failure in failures[:SHOWN]:
-        say(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
+    varied, failures = sorted({**values, **axes}), found.failures()
+    (table,) = found.tables
+    notes = [f"run {one.run} ended at t = {one.t:.6g} s: {one.message}" for one in failures[:SHOWN]]
     if len(failures) > SHOWN:
-        say(f"... and {len(failures) - SHOWN} more of {found.count} failed")
-    for file in files:
-        say(f"wrote {file}")
+        notes.append(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+    work.show(
+        as_json, float(found.t[-1]),
+        table._replace(title=f"{found.count} runs to t = {found.t[-1]:g} s; varied: {', '.join(varied)}"), *notes,
+        values=found.to_dict() | {"varied": varied},
+        files=[path for path in (out, plot and plot[1]) if path],
+    )  # fmt: skip
 
 
 def _even(end: float, count: int) -> list[float]:

@@ -23,20 +23,21 @@ import click
 from ..base.files import example_files, find_example, shipped, write_whole
 from ..base.limits.constraints import UNMOVED
 from ..base.names import hint
+from ..base.results import ResultTable
 from ..base.texts import visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
 from ..syntax_trees import parse_module
-from .options import NumberRange, Verb, json_option, target_option
+from .options import Number, Verb, json_option, target_option
 from .output import (
     MODEL,
     TOOLCHAIN,
     exit_code,
     lines_of,
     print_json,
-    print_table,
     readable_size,
     reports_failures,
     say,
+    show,
     stage,
 )
 
@@ -213,7 +214,7 @@ MEGABYTE = 1_000_000
 def cache(ctx: click.Context) -> None:
     """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
     if ctx.invoked_subcommand is None:
-        ctx.invoke(show, as_json=False)
+        ctx.invoke(listing, as_json=False)
 
 
 def _cache() -> Cache:
@@ -225,37 +226,25 @@ def _cache() -> Cache:
 @cache.command("list")
 @json_option
 @reports_failures
-def show(as_json: bool) -> None:
+def listing(as_json: bool) -> None:
     """List the compiled modules, the most recently used first."""
     kept = _cache()
     entries = kept.entries()
     size = sum(entry.size for entry in entries)
-    if as_json:
-        listed = [
-            {
-                "key": e.key,
-                "kind": e.kind,
-                "name": e.name,
-                "directory": str(e.directory),
-                "size": e.size,
-                "created": e.created,
-                "used": e.used,
-            }
-            for e in entries
-        ]
-        print_json({"directory": str(kept.root), "size": size, "entries": listed})
-        return
-    say(f"{kept.root}: {len(entries)} entries, {readable_size(size)}")
-    if entries:
-        rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
-        print_table(["model", "kind", "size", "used", "key"], rows, right=[2, 3])
+    keys = ("key", "kind", "name", "directory", "size", "created", "used")
+    values = {
+        "directory": kept.root,
+        "size": size,
+        "entries": [{key: getattr(e, key) for key in keys} for e in entries],
+    }
+    rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
+    table = [ResultTable(["model", "kind", "size", "used", "key"], rows, right=[2, 3])] if rows else []
+    show(as_json, values, f"{kept.root}: {len(entries)} entries, {readable_size(size)}", *table, files=None)
 
 
 @cache.command()
-@click.option(
-    "--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS."
-)
-@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
+@click.option("--older-than", type=Number(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS.")
+@click.option("--max-size", type=Number(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
 @json_option
 @reports_failures
 def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:
@@ -268,10 +257,8 @@ def prune(older_than: float | None, max_size: float | None, as_json: bool) -> No
         max_size=None if max_size is None else int(max_size * MEGABYTE),
     )
     freed = sum(entry.size for entry in removed)
-    if as_json:
-        print_json({"directory": str(kept.root), "removed": [entry.key for entry in removed], "freed": freed})
-        return
-    say(f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}")
+    values = {"directory": kept.root, "removed": [entry.key for entry in removed], "freed": freed}
+    show(as_json, values, f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}", files=None)
 
 
 @cache.command()
@@ -281,10 +268,8 @@ def clear(as_json: bool) -> None:
     """Remove every compiled module."""
     kept = _cache()
     removed = kept.clear()
-    if as_json:
-        print_json({"directory": str(kept.root), "removed": removed})
-        return
-    say(f"{kept.root}: removed {removed} entries")
+    values = {"directory": kept.root, "removed": removed}
+    show(as_json, values, f"{kept.root}: removed {removed} entries", files=None)
 
 
 def _ago(moment: float) -> str:
@@ -329,19 +314,14 @@ def examples(name: str | None, force: bool, every: bool, target: str, as_json: b
         _run_all(found, target, as_json)
         return
     if name is None:
-        rows = [(key, file.name, describe_example(file)) for key, file in found.items()]
-        if as_json:
-            print_json({"examples": [{"name": key, "file": file, "doc": doc} for key, file, doc in rows]})
-            return
-        print_table(["example", "what it is"], [[key, doc] for key, _, doc in rows])
-        say("copy one here:  eomgen examples NAME")
+        rows = [{"name": key, "file": file.name, "doc": describe_example(file)} for key, file in found.items()]
+        table = ResultTable(["example", "what it is"], [[row["name"], row["doc"]] for row in rows], right=())
+        show(as_json, {"examples": rows}, table, "copy one here:  eomgen examples NAME", files=None)
         return
     copied = _copy(name, found, force)
-    if as_json:
-        print_json({"file": str(copied)})
-        return
-    say(str(copied))
-    say(f"next:  {'python' if copied.suffix == '.py' else 'eomgen run'} {copied}", err=True)
+    show(as_json, {"file": copied}, str(copied), files=None)
+    if not as_json:
+        say(f"next:  {'python' if copied.suffix == '.py' else 'eomgen run'} {copied}", err=True)
 
 
 def _run_all(found: dict[str, Path], target: str, as_json: bool) -> None:
@@ -352,14 +332,16 @@ def _run_all(found: dict[str, Path], target: str, as_json: bool) -> None:
             runs.append(run_example(key, file, target))
     failed = [run for run in runs if not run.ok]
     total = perf_counter() - start
-    if as_json:
-        entries = [{**run._asdict(), "ok": run.ok} for run in runs]
-        print_json({"ok": not failed, "target": target, "seconds": total, "examples": entries})
-    else:
-        header = ["example", "freedoms", "derive s", "compile s", "simulate s", "steps", "result"]
-        print_table(header, [_row(run) for run in runs], right=range(1, 6))
-        said = f"{len(failed)} of {len(runs)} failed: {', '.join(run.name for run in failed)}" if failed else "all ran"
-        say(f"{said}, {total:.1f} s")
+    entries = [{**run._asdict(), "ok": run.ok} for run in runs]
+    header = ["example", "freedoms", "derive s", "compile s", "simulate s", "steps", "result"]
+    said = f"{len(failed)} of {len(runs)} failed: {', '.join(run.name for run in failed)}" if failed else "all ran"
+    show(
+        as_json,
+        {"ok": not failed, "target": target, "seconds": total, "examples": entries},
+        ResultTable(header, [_row(run) for run in runs], right=range(1, 6)),
+        f"{said}, {total:.1f} s",
+        files=None,
+    )
     if failed:
         sys.exit(failed[0].exit_code)
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..base.files import save_figure, write_whole
+from ..base.results import ResultTable
 from ..targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
 from .options import Source, file_option, model_verb, require_document_folder, require_folder, target_option
-from .output import print_heading, print_json, print_table, say, stage
+from .output import print_json, say, show, stage
 from .plot import require_plotting
 
 if TYPE_CHECKING:
@@ -64,10 +66,8 @@ def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) 
         save_figure(figure_at(model.compile(target="numpy")), draw)
     if as_json:
         print_json(report.to_dict())
-        return
-    say(str(report))
-    for file in filter(None, (graph, draw)):
-        say(f"wrote {file}")
+    else:
+        show(False, {}, str(report), files=[file for file in (graph, draw) if file])
 
 
 @model_verb("robot")
@@ -119,13 +119,10 @@ def derive(source: Source, equations: bool, form: str | None, out: Path | None, 
         if out is not None:
             write_whole(out, text)
         say(text.rstrip("\n") if out is None else str(out))
-    elif as_json:
-        print_json(summary(derived) | (_written(derived) if equations else {}))
     else:
-        say(str(derived.report))
-        print_operations(derived)
-        if equations:
-            _print_equations(_written(derived))
+        written = _written(derived) if equations else {}
+        parts = (str(derived.report), *operations_of(derived), *(_lines(written) if equations else ()))
+        show(as_json, summary(derived) | written, *parts, files=None)
 
 
 def summary(derived: Equations) -> dict[str, Any]:
@@ -133,28 +130,27 @@ def summary(derived: Equations) -> dict[str, Any]:
     return {
         "name": derived.name,
         "method": derived.method,
-        "choice": dict(derived.choice.operations) if derived.choice else None,
+        "choice": derived.choice.operations if derived.choice else None,
         "report": derived.report.to_dict(),
         "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
         "system": derived.system_size and dict(zip(("unknowns", "entries"), derived.system_size, strict=True)),
-        "seconds": dict(derived.seconds),
+        "seconds": derived.seconds,
     }
 
 
-def print_operations(derived: Equations) -> None:
-    """The operations of each part of the equations, as a table."""
-    print_heading(f"equations by {derived.method}: operations")
-    rows = [
-        [name, *(str(n) for n in (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
-        for name, c in derived.operations.items()
-    ]
+def operations_of(derived: Equations) -> Iterator[ResultTable | str]:
+    """The operations of each part of the equations: a heading, what was chosen, a table."""
+    yield ResultTable((), (), f"equations by {derived.method}: operations")
     if derived.choice:
-        say(str(derived.choice))
+        yield str(derived.choice)
     if derived.system_size:
         unknowns, entries = derived.system_size
-        say(f"a linear system of {unknowns} unknowns with {entries} nonzero entries")
-    header = ["", "multiply", "add", "divide", "total", "functions"]
-    print_table(header, rows, right=range(1, len(header)))
+        yield f"a linear system of {unknowns} unknowns with {entries} nonzero entries"
+    rows = [
+        [name, *map(str, (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
+        for name, c in derived.operations.items()
+    ]
+    yield ResultTable(["", "multiply", "add", "divide", "total", "functions"], rows)
 
 
 def _written(derived: Equations) -> dict[str, Any]:
@@ -167,16 +163,13 @@ def _written(derived: Equations) -> dict[str, Any]:
     }
 
 
-def _print_equations(text: dict[str, Any]) -> None:
+def _lines(text: dict[str, Any]) -> Iterator[ResultTable | str]:
     """Equations as :func:`_written` gives them, one entry a line."""
-    print_heading(f"mass_matrix * [{', '.join(text['accelerations'])}] = force")
-    for name, expression in text["intermediates"].items():
-        say(f"  {name} = {expression}")
-    for i, row in enumerate(text["mass_matrix"]):
-        for j, entry in enumerate(row[: i + 1]):
-            say(f"  mass_matrix[{i}, {j}] = {entry}")
-    for i, entry in enumerate(text["force"]):
-        say(f"  force[{i}] = {entry}")
+    yield ResultTable((), (), f"mass_matrix * [{', '.join(text['accelerations'])}] = force")
+    yield from (f"  {name} = {expression}" for name, expression in text["intermediates"].items())
+    entries = ((i, j, entry) for i, row in enumerate(text["mass_matrix"]) for j, entry in enumerate(row[: i + 1]))
+    yield from (f"  mass_matrix[{i}, {j}] = {entry}" for i, j, entry in entries)
+    yield from (f"  force[{i}] = {entry}" for i, entry in enumerate(text["force"]))
 
 
 @model_verb(*DERIVED)
@@ -203,13 +196,10 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
     with stage("explain"):
         document = derived.explain(level)
         document.save(out)
-    if as_json:
-        head = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
-        print_json({**head, "sections": [s.title for s in document.sections], "difference": document.difference})
-        return
-    say(str(out))
-    if document.difference is not None:
-        say(f"largest difference between shown formulas and the compiled module: {document.difference:.1e}")
+    values: dict[str, Any] = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
+    values |= {"sections": [s.title for s in document.sections], "difference": document.difference}
+    difference = f"largest difference between shown formulas and the compiled module: {document.difference or 0.0:.1e}"
+    show(as_json, values, str(out), *([] if document.difference is None else [difference]), files=None)
 
 
 @model_verb(*DERIVED, "target", target=target_option(*TARGETS))
@@ -261,12 +251,7 @@ def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, a
         if built.note:
             say(f"note: {built.path.name} {built.note}", err=True)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
-    if as_json:
-        package = {"name": folder.stem, "target": target, "folder": str(folder), "files": files}
-        print_json(package | ({"wheel": str(built.path), "note": built.note} if built else {}))
-        return
-    say(str(folder))
-    for name in files:
-        say(f"  {name}")
-    if built:
-        say(str(built.path))
+    values = {"name": folder.stem, "target": target, "folder": str(folder), "files": files}
+    values |= {"wheel": str(built.path), "note": built.note} if built else {}
+    lines = [str(folder), *(f"  {name}" for name in files), *([str(built.path)] if built else [])]
+    show(as_json, values, *lines, files=None)

@@ -14,10 +14,11 @@ import click
 
 from ..base.files import kind_of, refuse_link
 from ..base.names import closest, place_of_marker
+from ..base.results import Result, ResultTable
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number
 from ..runtime.argument_checks import unknown
 from ..targets import TARGETS
-from .output import reports_failures, say, stage
+from .output import name_options, reports_failures, say, show, stage
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
@@ -88,21 +89,14 @@ def _number(value: Any) -> Any:
         raise click.BadParameter(str(error)) from None
 
 
-class Number(click.types.FloatParamType):
-    """Any number."""
+class Number(click.FloatRange):
+    """A number, which may have bounds; an expression of numbers as in a model file."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return super().convert(_number(value), param, ctx)
 
 
-class NumberRange(click.FloatRange):
-    """A number within bounds."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return super().convert(_number(value), param, ctx)
-
-
-POSITIVE = NumberRange(min=0, min_open=True)
+POSITIVE = Number(min=0, min_open=True)
 
 
 def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
@@ -431,11 +425,15 @@ class Prepared(NamedTuple):
         """Initial values that are coordinates."""
         return {name: x for name, x in (self.initial or {}).items() if not name.endswith("_dot")} or None
 
-    def heading(self, t: float) -> dict[str, Any]:
-        """What every result of --json begins with."""
+    def show(
+        self, as_json: bool, t: float, *parts: Result | ResultTable | str, values: Any = None, files: Any = None
+    ) -> None:
+        """Print what an analysis at a time found: its parts, or with --json the values, those of the result if none."""
         from ..runtime.identity import origin
 
-        return {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
+        head = {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
+        found = parts[0].to_dict() if values is None and isinstance(parts[0], Result) else values
+        show(as_json, {**head, **found} if as_json else {}, *parts, files=files)
 
 
 def model_verb(*names: str, target: Decorator | None = None) -> Callable[[Callable[..., Any]], Verb]:
@@ -498,7 +496,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     else:
         raise bad_file(_missing(path))
     for note in model.notes:
-        say(f"note: {note}", err=True)
+        say(f"note: {name_options(note)}", err=True)
     return model
 
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import isfinite
 from time import perf_counter
 from typing import Any, TypeVar
 
 import click
 
+from ..base.results import Result, ResultTable, plain
 from ..base.texts import aligned_rows, terminal_width, visible
 from ..errors import (
     EomgenError,
@@ -36,29 +37,38 @@ def say(text: str, err: bool = False) -> None:
 
 def print_json(value: Any) -> None:
     """One JSON object on stdout."""
-    click.echo(json.dumps(value, indent=2, allow_nan=False, default=_plain))
+    click.echo(json.dumps(plain(value), indent=2, allow_nan=False))
 
 
-def _plain(value: Any) -> Any:
-    """NumPy scalars and arrays, tuples and paths as what JSON knows."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+def show(
+    as_json: bool, values: Mapping[str, Any], *parts: Result | ResultTable | str, files: Sequence[object] | None = ()
+) -> None:
+    """What a verb found: with --json its values as one object, else its parts in order; last the files it wrote."""
+    if as_json:
+        print_json({**values, **({"files": list(map(str, files))} if files is not None else {})})
+        return
+    for part in parts:
+        if isinstance(part, ResultTable):
+            print_table(part)
+        else:
+            say(str(part))
+        for table in part.tables if isinstance(part, Result) else ():
+            print_table(table)
+    for file in files or ():
+        say(f"wrote {file}")
 
 
-def print_heading(text: str) -> None:
-    """A heading on stdout."""
-    click.echo("\n" + click.style(visible(text), bold=True))
-
-
-def print_rows(rows: Sequence[tuple[str, str]]) -> None:
-    """Label and value pairs on stdout, aligned; on a terminal, long values go on below."""
-    for line in aligned_rows(rows):
-        say(line)
-
-
-def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> None:
-    """A table on stdout; the columns in ``right`` are aligned to the right, the last one wraps on a narrow terminal."""
-    columns = list(zip(header, *rows, strict=True))
-    widths = [max(map(len, column)) for column in columns]
+def print_table(table: ResultTable) -> None:
+    """A table on stdout, its last column wrapped on a narrow terminal; one without headings as labels and values."""
+    if table.title:
+        click.echo("\n" + click.style(visible(table.title), bold=True))
+    if not table.columns:
+        for fact in aligned_rows([(label, value) for label, value in table.cells]):
+            say(fact)
+        return
+    header, rows = list(table.columns), table.cells
+    right = range(1, len(header)) if table.right is None else table.right
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     room = terminal_width() or WIDTH
     last = len(header) - 1
     if last not in right:
@@ -108,12 +118,6 @@ def readable_size(size: int) -> str:
     return f"{size / 1000:.0f} kB" if size < 1_000_000 else f"{size / 1e6:.1f} MB"
 
 
-def finite(value: float) -> float | None:
-    """A number that JSON can hold: None stands for what is not finite."""
-    number = float(value)
-    return number if isfinite(number) else None
-
-
 # -- failures ----------------------------------------------------------------------------------------------------------
 
 MODEL, USAGE, TOOLCHAIN, INTEGRATION, BREACH = 1, 2, 3, 4, 5
@@ -124,8 +128,12 @@ OPTIONS = {
     "step=,": "--step,",
     "limits=True": "--within-limits",
     "; give limits={name: ..}": "",
-    "method='embedding'": "--method embedding",
     "method='moreau'": "--solver moreau",
+    "treat any gap as closed (closed=True, --closed)": "treat any gap as closed by --closed",
+    "floating=True, or --floating": "--floating",
+    "partial=True": "--partial",
+    "weights={name: weight}": "--weight NAME=W",
+    "weights='mass'": "--mass",
     "leave dense_output out and give t_eval, or take DOP853, RK45 or Radau in compiled code": "leave --plot out, "
     "or take --solver DOP853, RK45 or Radau with --target cython",
 }
@@ -153,7 +161,7 @@ def lines_of(error: BaseException, file: str = "") -> list[str]:
         return [str(p) if p.file else f"{prefix}{p}" for p in error.problems]
     if isinstance(error, OSError) and error.strerror:
         return [f"{error.filename}: {error.strerror}" if error.filename else error.strerror]
-    text = told(error)
+    text = name_options(str(error))
     if isinstance(error, ToolchainError):
         extra = [part for part in (error.command, error.output.strip()) if part and part not in text]
         return "\n".join([text, *extra]).splitlines()
@@ -162,12 +170,11 @@ def lines_of(error: BaseException, file: str = "") -> list[str]:
     return text.splitlines() or [type(error).__name__]
 
 
-def told(error: BaseException) -> str:
-    """The message of an exception in the words of the command line."""
-    text = str(error)
+def name_options(text: str) -> str:
+    """A message that names options of the command line instead of Python's arguments."""
     for argument, option in OPTIONS.items():
         text = text.replace(argument, option)
-    return text
+    return re.sub(r"\b(limits|method|precision)='(\w+)'", r"--\1 \2", text)
 
 
 def to_dict(error: BaseException) -> dict[str, Any]:
@@ -178,7 +185,7 @@ def to_dict(error: BaseException) -> dict[str, Any]:
             "type": type(error).__name__,
             "code": getattr(error, "code", "EG-FILE"),
             "exit_code": exit_code(error),
-            "message": told(error),
+            "message": name_options(str(error)),
             "problems": problems,
         }
     }

@@ -11,10 +11,11 @@ import click
 import numpy as np
 
 from ..base.limits.numbers import RESTING
+from ..base.results import ResultTable
 from ..base.texts import without_noise
 from ..errors import at_odds, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
 from ..runtime.storage import RUNS
-from .models import print_operations, summary
+from .models import operations_of, summary
 from .options import (
     POSITIVE,
     Source,
@@ -26,7 +27,7 @@ from .options import (
     solver_options,
     split_names,
 )
-from .output import after_integration, finite, print_heading, print_json, print_rows, print_table, say, stage
+from .output import after_integration, say, show, stage
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
 
 if TYPE_CHECKING:
@@ -87,15 +88,10 @@ def run(
         if animate is not None:
             with stage("animate"):
                 files.append(str(trajectory.animate(animate)))
-        result = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files}
-    if as_json:
-        print_json(result)
-        return
-    say(str(equations.report))
-    print_operations(equations)
-    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy and energy.work is None else ())
-    for file in files:
-        say(f"wrote {file}")
+        values = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds}
+        uncounted = uncounted_functions(equations) if energy and energy.work is None else ()
+        tables = tables_of(trajectory, energy, uncounted)
+    show(as_json, values, str(equations.report), *operations_of(equations), *tables, files=files)
 
 
 def _check_files(out: Path | None, plot: Path | None, picture: Picture) -> None:
@@ -127,7 +123,7 @@ def _final_names(trajectory: Trajectory) -> list[str]:
 def _run_to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
     """A run as plain values."""
     header, residuals = trajectory.metadata, trajectory.residuals
-    final = {name: finite(trajectory[name][-1]) for name in _final_names(trajectory)}
+    final = {name: trajectory[name][-1] for name in _final_names(trajectory)}
     return summary(equations) | {
         "integration": {
             "method": header["method"],
@@ -151,8 +147,8 @@ def _run_to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBal
             "projected_velocity": residuals.velocity,
             "correction_velocity": residuals.correction_velocity,
         },
-        "change_points": [point._asdict() for point in trajectory.change_points],
-        "energy": energy and {k: None if value is None else finite(value) for k, value in energy._asdict().items()},
+        "change_points": trajectory.change_points,
+        "energy": energy,
         "final": {"t": float(trajectory.t[-1]), **final},
     }
 
@@ -177,13 +173,14 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
     return rows
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncounted: Sequence[str] = ()) -> None:
+def tables_of(
+    trajectory: Trajectory, energy: EnergyBalance | None, uncounted: Sequence[str] = ()
+) -> tuple[ResultTable, ...]:
     """Statistics of a run, its residuals, its energy and its final values.
 
     ``uncounted`` are functions whose work is not known.
     """
     header, residuals = trajectory.metadata, trajectory.residuals
-    print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
     if header["method"] == "moreau":
         missed = header["missed_steps"]
         rows = [
@@ -207,8 +204,7 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     if points:
         rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
         rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
-    print_rows(rows + _energy_rows(energy, uncounted))
-    print_heading(f"values at t = {trajectory.t[-1]:g} s")
+    rows += _energy_rows(energy, uncounted)
     names = _final_names(trajectory)
     units = [trajectory.units.get(name, "") for name in names]
     sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
@@ -217,7 +213,10 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     for k, name in enumerate(names):  # a state that rests, to the error that the integrator admits
         if name in states and abs(final[k]) <= error and sizes[k] <= RESTING * error:
             final[k] = 0.0
-    print_rows([(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)])
+    values = [(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)]
+    start, end = trajectory.t[0], trajectory.t[-1]
+    run = ResultTable((), rows, f"simulation from {start:g} to {end:g} s")
+    return run, ResultTable((), values, f"values at t = {end:g} s")
 
 
 # -- kinematics --------------------------------------------------------------------------------------------------------
@@ -259,25 +258,13 @@ def kinematics(
         found = [module.motion_range(name, initial=work.initial) for name in limits]
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files = [] if motion is None else _write(equations, motion, out, plot, picture)
-    if as_json:
-        report: dict[str, Any] = {
-            "name": module.name,
-            "report": summary(equations)["report"],
-            "seconds": seconds,
-            "files": files,
-        }
-        report |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [_limits(r) for r in found]}
-        print_json(report)
-        return
-    say(str(equations.report))
-    if motion is not None:
-        _print_motion(motion)
-    for one in found:
-        print_heading(f"range of {one.name}")
-        sides = (("lower", one.lower, one.stops[0], one.gaps[0]), ("upper", one.upper, one.stops[1], one.gaps[1]))
-        print_rows([(s, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for s, x, stop, gap in sides])
-    for file in files:
-        say(f"wrote {file}")
+    values = {"name": module.name, "report": summary(equations)["report"], "seconds": seconds}
+    values |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [r.to_dict() for r in found]}
+    tables = [
+        *([] if motion is None else _tables_of_motion(motion)),
+        *(ResultTable((), r.facts, r.title) for r in found),
+    ]
+    show(as_json, values, str(equations.report), *tables, files=files)
 
 
 def _read_range(words: str) -> tuple[str, float, float, int | None]:
@@ -335,59 +322,35 @@ def _left(n: int) -> str:
 
 def _motion_to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
     """An analysis as plain values."""
-    ends: dict[str, dict[str, float | None]] = {}
-    for where, k in (("first", 0), ("last", -1)):
-        ends[where] = {n: finite(motion[n][k]) for n in ("t", *_final_names(motion))}
+    names = ("t", *_final_names(motion))
     return {
         "points": len(motion),
         "complete": motion.complete,
-        "led": list(motion.led),
-        "singular": [_singular(s) for s in motion.singular],
+        "led": motion.led,
+        "singular": [one.facts for one in motion.singular],
         "residual": {"position": motion.residuals.position, "velocity": motion.residuals.velocity},
-        **ends,
+        **{where: {n: motion[n][k] for n in names} for where, k in (("first", 0), ("last", -1))},
     }
 
 
-def _singular(found: Any) -> dict[str, Any]:
-    return {
-        "kind": found.kind,
-        "t": found.t,
-        "values": dict(found.values),
-        "moving": list(found.moving),
-        "joints": list(found.joints),
-    }
-
-
-def _limits(found: Any) -> dict[str, Any]:
-    return {
-        "name": found.name,
-        "lower": finite(found.lower),
-        "upper": finite(found.upper),
-        "stops": [None if stop is None else _singular(stop) for stop in found.stops],
-        "gaps": list(found.gaps),
-    }
-
-
-def _print_motion(motion: KinematicAnalysis) -> None:
+def _tables_of_motion(motion: KinematicAnalysis) -> tuple[ResultTable, ResultTable]:
     """Points, residuals and singular positions of an analysis, and some of its rows."""
-    over = ", ".join(motion.led) if motion.led else "t"
-    print_heading(f"kinematics over {over}: {len(motion)} points")
     rows = [("loop residual", f"{motion.residuals.position:.1e} (m, rad), {motion.residuals.velocity:.1e} of rates")]
     for found in motion.singular[:20]:
         place, _, words = str(found).removeprefix(f"{found.kind} at ").partition(": ")
         rows.append((found.kind, f"{place}: {words}"))
     if len(motion.singular) > 20:
         rows.append(("", f"and {len(motion.singular) - 20} more singular positions"))
-    print_rows(rows)
     names = [n for n in _final_names(motion) if not n.endswith("_dot")][:8]
     header = [n + (f" ({motion.units[n]})" if n in motion.units else "") for n in ("t", *names)]
     picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
     if len(picked) < len(motion):
-        print_rows([("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all")])
+        rows.append(("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all"))
     units = [motion.units.get(n, n) for n in ("t", *names)]
     sizes = [float(np.nanmax(np.abs(motion[n]), initial=0.0)) for n in ("t", *names)]
     shown = [without_noise([motion[n][k] for n in ("t", *names)], units, sizes) for k in picked]
-    print_table(header, [[f"{x:.6g}" for x in row] for row in shown], right=range(len(header)))
+    title = f"kinematics over {', '.join(motion.led) if motion.led else 't'}: {len(motion)} points"
+    return ResultTable((), rows, title), ResultTable(header, shown, right=range(len(header)))
 
 
 # -- view --------------------------------------------------------------------------------------------------------------
@@ -444,9 +407,6 @@ def view(
     with after_integration(), stage("animate"):
         written = motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
     opened = out is None and webbrowser.open(Path(written).absolute().as_uri())
-    if as_json:
-        print_json({"name": work.module.name, "points": len(motion), "files": [str(written)], "opened": opened})
-        return
-    say(f"wrote {written}")
-    if out is None and not opened:
+    show(as_json, {"name": work.module.name, "points": len(motion), "opened": opened}, files=[written])
+    if not as_json and out is None and not opened:
         say("no browser was found here; open that file in one, or give --out FILE")

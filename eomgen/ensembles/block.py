@@ -47,35 +47,17 @@ COUNTS = ("steps", "rejected", "evaluations", "noted")
 
 @dataclass(frozen=True)
 class Plan:
-    """What all runs have in common.
-
-    Attributes
-    ----------
-    span : (float, float)
-    method : str
-    options : dict
-        rtol, atol, max_step, first_step, as steppers take them.
-    max_steps : int
-    t_eval : (m,) array or None
-    inputs : dict
-        Inputs that vary over time: name -> (times, values), Signal or expression.
-    constants : tuple of str
-        Inputs given as constants, in place of signals that the model may declare.
-    events : object
-        As a user gives them, without functions.
-    keep_events : int
-        Events kept of each run.
-    """
+    """What all runs have in common."""
 
     span: tuple[float, float]
     method: str
-    options: dict[str, Any]
+    options: dict[str, Any]  #: rtol, atol, max_step, first_step, as steppers take them
     max_steps: int
-    t_eval: Array | None
-    inputs: dict[str, Any]
-    events: Any
-    keep_events: int
-    constants: tuple[str, ...] = ()
+    t_eval: Array | None  #: (m,)
+    inputs: dict[str, Any]  #: inputs that vary over time: name -> (times, values), Signal or expression
+    events: Any  #: as a user gives them, without functions
+    keep_events: int  #: of each run
+    constants: tuple[str, ...] = ()  #: inputs given as constants, in place of signals that the model may declare
 
 
 @dataclass(frozen=True)
@@ -114,6 +96,17 @@ class RunBlock:
     notes: Array | None = None
     words: dict[int, str] = field(default_factory=dict)
 
+    @classmethod
+    def blank(cls, module: BoundModel, plan: Plan, count: int, status: int = 0) -> RunBlock:
+        """A block of which no run has begun."""
+        n = module.n_x
+        numbers: dict[str, Any] = {name: np.zeros(count, dtype=np.int64) for name in ("failure", *COUNTS)}
+        samples = None if plan.t_eval is None else np.full((n, len(plan.t_eval), count), np.nan)
+        notes = np.full((2 + n, plan.keep_events, count), np.nan) if find_events(module, plan).names else None
+        x, t, when = np.full((n, count), np.nan), np.full(count, plan.span[0]), np.zeros(count)
+        states = np.full(count, status, dtype=np.intc)
+        return cls(x=x, t=t, samples=samples, status=states, failure_time=when, notes=notes, **numbers)
+
 
 def run_block(
     module: BoundModel, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
@@ -138,10 +131,10 @@ def run_block(
     some = good.size < cases.count
     rows = _rows(cases, good if some else slice(None))
     found = run(module, x0[:, good].T if some else x0.T, rows, plan, threads, watch)
-    block = _spread(found, good, cases.count, plan.span[0]) if some else found
-    block.status[failed] = UNASSEMBLED
+    block = _spread(found, good, RunBlock.blank(module, plan, cases.count, UNASSEMBLED)) if some else found
+    block.words.update(told)
     project(module, cases, block, plan)
-    return RunBlock(**{**vars(block), "words": {**block.words, **told}})
+    return block
 
 
 def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
@@ -251,15 +244,9 @@ def _run_python(
     module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
 ) -> RunBlock:
     """The same through ``simulate``, one run after the other: by SciPy's methods."""
-    count, n = x0.shape
-    sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
-    status, failure, steps, rejected, evaluations, noted = (np.zeros(count, dtype=np.int64) for _ in range(6))
-    names = find_events(module, plan).names
-    notes = np.full((2 + n, plan.keep_events, count), np.nan) if names else None
-    samples = None if sizes is None else np.full(sizes, np.nan)
-    x, t = np.full((n, count), np.nan), np.full(count, plan.span[0])
-    block = RunBlock(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
-    for k in range(count):
+    block = RunBlock.blank(module, plan, len(x0))
+    status, samples = block.status, block.samples
+    for k in range(len(x0)):
         try:
             bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
         except UsageError as error:
@@ -280,11 +267,12 @@ def _run_python(
         except EomgenError as error:
             status[k], block.words[k] = FAILED, str(error)
             continue
-        x[:, k], t[k], evaluations[k], steps[k] = run.x[:, -1], run.t[-1], run.nfev, len(run.t) - 1
-        status[k] = run.status if steps[k] <= plan.max_steps else TOO_MANY_STEPS
-        if notes is not None:
-            _take_notes(notes[:, :, k], run.t_events, run.x_events)
-            noted[k] = sum(map(len, run.t_events))
+        block.x[:, k], block.t[k], block.evaluations[k] = run.x[:, -1], run.t[-1], run.nfev
+        block.steps[k] = len(run.t) - 1
+        status[k] = run.status if block.steps[k] <= plan.max_steps else TOO_MANY_STEPS
+        if block.notes is not None:
+            _take_notes(block.notes[:, :, k], run.t_events, run.x_events)
+            block.noted[k] = sum(map(len, run.t_events))
         if watch is not None:
             watch(k + 1)
     return block
@@ -298,20 +286,13 @@ def _take_notes(notes: Array, t_events: list[Array], x_events: list[Array]) -> N
     notes[:, : len(order)] = found[:, order]
 
 
-def _spread(found: RunBlock, good: Integers, count: int, start: float) -> RunBlock:
-    """A block with places for the runs that could not be begun."""
-
-    def widened(array: Any, fill: float) -> Any:
-        wide = np.full((*array.shape[:-1], count), fill, dtype=array.dtype)
-        wide[..., good] = array
-        return wide
-
-    fills = {"x": np.nan, "samples": np.nan, "notes": np.nan, "t": start}
-    wide = {
-        name: value if name == "words" or value is None else widened(value, fills.get(name, 0))
-        for name, value in vars(found).items()
-    }
-    return RunBlock(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
+def _spread(found: RunBlock, good: Integers, block: RunBlock) -> RunBlock:
+    """The block with the runs that could be begun in their places."""
+    for name, value in vars(found).items():
+        if isinstance(value, np.ndarray):
+            getattr(block, name)[..., good] = value
+    block.words.update({int(good[k]): text for k, text in found.words.items()})
+    return block
 
 
 def project(module: BoundModel, cases: Cases, block: RunBlock, plan: Plan) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
 
 from ..base.algebra import Array
 from ..base.files import MANIFEST, read_entry
@@ -20,7 +19,7 @@ from ..errors import MissingDependencyError, ToolchainError, UsageError, bad_fil
 from ..runtime.argument_checks import require
 from ..runtime.late import eager
 from ..runtime.pickling import processor_features, restore
-from .block import LOST, MEANING, Plan, RunBlock, find_events
+from .block import LOST, MEANING, Plan, RunBlock
 from .given_cases import Cases
 from .run_blocks import RUNS, Custom, Kept, Reduction, keep, reduce_block
 
@@ -32,45 +31,26 @@ if TYPE_CHECKING:
 
 
 class Handle(NamedTuple):
-    """A module as it travels.
-
-    Attributes
-    ----------
-    kind : type
-        Of the module.
-    name, file : str
-        Import name and file of its code where it was made.
-    digest : str
-        SHA-256 of that file.
-    recipe : str
-        JSON with the model's name, the source texts and the options to build it with; empty where there are none (an
-        installed package).
-    needs : tuple of str
-        What the processor must have, for code compiled for the one where it was made (``native=True``): its features.
-    p, u : arrays
-        Values bound.
-    """
+    """A module as it is sent: what opens it where its file is, and what builds it elsewhere."""
 
     kind: type[BoundModel]
-    name: str
-    file: str
-    digest: str
-    recipe: str
+    name: str  #: import name of its code
+    file: str  #: of its code, where it was made
+    digest: str  #: SHA-256 of that file
+    recipe: str  #: JSON of name, sources, options and needed features of the processor; empty of an installed package
     p: Array
     u: Array
-    needs: tuple[str, ...] = ()
 
     def open(self) -> BoundModel:
-        """The module: from its own file if that is here, the same and for this processor, else built from the sources,
-        or imported.
+        """The module: from its file if the same is here and for this processor, else built from the sources, or
+        imported.
 
         Raises
         ------
         ToolchainError
             It cannot be built here.
         """
-        core = _open(self.name, self.file, self.digest, self.recipe, self.needs)
-        return self.kind(core, self.p, self.u)
+        return self.kind(_open(self.name, self.file, self.digest, self.recipe), self.p, self.u)
 
 
 def describe(module: BoundModel) -> Handle:
@@ -82,19 +62,15 @@ def describe(module: BoundModel) -> Handle:
         Its code has no file of its own.
     """
     core: Any = eager(module.core)
-    file = str(getattr(core, "__file__", "") or "")
-    if not file or not Path(file).is_file():
+    file = Path(str(getattr(core, "__file__", "") or ""))
+    if not file.is_file():
         raise cannot(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     core.take_lanes()  # here, once, so that workers find them beside the module
-    recipe = _recipe(Path(file))
-    facts = json.loads(recipe) if recipe else {"options": {}, "needs": ()}
-    needs = tuple(sorted(processor_features())) if facts["options"].get("native", False) else tuple(facts["needs"])
-    return Handle(type(module), core.__name__, file, digest(file), recipe, module.p, module.u, needs)
+    return Handle(type(module), core.__name__, str(file), _digest(file), _recipe(file), module.p, module.u)
 
 
-def digest(file: str) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def _recipe(file: Path) -> str:
@@ -106,34 +82,35 @@ def _recipe(file: Path) -> str:
         raise ToolchainError(
             f"the compiled code of the module is damaged: {error}; compile the model again", code="EG-FILE-DAMAGED"
         ) from None
-    folder = "sources/"
+    folder, recipe = "sources/", facts["recipe"]
     sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
     if not sources:
         return ""
-    how = {key: facts["recipe"].get(key, none) for key, none in (("options", {}), ("needs", []))}
-    return json.dumps({"name": facts["name"], "sources": sources, **how})
+    options = recipe.get("options", {})
+    needs = sorted(processor_features()) if options.get("native", False) else recipe.get("needs", [])
+    return json.dumps({"name": facts["name"], "sources": sources, "options": options, "needs": needs})
 
 
 @lru_cache(maxsize=8)
-def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...] = ()) -> Any:
-    if processor_features().issuperset(needs) and Path(file).is_file() and digest(file) == wanted:
+def _open(name: str, file: str, digest: str, recipe: str) -> Any:
+    how: dict[str, Any] = json.loads(recipe) if recipe else {"needs": ()}
+    path = Path(file)
+    if processor_features().issuperset(how["needs"]) and path.is_file() and _digest(path) == digest:
         return restore(_core, name, file, None, None)  # type: ignore[arg-type]
-    if not recipe:
-        try:
-            return import_module(name)
-        except ImportError as error:
-            raise ToolchainError(
-                f"this worker has no module {name}: install its package there", code="EG-PACKAGE-MISSING"
-            ) from error
     try:
-        build, load = (import_module(f"eomgen.compilation.{name}") for name in ("build", "load"))
+        if not recipe:
+            return import_module(name)
+        build, load = (import_module(f"eomgen.compilation.{part}") for part in ("build", "load"))
     except ImportError as error:
-        raise MissingDependencyError(
-            "a worker on another machine builds the module itself, so it needs eomgen: pip install eomgen there"
+        if recipe:
+            raise MissingDependencyError(
+                "a worker on another machine builds the module itself, so it needs eomgen: pip install eomgen there"
+            ) from error
+        raise ToolchainError(
+            f"this worker has no module {name}: install its package there", code="EG-PACKAGE-MISSING"
         ) from error
-    facts = json.loads(recipe)
-    options = build.Options(**facts["options"])
-    return load.load_core(build.compile_sources("model", facts["sources"], facts["name"], options))
+    options = build.Options(**how["options"])
+    return load.load_core(build.compile_sources("model", how["sources"], how["name"], options))
 
 
 def _core(core: Any, p: None, u: None) -> Any:
@@ -165,11 +142,7 @@ def open_client(cluster: Any) -> Iterator[Any]:
     if isinstance(cluster, distributed.Client):
         yield cluster
     elif cluster is True or (isinstance(cluster, str) and cluster == "local") or (as_count(cluster) or 0) > 0:
-        workers = as_count(cluster)
-        if workers is None:
-            import os
-
-            workers = os.cpu_count() or 1
+        workers = as_count(cluster) or os.cpu_count() or 1
         with (
             distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
@@ -248,14 +221,8 @@ def _task(handle: Handle, cases: Cases, plan: Plan, reduction: Reduction) -> Kep
 
 def _lost(module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, error: BaseException) -> Kept:
     """What is kept of a block that no worker could run: runs without states, marked so."""
-    sizes, k = (module.n_x, 0 if plan.t_eval is None else len(plan.t_eval)), cases.count
-    samples = None if plan.t_eval is None else np.full((*sizes, k), np.nan)
-    failure, steps, rejected, evaluations, noted = (np.zeros(k, dtype=np.int64) for _ in range(5))
-    notes = np.full((2 + sizes[0], plan.keep_events, k), np.nan) if find_events(module, plan).names else None
-    status = np.full(k, LOST, dtype=np.intc)
-    x, t = np.full((sizes[0], k), np.nan), np.full(k, plan.span[0])
-    block = RunBlock(x, t, samples, status, failure, np.zeros(k), steps, rejected, evaluations, noted, notes)
-    words = dict.fromkeys(range(k), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
+    block = RunBlock.blank(module, plan, cases.count, LOST)
+    words = dict.fromkeys(range(cases.count), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
     if isinstance(reduction, Custom):  # the function has nothing to work on
         return {f"runs_{name}": getattr(block, name) for name in RUNS}, words
     return keep(module, cases, plan, reduction, block, words)

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.files import as_path, whole_file
+from ..base.files import whole_file
 from ..base.inline_pictures import picture_html, side_by_side
 from ..base.notation import TIME, Notation, label
-from ..base.texts import html_table, html_text
+from ..base.results import Result, ResultTable
+from ..base.results import plain as plain_values
+from ..base.texts import html_table
 from ..base.value_rules import read_count
-from ..errors import UsageError, bad_file, cannot, off_range
+from ..errors import UsageError, cannot, off_range
 from ..runtime.argument_checks import require, unknown
 from ..runtime.identity import origin, plain, spell_input
-from ..runtime.storage import attributes, free
+from ..runtime.storage import attributes, free, table_path
 from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .given_cases import Cases
-from .run_blocks import KeptStates, Reduction, Statistics, names_of, summarise, with_outputs
+from .run_blocks import Custom, Reduction, Statistics, names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
     import pandas
@@ -32,163 +34,12 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
 
-# -- a picture of one column -------------------------------------------------------------------------------------------
-
-
-class DrawnEnsemble(Protocol):
-    """What an :class:`~.ensemble.Ensemble` is drawn from."""
-
-    t: Any
-    count: int
-    names: tuple[str, ...]
-    reduced: dict[str, Any]
-
-    def __getitem__(self, name: str) -> Any: ...
-
-    def unit(self, name: str) -> str: ...
-
-    @property
-    def notation(self) -> Notation: ...
-
-
-def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
-    """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
-    values, limit = ensemble[name], read_count("limit, of the runs drawn,", limit, 1)
-    if ax is None:
-        plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
-        ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
-    printed = label(ensemble.notation.mathtext(name), ensemble.unit(name))
-    if "mean" in ensemble.reduced:
-        row = ensemble.names.index(name)
-        spread = np.sqrt(ensemble.reduced["variance"][row])
-        ax.fill_between(ensemble.t, values - spread, values + spread, alpha=0.3, label="mean ± deviation")
-        ax.plot(ensemble.t, values, label="mean")
-        ax.plot(ensemble.t, ensemble.reduced["least"][row], "k:", lw=0.8, label="least, greatest")
-        ax.plot(ensemble.t, ensemble.reduced["greatest"][row], "k:", lw=0.8)
-        ax.legend(frameon=False)
-    elif values.ndim == 2:
-        chosen = np.unique(np.linspace(0, ensemble.count - 1, min(limit, ensemble.count)).astype(int))
-        ax.plot(ensemble.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
-    else:
-        ax.hist(values[np.isfinite(values)], bins="auto")
-        ax.set_xlabel(f"{printed} at $t$ = {ensemble.t[0]:.6g} s")
-        ax.set_ylabel("runs")
-        return ax
-    ax.set_xlabel(TIME)
-    ax.set_ylabel(printed)
-    return ax
-
-
-# -- HTML --------------------------------------------------------------------------------------------------------------
-
-
-PANELS = 3  #: columns that are drawn
-ROWS = 12  #: columns whose numbers are listed
-FAILURES = 5  #: runs that are named
-
-
-def ensemble_html(ensemble: Any) -> str:
-    """A picture of the first columns, and mean, deviation, least and greatest of all."""
-    failed = ensemble.failures()
-    facts = [("runs", f"{ensemble.count}" + (f", {len(failed)} of which failed" if failed else ""))]
-    facts += [("times", f"{len(ensemble.t)}"), ("end", f"{ensemble.t[-1]:.6g} s")]
-    facts += [(f"run {one.run} failed", f"at t = {one.t:.6g} s: {one.message}") for one in failed[:FAILURES]]
-    text = html_table(repr(ensemble).strip("<>").partition(":")[0], facts)
-    try:
-        summary = ensemble.summary()
-    except UsageError:  # a reduction of the user's own kept something else
-        return text
-    return side_by_side(picture_html(lambda: _figure(ensemble)), text + _table(summary))
-
-
-def _table(summary: dict[str, dict[str, float]]) -> str:
-    heads = ("", "mean", "deviation", "least", "greatest")
-    rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
-    for name, values in list(summary.items())[:ROWS]:
-        cells = "".join(f"<td>{values[head]:.5g}</td>" for head in heads[1:])
-        rows.append(f"<tr><th style='text-align:left'>{html_text(name)}</th>{cells}</tr>")
-    if len(summary) > ROWS:
-        rows.append(f"<tr><td colspan='5'>and {len(summary) - ROWS} more: summary()</td></tr>")
-    return f"<table>{''.join(rows)}</table>"
-
-
-def _figure(ensemble: Any) -> Any:
-    names = ensemble.names[:PANELS]
-    figure = require("matplotlib.figure", "matplotlib", "a picture").Figure
-    made = figure(figsize=(5.6, 0.6 + 1.7 * len(names)), layout="constrained")
-    for k, name in enumerate(names):
-        ensemble.plot(name, made.add_subplot(len(names), 1, k + 1))
-    return made
-
-
-# -- xarray ------------------------------------------------------------------------------------------------------------
-
-
+PANELS = 3  #: columns that a notebook draws
+ROWS = 12  #: columns whose numbers it lists
+FAILURES = 5  #: runs that it names
 STATISTICS = ("count", "mean", "variance", "least", "greatest")
 #: Of each run, and what it is.
 TOLD = {"status": "0 where the end was reached", "t_end": "how far the run came (s)", "steps": "steps that were taken"}
-
-
-def dataset_of_runs(ensemble: Any) -> xarray.Dataset:
-    """The Dataset of :meth:`.ensemble.Ensemble.to_xarray`."""
-    xr = require("xarray", "xarray", "to_xarray")
-    variables, coordinates = (_statistics if "variance" in ensemble.reduced else _runs)(ensemble)
-    coordinates["t"] = ("t", ensemble.t, {"units": "s", "long_name": "time"})
-    metadata = ensemble.metadata
-    words = {"model": metadata["name"], "metadata": json.dumps(metadata)}
-    made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
-    return made
-
-
-def _statistics(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables over statistics and times."""
-    label = free("statistic", set(ensemble.names))
-    variables = {
-        name: (
-            (label, "t"),
-            np.array([ensemble.reduced[key][row] for key in STATISTICS], dtype=float),
-            _words(ensemble, name),
-        )
-        for row, name in enumerate(ensemble.names)
-    }
-    return variables, {label: (label, list(STATISTICS))}
-
-
-def _runs(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables over the runs, and times where some were kept; coordinates of the runs."""
-    if ensemble.x is None:
-        kept = f"this ensemble kept only the results of its reduction ({', '.join(ensemble.reduced)})"
-        raise cannot(f"{kept}; run it with reduce='states' or 'statistics'")
-    varied = ensemble.varied()
-    # an initial value of the grid is called as in `varied`, so that it does not hide the column of its name
-    labels = {name: name if name in ensemble.parameters_and_inputs else f"initial_{name}" for name in ensemble.grid}
-    run = free("run", {*ensemble.names, *varied})
-    dimensions = tuple(labels.values()) or (run,)
-    shape = tuple(map(len, ensemble.grid.values())) or (ensemble.count,)
-    coordinates: dict[str, Any] = {
-        labels[name]: (labels[name], values, _words(ensemble, name)) for name, values in ensemble.grid.items()
-    } or {run: (run, np.arange(ensemble.count), {"long_name": "number of the run"})}
-    for name, row in varied.items():
-        words = _words(ensemble, name.removeprefix("initial_"))
-        coordinates.setdefault(name, (dimensions, row.reshape(shape), words))
-    variables: dict[str, Any] = {}
-    for name in ensemble.names:
-        values, words = np.asarray(ensemble[name]), _words(ensemble, name)
-        if ensemble.samples is None:
-            variables[name] = (dimensions, values.reshape(shape), words)
-        else:
-            variables[name] = ((*dimensions, "t"), values.T.reshape(*shape, len(ensemble.t)), words)
-    for name, what in TOLD.items():
-        own = free(name, {*variables, *coordinates})
-        variables[own] = (dimensions, getattr(ensemble, name).reshape(shape), {"long_name": what})
-    return variables, coordinates
-
-
-def _words(ensemble: Any, name: str) -> dict[str, str]:
-    return attributes(name, {name: ensemble.unit(name)}, ensemble.model_metadata)
-
-
-# -- the ensemble ------------------------------------------------------------------------------------------------------
 
 
 class Failure(NamedTuple):
@@ -200,7 +51,7 @@ class Failure(NamedTuple):
     message: str
 
 
-class Ensemble:
+class Ensemble(Result):
     """The results of many runs, from :meth:`~..module.Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
@@ -252,14 +103,12 @@ class Ensemble:
         self.t_end, self.status = runs["t"], runs["status"]
         self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
         self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
-        self._notes = kept.get("notes") if isinstance(reduction, KeptStates) else None
         self._failure, self._failure_time = runs["failure"], runs["failure_time"]
-        self.reached = self.samples = self.x = None
-        if isinstance(reduction, KeptStates):
-            self.reached, self.samples = kept.get("x"), kept.get("samples")
-            self.x = None if self.reached is None else np.where(self.ok, self.reached, np.nan)
-            kept = {}
-        self.reduced, self._statistics = kept, isinstance(reduction, Statistics)
+        self._statistics = isinstance(reduction, Statistics)
+        self.reduced = kept if isinstance(reduction, Statistics | Custom) else {}
+        found = {} if self.reduced else kept
+        self.reached, self.samples, self._notes = found.get("x"), found.get("samples"), found.get("notes")
+        self.x = None if self.reached is None else np.where(self.ok, self.reached, np.nan)
 
     @property
     def ok(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -291,10 +140,7 @@ class Ensemble:
         if self._statistics:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
-            raise cannot(
-                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}; "
-                "run it with reduce='states'"
-            )
+            raise cannot(f"{self._kept_only}, not {name!r}; run it with reduce='states'")
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
             found = states[row]
@@ -304,6 +150,10 @@ class Ensemble:
             times = np.repeat(self.t[:, None], self.count, axis=1)
             found = np.stack([self._outputs(states[:, j], t)[row] for j, t in enumerate(times)])
         return np.asarray(found[0] if self.samples is None else found)
+
+    @property
+    def _kept_only(self) -> str:
+        return f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)})"
 
     def _outputs(self, x: Array, t: Array) -> Array:
         return with_outputs(self._module, self._cases, self._plan, x, t)
@@ -405,8 +255,54 @@ class Ensemble:
         MissingDependencyError
             xarray is not installed.
         """
+        xr = require("xarray", "xarray", "to_xarray")
+        variables, coordinates = self._statistics_to_xarray() if self._statistics else self._runs_to_xarray()
+        coordinates["t"] = ("t", self.t, {"units": "s", "long_name": "time"})
+        metadata = self.metadata
+        words = {"model": metadata["name"], "metadata": json.dumps(metadata)}
+        made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
+        return made
 
-        return dataset_of_runs(self)
+    def _attributes(self, name: str) -> dict[str, str]:
+        return attributes(name, {name: self.unit(name)}, self._module.metadata)
+
+    def _statistics_to_xarray(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Variables over statistics and times."""
+        label = free("statistic", set(self.names))
+        variables = {}
+        for row, name in enumerate(self.names):
+            values = np.array([self.reduced[key][row] for key in STATISTICS], dtype=float)
+            variables[name] = ((label, "t"), values, self._attributes(name))
+        return variables, {label: (label, list(STATISTICS))}
+
+    def _runs_to_xarray(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Variables over the runs, and times where some were kept; coordinates of the runs."""
+        if self.x is None:
+            raise cannot(f"{self._kept_only}; run it with reduce='states' or 'statistics'")
+        varied = self.varied()
+        # an initial value of the grid is called as in `varied`, so that it does not hide the column of its name
+        own = {*self._module.p_names, *self._module.u_names}
+        labels = {name: name if name in own else f"initial_{name}" for name in self.grid}
+        run = free("run", {*self.names, *varied})
+        dimensions = tuple(labels.values()) or (run,)
+        shape = tuple(map(len, self.grid.values())) or (self.count,)
+        coordinates: dict[str, Any] = {
+            labels[name]: (labels[name], values, self._attributes(name)) for name, values in self.grid.items()
+        } or {run: (run, np.arange(self.count), {"long_name": "number of the run"})}
+        for name, row in varied.items():
+            words = self._attributes(name.removeprefix("initial_"))
+            coordinates.setdefault(name, (dimensions, row.reshape(shape), words))
+        variables: dict[str, Any] = {}
+        for name in self.names:
+            values = np.asarray(self[name])
+            if self.samples is None:
+                variables[name] = (dimensions, values.reshape(shape), self._attributes(name))
+            else:
+                variables[name] = ((*dimensions, "t"), values.T.reshape(*shape, len(self.t)), self._attributes(name))
+        for name, what in TOLD.items():
+            variable = free(name, {*variables, *coordinates})
+            variables[variable] = (dimensions, getattr(self, name).reshape(shape), {"long_name": what})
+        return variables, coordinates
 
     def varied(self) -> dict[str, Array]:
         """The parameters, inputs and initial values (k,) that differ between the runs."""
@@ -439,11 +335,7 @@ class Ensemble:
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays to an .npz file that NumPy alone reads; ``header`` in it is ``metadata`` as JSON."""
-        target = as_path("path", path)
-        if target.suffix not in ("", ".npz"):
-            remedy = "to_pandas() gives a table, which has to_csv(...)"
-            raise bad_file(f"an ensemble is saved as .npz, not as {target.suffix}: {target}; {remedy}")
-        target = target.with_suffix(".npz")
+        target = table_path(path, "an ensemble (for tables see to_pandas().to_csv) is", (".npz",))
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)
         }
@@ -466,34 +358,79 @@ class Ensemble:
         limit : int
             Draw at most this number of runs, evenly chosen.
         """
+        values, limit = self[name], read_count("limit, of the runs drawn,", limit, 1)
+        if ax is None:
+            plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
+            ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
+        assert ax is not None
+        printed = label(Notation.of(self._module.metadata).mathtext(name), self.unit(name))
+        if not self._statistics and values.ndim == 1:
+            ax.hist(values[np.isfinite(values)], bins="auto")
+            ax.set_xlabel(f"{printed} at $t$ = {self.t[0]:.6g} s")
+            ax.set_ylabel("runs")
+            return ax
+        if self._statistics:
+            row = self.names.index(self._module.layout.plain(name))
+            spread = np.sqrt(self.reduced["variance"][row])
+            ax.fill_between(self.t, values - spread, values + spread, alpha=0.3, label="mean ± deviation")
+            ax.plot(self.t, values, label="mean")
+            ax.plot(self.t, self.reduced["least"][row], "k:", lw=0.8, label="least, greatest")
+            ax.plot(self.t, self.reduced["greatest"][row], "k:", lw=0.8)
+            ax.legend(frameon=False)
+        else:
+            chosen = np.unique(np.linspace(0, self.count - 1, min(limit, self.count)).astype(int))
+            ax.plot(self.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
+        ax.set_xlabel(TIME)
+        ax.set_ylabel(printed)
+        return ax
 
-        drawn: Axes = draw(self, name, ax, limit)
-        return drawn
+    def _figure(self) -> Any:
+        names = self.names[:PANELS]
+        figure = require("matplotlib.figure", "matplotlib", "a picture").Figure
+        made = figure(figsize=(5.6, 0.6 + 1.7 * len(names)), layout="constrained")
+        for k, name in enumerate(names):
+            self.plot(name, made.add_subplot(len(names), 1, k + 1))
+        return made
 
     def unit(self, name: str) -> str:
         """The unit of a column."""
         return self._module.layout.unit(name)
 
-    @property
-    def model_metadata(self) -> dict[str, Any]:
-        """Metadata of the module."""
-        return self._module.metadata
+    def to_dict(self) -> dict[str, Any]:
+        """Sizes, failures and the summary, as ``--json`` prints them."""
+        facts = {"count": self.count, "steps": int(self.steps.sum()), "failures": self.failures()}
+        made: dict[str, Any] = plain_values(facts | {"summary": self.summary()})
+        return made
 
     @property
-    def parameters_and_inputs(self) -> tuple[str, ...]:
-        """Names of the module's parameters and inputs."""
-        return (*self._module.p_names, *self._module.u_names)
+    def title(self) -> str:
+        return f"Ensemble of {self._module.name}"
 
     @property
-    def notation(self) -> Notation:
-        """How the columns are printed."""
-        return Notation.of(self._module.metadata)
+    def facts(self) -> list[tuple[str, str]]:
+        failed = self.failures()
+        facts = [("runs", f"{self.count}" + (f", {len(failed)} of which failed" if failed else ""))]
+        facts += [("times", f"{len(self.t)}"), ("end", f"{self.t[-1]:.6g} s")]
+        return facts + [(f"run {one.run} failed", f"at t = {one.t:.6g} s: {one.message}") for one in failed[:FAILURES]]
+
+    @property
+    def tables(self) -> list[ResultTable]:
+        """Mean, deviation, least and greatest of every column at the end."""
+        rows = [[name, *values.values()] for name, values in self.summary().items()]
+        return [ResultTable(["at the end", "mean", "deviation", "least", "greatest"], rows)]
 
     def __repr__(self) -> str:
         failed = int((~self.ok).sum())
         lost = f", {failed} failed" if failed else ""
-        return f"<Ensemble of {self._module.name}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"
+        return f"<{self.title}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"
 
     def _repr_html_(self) -> str:
-
-        return ensemble_html(self)
+        text = html_table(self.title, self.facts)
+        try:
+            (table,) = self.tables
+        except UsageError:  # a reduction of the user's own kept something else
+            return text
+        text += table._replace(rows=table.rows[:ROWS]).to_html(digits=5)
+        if len(table.rows) > ROWS:
+            text += f"<p>and {len(table.rows) - ROWS} more: summary()</p>"
+        return side_by_side(picture_html(self._figure), text)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.algebra import Array
 from ..base.files import as_path, open_plain, remove_parts, write_whole
 from ..base.texts import shown
-from ..errors import UsageError, bad_data, bad_file, ill_typed, no_choice
+from ..errors import bad_data, bad_file, ill_typed, no_choice
 from ..runtime.storage import BROKEN, read_arrays, sealed
 from .block import COUNTS, EVENT, Plan, RunBlock, inputs_at, run_block
 from .given_cases import Cases
@@ -30,20 +32,13 @@ Arrays = dict[str, Any]
 GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
 
 
-class Reduction(Protocol):
-    """How blocks are boiled down."""
-
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays: ...
-    def join(self, parts: Sequence[Arrays]) -> Arrays: ...
-
-
-class KeptStates:
-    """The last states, the samples where times were asked for, and the events.
+class Reduction:
+    """How blocks are reduced, and what is left of them joined; this one keeps arrays of them by name.
 
     Parameters
     ----------
     kept : sequence of str
-        Which of them.
+        Of the last states ``x``, the ``samples`` where times were asked for, and the events, ``notes``.
     """
 
     def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
@@ -58,7 +53,7 @@ class KeptStates:
         return {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
 
 
-class Statistics:
+class Statistics(Reduction):
     """Count, mean, variance, least and greatest of every state and output over the runs that got there.
 
     Means and variances of blocks are merged as in T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the
@@ -76,31 +71,23 @@ class Statistics:
         values = [with_outputs(module, cases, plan, states[:, j], t) for j, t in enumerate(times)]
         for start in range(0, max(cases.count, 1), GRAIN):
             parts = [summarise(x[:, start : start + GRAIN]) for x in values]
-            grains.append({name: np.stack([part[name] for part in parts], axis=-1) for name in parts[0]})
-        return {name: np.stack([grain[name] for grain in grains]) for name in grains[0]}
+            grains.append(stacked(parts, -1))
+        return stacked(grains, 0)
 
     def join(self, parts: Sequence[Arrays]) -> Arrays:
         """One grain after the other, and the variance at the end."""
         grains = [{name: rows[g] for name, rows in part.items()} for part in parts for g in range(len(part["count"]))]
-        total = grains[0]
-        for grain in grains[1:]:
-            total = merge(total, grain)
-        count = total["count"]
+        total = functools.reduce(merge, grains)
+        count, squares = total["count"], total.pop("squares")
         with np.errstate(invalid="ignore", divide="ignore"):
-            variance = np.where(count > 1, total["squares"] / (count - 1.0), np.nan)
-        return {**{name: total[name] for name in ("count", "mean", "least", "greatest")}, "variance": variance}
+            return total | {"variance": np.where(count > 1, squares / (count - 1.0), np.nan)}
 
 
-class Custom:
-    """What a user's function makes of each block.
-
-    Parameters
-    ----------
-    function : callable
-        ``function(block)`` with a :class:`~.block.RunBlock` -> a mapping of names to arrays.
-    """
+class Custom(Reduction):
+    """What a user's ``function(block)`` makes of each :class:`~.block.RunBlock`, a mapping of names to arrays."""
 
     def __init__(self, function: Callable[[RunBlock], Mapping[str, Any]]) -> None:
+        super().__init__(())
         self.function = function
 
     def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
@@ -126,9 +113,9 @@ def choose_reduction(reduce: Any) -> Reduction:
     if reduce is not None and not isinstance(reduce, str):
         raise ill_typed(f"{WANTED}, not {shown(reduce)}")
     if reduce in (None, "states"):
-        return KeptStates()
+        return Reduction()
     if reduce == "events":
-        return KeptStates(["notes"])
+        return Reduction(["notes"])
     if reduce == "statistics":
         return Statistics()
     raise no_choice(f"{WANTED}, not {reduce!r}")
@@ -170,6 +157,11 @@ def summarise(values: Array) -> Arrays:
     return {"count": count, "mean": mean, "squares": np.where(some, squares, np.nan), **extremes}
 
 
+def stacked(parts: Sequence[Arrays], axis: int) -> Arrays:
+    """Arrays of the same names along a new axis."""
+    return {name: np.stack([part[name] for part in parts], axis=axis) for name in parts[0]}
+
+
 def merge(one: Arrays, other: Arrays) -> Arrays:
     """Both together."""
     a, b = one["count"], other["count"]
@@ -183,9 +175,6 @@ def merge(one: Arrays, other: Arrays) -> Arrays:
         "least": np.fmin(one["least"], other["least"]),
         "greatest": np.fmax(one["greatest"], other["greatest"]),
     }
-
-
-# -- runs and files ----------------------------------------------------------------------------------------------------
 
 
 # -- finished blocks in files ------------------------------------------------------------------------------------------
@@ -216,27 +205,18 @@ class Store:
         self._identity = json.dumps({"format": FORMAT, **identity})
         wanted = json.loads(self._identity)
         if manifest.is_file():
-            self._compare(manifest, wanted)
+            found = _read_manifest(self.folder)
+            if differing := sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name)):
+                raise bad_data(
+                    f"store {self.folder} belongs to another ensemble: {', '.join(differing)} differ; "
+                    "name another folder or remove this one"
+                )
             return
         remove_parts(manifest)  # of a call that was killed before the manifest was there
         if self.folder.is_dir() and any(self.folder.iterdir()):
             raise bad_file(f"store {self.folder} is not empty and does not contain an ensemble; name another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
         write_whole(manifest, json.dumps(wanted, indent=1).encode())
-
-    def _compare(self, manifest: Path, wanted: dict[str, Any]) -> None:
-        try:
-            with open_plain(manifest) as file:
-                found = json.load(file)
-        except (ValueError, RecursionError):
-            found = {}
-        found = found if isinstance(found, dict) else {}
-        differing = sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name))
-        if differing:
-            raise bad_data(
-                f"store {self.folder} belongs to another ensemble: {', '.join(differing)} differ; "
-                "name another folder or remove this one"
-            )
 
     def _path(self, index: int) -> Path:
         return self.folder / f"block_{index:06d}.npz"
@@ -247,8 +227,6 @@ class Store:
 
     def save(self, index: int, arrays: dict[str, Any], words: dict[int, str]) -> None:
         """Keep the arrays of a block; complete or not there."""
-        import io
-
         buffer = io.BytesIO()
         messages = np.array(json.dumps({str(k): text for k, text in words.items()}))
         np.savez(buffer, **sealed({**arrays, "words": messages}, self._key(index)))
@@ -264,20 +242,23 @@ class Store:
         except FileNotFoundError:
             return None
         except BROKEN as error:
-            raise self.damaged(index, error) from None
+            path = self._path(index)
+            raise bad_data(f"{path} cannot be read: {error}; remove it to run its block again") from None
 
-    def damaged(self, index: int, why: object) -> UsageError:
-        """The error for a block that cannot be taken."""
-        return bad_data(f"{self._path(index)} cannot be read: {why}; remove it to run its block again")
+
+def _read_manifest(folder: Path) -> dict[str, Any]:
+    """Which ensemble a folder holds; nothing where it holds none, or what cannot be read."""
+    try:
+        with open_plain(folder / "manifest.json") as file:
+            found = json.load(file)
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def stored_length(folder: str | Path) -> int | None:
     """Runs of a block of the ensemble that a folder holds; None if it holds none."""
-    try:
-        with open_plain(as_path("store", folder) / "manifest.json") as file:
-            found = json.load(file)["block"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
+    found = _read_manifest(as_path("store", folder)).get("block")
     return found if type(found) is int and 0 < found <= LARGEST else None
 
 
@@ -319,26 +300,3 @@ def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:
 def split(count: int, size: int) -> list[tuple[int, int]]:
     """First and last + 1 of every block; one empty block where there are no runs."""
     return [(start, min(start + size, count)) for start in range(0, max(count, 1), size)]
-
-
-def run_local(
-    module: BoundModel,
-    cases: Cases,
-    plan: Plan,
-    reduction: Reduction,
-    parts: list[tuple[int, int]],
-    wanted: list[int],
-    threads: int,
-    watch: Callable[[int], None] | None,
-) -> Iterator[tuple[int, Kept]]:
-    """Run the wanted blocks one after the other, each on all threads."""
-    before = 0
-    for index in wanted:
-        start, stop = parts[index]
-
-        def told(done: int, before: int = before) -> None:
-            if watch is not None:
-                watch(before + done)
-
-        yield index, reduce_block(module, cases.part(start, stop), plan, reduction, threads, told)
-        before += stop - start

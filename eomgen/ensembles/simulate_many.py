@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..base.value_rules import read_count
 from ..errors import bad_data, ill_typed, no_choice, untrue
 from ..runtime.argument_checks import check_names, require_room, require_steps, without_dots
+from ..runtime.identity import code_digest, digest
 from ..runtime.inputs import Forcing, Signal, fill_rates, rate_pairs
 from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.trajectory import Span
@@ -32,7 +34,18 @@ from ..simulation.run_arguments import (
 from .block import LOST, Plan, find_events
 from .ensemble import Ensemble
 from .given_cases import Cases, collect_cases, grid_axes, spread_grid
-from .run_blocks import GRAIN, RUNS, Kept, Reduction, choose_reduction, choose_size, run_local, split, stored_length
+from .run_blocks import (
+    GRAIN,
+    RUNS,
+    Kept,
+    Reduction,
+    Store,
+    choose_reduction,
+    choose_size,
+    reduce_block,
+    split,
+    stored_length,
+)
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -187,11 +200,22 @@ def _run(
     module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]],
     missing: list[int], threads: int, client: Any, watch: Callable[[float], None] | None,
 ) -> Iterator[tuple[int, Kept]]:  # fmt: skip
-    if client is None:
-        return run_local(module, cases, plan, reduction, parts, missing, threads, watch)
-    from .cluster import describe, run_on_workers
+    """The missing blocks: one after the other, each on all threads, or on the workers of a cluster."""
+    if client is not None:
+        from .cluster import describe, run_on_workers
 
-    return run_on_workers(client, module, describe(module), cases, plan, reduction, parts, missing, watch)
+        yield from run_on_workers(client, module, describe(module), cases, plan, reduction, parts, missing, watch)
+        return
+    before = 0
+    for index in missing:
+        start, stop = parts[index]
+        look = None if watch is None else partial(_look_from, watch, before)
+        yield index, reduce_block(module, cases.part(start, stop), plan, reduction, threads, look)
+        before += stop - start
+
+
+def _look_from(watch: Callable[[float], None], before: int, done: int) -> None:
+    watch(before + done)
 
 
 def _gather(
@@ -264,9 +288,8 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
 
 def _open_store(
     folder: str | Path, module: BoundModel, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
-) -> Any:
-    from ..runtime.identity import code_digest
-    from .run_blocks import Store
+) -> Store:
+    """The store of an ensemble, whose identity is all that its results depend on."""
 
     def _plain(x: Any) -> Any:
         if isinstance(x, Signal):
@@ -279,14 +302,8 @@ def _open_store(
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
         "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,
-        "keep_events": plan.keep_events, "constants": list(plan.constants), "reduce": _identify(reduce),
+        "keep_events": plan.keep_events, "constants": list(plan.constants),
+        "reduce": digest(reduce) if callable(reduce) else str(reduce or "states"),
         "block": parts[0][1],
     }  # fmt: skip
     return Store(folder, identity)
-
-
-def _identify(reduce: Any) -> str:
-    """Which reduction it is; of a function, what it does."""
-    from ..runtime.identity import digest
-
-    return digest(reduce) if callable(reduce) else str(reduce or "states")

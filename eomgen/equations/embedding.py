@@ -442,8 +442,8 @@ class ForceSlopes:
                     continue
                 first = jvp([*s, *l], kinematics.flow)
                 second = jvp(first, along)
-                rates = [vec.cross(self._omegas[k], _three(first, at)) for at in (0, 3)]
-                own = [vec.add(_three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]
+                rates = [vec.cross(self._omegas[k], vec.three(first, at)) for at in (0, 3)]
+                own = [vec.add(vec.three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]
                 hat = vec.sub(vec.times(turning, l), vec.cross(s, linear))
                 found[k].append((vec.add(vec.times(turning, s), own[0]), vec.add(hat, own[1])))
         return found
@@ -525,7 +525,3 @@ def _subtract(entries: Entries, others: Entries) -> None:
 
 def _outer(a: Vec3, b: Vec3) -> Mat3:
     return vec.scale(a[0], b), vec.scale(a[1], b), vec.scale(a[2], b)
-
-
-def _three(values: Sequence[Expr], at: int) -> Vec3:
-    return values[at], values[at + 1], values[at + 2]

@@ -89,6 +89,11 @@ def dot(a: Vec3, b: Vec3) -> Expr:
     return zero if total == none else Expr(graph, total)
 
 
+def three(values: Sequence[Expr], at: int) -> Vec3:
+    """Three values from a place on, as a vector."""
+    return values[at], values[at + 1], values[at + 2]
+
+
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """a x b"""
     (x, y, z), (u, v, w) = a, b

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
-from ..base.texts import as_html, as_text
+from ..base.results import Result, ResultTable, same_keys
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_states
@@ -36,27 +36,8 @@ if TYPE_CHECKING:
 # IEEE Int. Conf. Robotics and Automation, 1997, 1922-1927, sec. 3, weights each joint so).
 
 
-class Reduced(Protocol):
-    """Base parameters as their fit sees them."""
-
-    @property
-    def module(self) -> BoundModel:
-        """Whose they are."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What each is called."""
-
-    @property
-    def texts(self) -> dict[str, str]:
-        """What each stands for."""
-
-    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, t: float = 0.0) -> Array:
-        """Y_b, (n_v, n_base, k)."""
-
-
-@dataclass(frozen=True)
-class BaseFit:
+@dataclass(frozen=True, repr=False)
+class BaseFit(Result):
     """Base parameters that explain measured forces best.
 
     Attributes
@@ -77,7 +58,8 @@ class BaseFit:
         What the motion does not tell apart.
     """
 
-    base: Reduced
+    KEYS = same_keys("values", "errors", "covariance", "sigma", "condition", "undetermined")
+    base: BaseParameters
     names: tuple[str, ...]
     values: dict[str, float]
     errors: dict[str, float]
@@ -92,7 +74,17 @@ class BaseFit:
         """Standard errors over the estimates."""
         return {n: self.errors[n] / abs(x) if x else float("inf") for n, x in self.values.items()}
 
-    def _facts(self) -> list[tuple[str, str]]:
+    @property
+    def title(self) -> str:
+        return f"base parameters of {self.base.module.name} from measured forces"
+
+    @property
+    def tables(self) -> list[ResultTable]:
+        """What was found, and how sure it is."""
+        return [ResultTable(["", "value", "error"], [[n, x, self.errors[n]] for n, x in self.values.items()])]
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
         texts = self.base.texts
         rows = []
         for name, value in self.values.items():
@@ -102,15 +94,9 @@ class BaseFit:
         noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
         return [*rows, ("noise", noise), ("condition", f"{self.condition:.3g}")]
 
-    def __repr__(self) -> str:
-        return as_text(f"base parameters of {self.base.module.name} from measured forces", self._facts())
-
-    def _repr_html_(self) -> str:
-        return as_html(f"base parameters of {self.base.module.name} from measured forces", self._facts())
-
 
 def fit_base(
-    base: Reduced,
+    base: BaseParameters,
     q: ArrayLike,
     v: ArrayLike,
     a: ArrayLike,
@@ -226,7 +212,7 @@ class _Data:
 
 
 def _not_inertial(
-    base: Reduced, motion: tuple[ArrayLike, ArrayLike, ArrayLike], also: tuple[str, ...], u: Any
+    base: BaseParameters, motion: tuple[ArrayLike, ArrayLike, ArrayLike], also: tuple[str, ...], u: Any
 ) -> tuple[Array, dict[str, Array]]:
     """Forces that are not inertial without those of the parameters of ``also``, and the column of each of these."""
     module = base.module
@@ -281,8 +267,8 @@ SPARE = 8  #: states more, for models of few bodies
 ORDER = ("Izz", "Ixx", "Iyy", "Ixy", "Ixz", "Iyz", "mx", "my", "mz", "m")
 
 
-@dataclass(frozen=True)
-class BaseParameters:
+@dataclass(frozen=True, repr=False)
+class BaseParameters(Result):
     """The inertial parameters that the motion of a mechanism tells: combinations of the standard ones.
 
     Attributes
@@ -301,6 +287,7 @@ class BaseParameters:
         Random states that were looked at.
     """
 
+    KEYS = same_keys("names", "standard", "combination", "values", "without_effect", "weakest", "states")
     module: BoundModel
     names: tuple[str, ...]
     standard: tuple[str, ...]
@@ -378,21 +365,17 @@ class BaseParameters:
 
         return fit_base(self, q, v, a, tau, **options)
 
-    def _facts(self) -> list[tuple[str, str]]:
+    @property
+    def title(self) -> str:
+        return f"{len(self)} base parameters of {self.module.name}, of {len(self.standard)} standard ones"
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
         values = self.values
         rows = [(f"{values[name]:.6g}", text) for name, text in self.texts.items()]
         if self.without_effect:
             rows.append(("no effect", ", ".join(self.without_effect)))
         return rows
-
-    def _title(self) -> str:
-        return f"{len(self)} base parameters of {self.module.name}, of {len(self.standard)} standard ones"
-
-    def __repr__(self) -> str:
-        return as_text(self._title(), self._facts())
-
-    def _repr_html_(self) -> str:
-        return as_html(self._title(), self._facts())
 
 
 def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int = SEED, p: Any = None) -> BaseParameters:

@@ -12,7 +12,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import IDENTIFIED, MEASURED, QUADRATURE, ROUNDS
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
-from ..base.texts import aligned_rows, as_html
+from ..base.results import Result, ResultTable, same_keys
 from ..errors import (
     ParameterError,
     SimulationError,
@@ -192,7 +192,7 @@ def _outputs(module: BoundModel, names: Sequence[str], forcing: Forcing, t: Arra
 # -- the result --------------------------------------------------------------------------------------------------------
 
 
-class Fit:
+class Fit(Result):
     """Values that make a module's runs agree best with measured ones.
 
     Attributes
@@ -220,6 +220,11 @@ class Fit:
     message : str
         SciPy's reason for the end.
     """
+
+    KEYS = same_keys(
+        *("values", "errors", "covariance", "sigma", "cost", "degrees_of_freedom", "undetermined", "at_bounds"),
+        *("evaluations", "success", "message"),
+    )
 
     def __init__(
         self, problem: Any, values: Array, jacobian: Array, limits: tuple[Array, Array], found: Any, known: bool
@@ -319,7 +324,17 @@ class Fit:
         panels[-1, 0].set_xlabel("t (s)")
         return figure
 
-    def _facts(self) -> list[tuple[str, str]]:
+    @property
+    def title(self) -> str:
+        return f"fit of {self._problem.module.name}"
+
+    @property
+    def tables(self) -> list[ResultTable]:
+        """What was found, and how sure it is."""
+        return [ResultTable(["", "value", "error"], [[n, x, self.errors[n]] for n, x in self.values.items()])]
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
         rows = []
         for name, value in self.values.items():
             error = self.errors[name]
@@ -347,12 +362,6 @@ class Fit:
             rows.append(("correlated", ", ".join(strong)))
         rows.append(("ended", f"{self.message} ({self.evaluations} trials)"))
         return rows
-
-    def __repr__(self) -> str:
-        return "\n".join([f"fit of {self._problem.module.name}", *aligned_rows(self._facts())])
-
-    def _repr_html_(self) -> str:
-        return as_html(f"fit of {self._problem.module.name}", self._facts())
 
 
 # -- the fit -----------------------------------------------------------------------------------------------------------

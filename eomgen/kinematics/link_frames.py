@@ -54,9 +54,9 @@ def joint_rates(kinematics: Kinematics) -> list[JointRates]:
         for c, (angular, _) in enumerate(link.columns):
             rate = v[link.first + c]
             spin = vec.add(spin, vec.scale(rate, angular))
-            spin_rate = vec.add(spin_rate, vec.scale(rate, _three(flows, at)))
+            spin_rate = vec.add(spin_rate, vec.scale(rate, vec.three(flows, at)))
             at += 3
-        result.append(JointRates(spin, spin_rate, _three(slides, 3 * k), _three(slide_rates, 3 * k)))
+        result.append(JointRates(spin, spin_rate, vec.three(slides, 3 * k), vec.three(slide_rates, 3 * k)))
     return result
 
 
@@ -64,11 +64,7 @@ def slide_accelerations(kinematics: Kinematics, rates: list[JointRates], a: tupl
     """What accelerations ``a`` add to ``slide_rate``: the slide is linear in the velocities."""
     slides = [x for r in rates for x in r.slide]
     pushes = jvp(slides, dict(zip(kinematics.v, a, strict=True)))
-    return [_three(pushes, 3 * k) for k in range(len(rates))]
-
-
-def _three(values: list[Expr], at: int) -> Vec3:
-    return values[at], values[at + 1], values[at + 2]
+    return [vec.three(pushes, 3 * k) for k in range(len(rates))]
 
 
 # -- parallel axes -----------------------------------------------------------------------------------------------------

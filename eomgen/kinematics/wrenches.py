@@ -521,16 +521,12 @@ def inertial_terms(kinematics: Kinematics) -> list[Expr]:
     for k, link in enumerate(links):
         falls.append(link.down(kinematics.mechanism.gravity if link.parent == GROUND else falls[link.parent]))
         angular, linear = twists[k]
-        alpha, change = (_three(rates, 6 * k + at) for at in (0, 3))
+        alpha, change = (vec.three(rates, 6 * k + at) for at in (0, 3))
         fall = vec.times(link.frame.rotation, falls[k])
         lifted = vec.sub(vec.add(change, vec.cross(angular, linear)), fall)
         motions[link.body] = [*angular, *linear, *alpha, *lifted]
     still = [graph.zero] * MOTION
     return [x for k, body in enumerate(kinematics.mechanism.bodies) for x in (*motions.get(k, still), *_inertia(body))]
-
-
-def _three(values: list[Expr], at: int) -> Vec3:
-    return values[at], values[at + 1], values[at + 2]
 
 
 def _inertia(body: Body) -> list[Expr]:

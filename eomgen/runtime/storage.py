@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ..base.algebra import Array
-from ..base.files import as_path, open_plain, whole_file
+from ..base.files import as_name, as_path, open_plain, whole_file
 from ..base.texts import visible
 from ..errors import bad_file, cannot
 from .argument_checks import require
@@ -155,9 +156,11 @@ def table_path(path: str | Path, what: str, endings: tuple[str, ...] = TABLES) -
     Raises
     ------
     UsageError
-        Another ending than those allowed.
+        Another ending than those allowed; a folder, as a name that ends in a slash.
     """
     target = as_path("path", path)
+    if as_name("path", path).endswith(("/", os.sep)):
+        raise bad_file(f"{path} is a folder; name a file in it")
     target = target if target.suffix else target.with_suffix(".npz")
     if target.suffix not in endings:
         raise bad_file(f"{target}: {what} written as {' or '.join(endings)}, not {target.suffix!r}")

@@ -16,7 +16,7 @@ stop: a dead centre of theirs, the end of the mechanism's reach).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -341,6 +341,11 @@ class Singular(NamedTuple):
     q: Array
     moving: tuple[str, ...]
     joints: tuple[str, ...]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """All but the position."""
+        return {name: value for name, value in self._asdict().items() if name != "q"}
 
     def __str__(self) -> str:
         place = ", ".join([f"{name} = {value:.9g}" for name, value in self.values.items()] or [f"t = {self.t:.9g} s"])

@@ -19,7 +19,7 @@ from ..base.algebra import Array, definite_factor
 from ..base.limits.constraints import MEASURED
 from ..base.limits.impacts import BEYOND, ELSEWHERE, HELD, ROUNDED, TOUCHING
 from ..base.names import hint, joined
-from ..base.texts import as_text
+from ..base.results import Result, plain, same_keys
 from ..errors import (
     UsageError,
     at_odds,
@@ -364,8 +364,8 @@ def find_sliding(
 # -- the impact --------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Impact:
+@dataclass(frozen=True, repr=False)
+class Impact(Result):
     """The result of an impact: states before and after it, impulses and the energy lost.
 
     Attributes
@@ -408,7 +408,15 @@ class Impact:
             raise no_such(f"no gap or locked coordinate {name!r}; there are {', '.join(self.names)}")
         return float(self.impulses[self.names.index(name)])
 
-    def __repr__(self) -> str:
+    KEYS = same_keys("names", "impulses", "energy_lost", "rates_before", "rates_after", "constraint_impulses")
+    title = "Impact"
+
+    def to_dict(self) -> dict[str, Any]:
+        sliding = same_keys("friction", "sliding_before", "sliding_after") if self.friction else ()
+        return super().to_dict() | {key: plain(getattr(self, key)) for key in sliding}
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
         facts = [
             (name, f"impulse {g:.6g}, rate {before:.6g} -> {after:.6g}")
             for name, g, before, after in zip(
@@ -419,7 +427,7 @@ class Impact:
             before, after = self.sliding_before[name], self.sliding_after[name]
             texts = (", ".join(f"{x:.6g}" for x in row) for row in (impulses, before, after))
             facts.append((f"friction of {name}", "impulse {}, sliding {} -> {}".format(*texts)))
-        return as_text("Impact", [*facts, ("energy lost", f"{self.energy_lost:.6g} J")])
+        return [*facts, ("energy lost", f"{self.energy_lost:.6g} J")]
 
 
 @np.errstate(all="ignore")

@@ -15,6 +15,7 @@ from ..base.files import whole_file
 from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
 from ..base.limits.impacts import OPENS
 from ..base.names import place_of_marker
+from ..base.results import Result, ResultTable, plain, same_keys
 from ..errors import NoDerivativeError, at_odds, cannot, ill_placed, ill_typed, incomplete, untrue
 from ..numeric.projection import minimum_norm
 from ..runtime.argument_checks import unknown
@@ -48,7 +49,7 @@ class EventSlopes(NamedTuple):
     d_after: Array  #: (n_x, k)
 
 
-class Sensitivities:
+class Sensitivities(Result):
     """A trajectory and its derivatives: ``s["theta", "k"]`` is d theta / d k over time, (n_t,).
 
     Attributes
@@ -87,6 +88,44 @@ class Sensitivities:
         self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
         self._rows |= dict(zip(trajectory.x_names, dx, strict=True))
 
+    KEYS = same_keys("names", "held", "steps", "final")
+
+    @property
+    def steps(self) -> int:
+        """Of the run."""
+        return len(self.t) - 1
+
+    @property
+    def final(self) -> dict[str, dict[str, float]]:
+        """Derivatives at the end, by state or output, then by name."""
+        rows = (*self.trajectory.x_names, *self.trajectory.metadata["y_names"])
+        return {row: {name: float(self[row, name][-1]) for name in self.names} for row in dict.fromkeys(rows)}
+
+    def to_dict(self) -> dict[str, Any]:
+        events = [
+            {"event": e.name, "t": e.t, "by": dict(zip(self.names, e.dt.tolist(), strict=True))} for e in self.events
+        ]
+        return super().to_dict() | {"events": plain(events)}
+
+    @property
+    def title(self) -> str:
+        return f"Sensitivities of {self.trajectory.name} to {', '.join(self.names)}"
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        return [("points", f"{len(self.t)}"), ("held at the start", ", ".join(self.held))]
+
+    @property
+    def tables(self) -> list[ResultTable]:
+        """Derivatives at the end, and those of the times of events."""
+        columns = ["", *self.names]
+        final = [[row, *plain(list(by.values()))] for row, by in self.final.items()]
+        found = [ResultTable(columns, final, f"derivatives at t = {self.t[-1]:g} s, by")]
+        if self.events:
+            events = [[f"{e.name}, t = {e.t:.6g} s", *e.dt.tolist()] for e in self.events]
+            found.append(ResultTable(columns, events, "times of events, by"))
+        return found
+
     def __getitem__(self, key: tuple[str, str]) -> Array:
         if not (isinstance(key, tuple) and len(key) == 2):
             raise ill_typed(f"write sensitivities[state or output, parameter], not {key!r}")
@@ -120,7 +159,7 @@ class Sensitivities:
         return target
 
     def __repr__(self) -> str:
-        return f"<Sensitivities of {self.trajectory.name} to {', '.join(self.names)}: {len(self.t)} points>"
+        return f"<{self.title}: {len(self.t)} points>"
 
 
 # -- the start ---------------------------------------------------------------------------------------------------------

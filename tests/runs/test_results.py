@@ -156,3 +156,33 @@ def test_a_linearization_is_a_system_of_python_control() -> None:
     )
     for k, name in enumerate(linear.states):
         assert np.allclose(response.states[k, 0], (run[name] - run[name][0]) / small, atol=2e-4)
+
+
+def test_every_result_gives_plain_values_a_table_and_a_page() -> None:
+    crank = models.build("slider_crank").compile(target="numpy")
+    state, start = crank.x0({"theta": 0.3, "theta_dot": 2.0}), {"theta": 0.3}
+    measured = crank.simulate(0.1, start, t_eval=np.linspace(0, 0.1, 9))
+    results = [
+        crank.equilibrium(start),
+        crank.linearize(start),
+        crank.modes(),
+        crank.actuator_forces(0.0, state),
+        crank.impact(0.0, state, lock=["s"]),
+        crank.motion_range("theta"),
+        crank.sensitivities(["r"], 0.05, start),
+        crank.fit({"t": measured.t, "s": measured["s"]}, ["r"]),
+        crank.base_parameters(),
+        crank.simulate_many(0.05, {"theta": [0.1, 0.2]}),
+    ]
+    for result in results:
+        values = json.loads(json.dumps(result.to_dict(), allow_nan=False))  # an unlimited range has null limits
+        assert values
+        assert len(result.to_pandas())
+        assert result.title in result._repr_html_()
+        assert result.title in repr(result)
+    assert results[1].to_pandas().loc["theta", "theta_dot"] == pytest.approx(1.0)
+    assert results[0].to_dict()["coordinates"]["theta"] == results[0]["theta"]
+
+
+def test_a_name_that_ends_in_a_slash_is_no_file(run: Any, tmp_path: Path) -> None:
+    refuses("EG-FILE folder", run.save, f"{tmp_path}/")

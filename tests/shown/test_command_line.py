@@ -228,6 +228,21 @@ def test_codes_of_models(call: Call, tmp_path: Path, text: str, words: list[str]
     expect(call(words[0], model_file(tmp_path, text), *words[1:]), code, said)
 
 
+def test_messages_name_options_not_arguments_of_python(call: Call, tmp_path: Path) -> None:
+    told = call("kinematics", FOUR_BAR, *NUMPY, "--range", "psi=1.2:2.5").err
+    assert "give --partial for the part" in told
+    robot = model_file(
+        tmp_path,
+        '<robot name="arm"><link name="base"/><link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" '
+        'izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" type="revolute"><parent link="base"/>'
+        '<child link="tip"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>',
+        "arm.urdf",
+    )
+    told = call("check", robot).err
+    assert "--limits stop" in told
+    assert "limits='stop'" not in told
+
+
 def test_values_of_set_are_judged_as_declared_ones(call: Call, tmp_path: Path) -> None:
     text = (
         "name: dropped\nparameters: {r: 0.1, mu: 0.3}\nbodies: {ball: {mass: 1, inertia: {zz: 0.1}}}\n"

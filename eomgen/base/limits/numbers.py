@@ -24,8 +24,6 @@ NORMAL = 1e-290
 #: The same of sizes that are squared.
 TINY_ROOT = 1e-150
 LARGE_ROOT = 1e150  #: a number whose square is beyond double precision
-#: Width of a bracket relative to its place at which nothing lies between: two numbers.
-NEXT = 4e-16
 #: By which an angle may miss a multiple of a quarter turn, relative to it, and an entry of a rotation a whole number: 4
 #: to 5 eps, what pi / 2 written in sixteen digits leaves.
 QUARTER = 1e-15

@@ -1,0 +1,117 @@
+"""Results of calls: labelled lines, tables and plain values, from which text, HTML, JSON and DataFrames are made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from math import isfinite
+from typing import Any, ClassVar, NamedTuple
+
+from .texts import aligned_rows, html_table, html_text
+
+LEFT = "style='text-align:left'"
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON can hold it: arrays as lists, complex numbers as pairs, None for what is not finite."""
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    return [plain(one) for one in value] if isinstance(value, Iterable) else str(value)
+
+
+class ResultTable(NamedTuple):
+    """Rows of labels and numbers under headings; without headings, labels and values."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    title: str = ""
+    right: Sequence[int] | None = None  #: columns aligned to the right; all but the first by default
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as text."""
+        return [[_cell(value) for value in row] for row in self.rows]
+
+    def to_html(self, digits: int = 6, printed: bool = False) -> str:
+        """For notebooks; headings may be HTML already."""
+        head = "".join(f"<th>{name if printed else html_text(name)}</th>" for name in self.columns)
+        cells = ((_cell(value, digits) for value in row) for row in self.rows)
+        rows = "".join(
+            f"<tr><th {LEFT}>{html_text(label)}</th>{''.join(f'<td>{html_text(one)}</td>' for one in more)}</tr>"
+            for label, *more in cells
+        )
+        return f"<table><tr>{head}</tr>{rows}</table>"
+
+    def to_pandas(self) -> Any:
+        """As a DataFrame, the first column its index."""
+        from pandas import DataFrame
+
+        frame = DataFrame([list(row) for row in self.rows], columns=list(self.columns) or ["", "value"])
+        return frame.set_index(frame.columns[0])
+
+
+def _cell(value: Any, digits: int = 6) -> str:
+    """A cell of a table: numbers with so many digits, a dash for none."""
+    return value if isinstance(value, str) else "-" if value is None else f"{value:.{digits}g}"
+
+
+class Result:
+    """What an analysis found: a class of results says its ``title``, its ``facts`` and what ``to_dict`` holds.
+
+    Attributes
+    ----------
+    title : str
+    facts : list of (str, str)
+        Label and value of each line of its text.
+    tables : sequence of ResultTable
+        What lines do not hold.
+    """
+
+    #: Key of ``to_dict`` -> attribute.
+    KEYS: ClassVar[Mapping[str, str]] = {}
+
+    @property
+    def title(self) -> str:
+        """First line of the text."""
+        raise NotImplementedError
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value of each line of the text."""
+        raise NotImplementedError
+
+    @property
+    def tables(self) -> Sequence[ResultTable]:
+        """What lines do not hold."""
+        return ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain values, as ``--json`` prints them."""
+        return {key: plain(getattr(self, attribute)) for key, attribute in self.KEYS.items()}
+
+    def to_pandas(self) -> Any:
+        """The result, or the first of its tables, as a pandas DataFrame."""
+        return next(iter(self.tables), ResultTable((), self.facts)).to_pandas()
+
+    def __repr__(self) -> str:
+        return "\n".join([self.title, *aligned_rows(self.facts)])
+
+    def _repr_html_(self) -> str:
+        return html_table(self.title, self.facts)
+
+
+def same_keys(*names: str) -> dict[str, str]:
+    """Keys of ``to_dict`` that are called as the attributes."""
+    return {name: name for name in names}
