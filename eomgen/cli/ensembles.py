@@ -11,10 +11,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..base.files import open_plain, save_figure, write_whole
-from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
+from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
 from ..runtime.argument_checks import require, require_room
 from ..runtime.storage import split_head, write_netcdf
-from .options import Number, Prepared, analysis_verb, end_option, file_option, parse_number, require_folder
+from .options import (
+    Prepared,
+    analysis_verb,
+    end_option,
+    file_option,
+    parse_span,
+    require_folder,
+    require_once,
+    solver_options,
+)
 from .output import stage
 
 if TYPE_CHECKING:
@@ -42,10 +51,6 @@ MOST_WORKERS = 4096  #: processes of a local cluster
 @end_option
 @click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M evenly spaced times.")
 @click.option("--statistics", is_flag=True, help="Keep only mean, standard deviation, least and greatest values.")
-@click.option("--solver", metavar="NAME", help="Integrator; by default that of the file.")
-@click.option("--step", type=Number(), metavar="H", help="Step size of RK4 in s.")
-@click.option("--rtol", type=Number(), metavar="X", help="Relative tolerance.")
-@click.option("--atol", type=Number(), metavar="X", help="Absolute tolerance.")
 @click.option(
     "--threads", type=click.IntRange(min=1), metavar="N", help="Number of runs at a time; by default all processors."
 )
@@ -58,12 +63,12 @@ MOST_WORKERS = 4096  #: processes of a local cluster
 )
 @click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw column NAME to the picture FILE.")
 @file_option("--out", "Write results to FILE.npz, .csv or .nc.")
+@solver_options
 def ensemble(
     work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
     seed: int, end: float | None,
-    samples: int | None, statistics: bool, solver: str | None, step: float | None, rtol: float | None,
-    atol: float | None, threads: int | None, cluster: str | None, store: Path | None,
-    plot: tuple[str, str] | None, out: Path | None, as_json: bool,
+    samples: int | None, statistics: bool, threads: int | None, cluster: str | None, store: Path | None,
+    plot: tuple[str, str] | None, out: Path | None, as_json: bool, solver: dict[str, Any],
 ) -> None:  # fmt: skip
     """Run a model many times: for a table of cases, for random values, or over a grid of values."""
     if out is not None and out.suffix not in (".npz", ".csv", ".nc"):
@@ -83,7 +88,7 @@ def ensemble(
         raise off_range(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     if grid and (cases is not None or vary or count is not None):
         raise at_odds("--grid defines all runs itself; leave out --cases, --vary and --count")
-    axes = read_grid(grid)
+    axes = _read_grid(grid)
     values = _read(cases, module) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
@@ -96,9 +101,9 @@ def ensemble(
     times = None if samples is None else _even(end or float(last), samples)
     with stage("integrate"):
         found = module.simulate_many(
-            end, *(group or None for group in sorted_values.values()), method=solver, step=step, t_eval=times,
-            grid=axes or None, threads=threads, reduce="statistics" if statistics else None,
-            cluster=_cluster(cluster), store=store, rtol=rtol, atol=atol,
+            end, *(group or None for group in sorted_values.values()), t_eval=times, grid=axes or None,
+            threads=threads, reduce="statistics" if statistics else None,
+            cluster=int(cluster) if cluster is not None and cluster.isdigit() else cluster, store=store, **solver,
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
@@ -124,10 +129,6 @@ def ensemble(
 
 def _even(end: float, count: int) -> list[float]:
     return [end * (i / (count - 1)) for i in range(count)]  # the last is end itself
-
-
-def _cluster(given: str | None) -> int | str | None:
-    return int(given) if given is not None and given.isdigit() else given
 
 
 def _read(path: Path, module: Module) -> dict[str, list[float]]:
@@ -165,41 +166,18 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
     """Values drawn for each name, from a stream of its own."""
     import numpy as np
 
+    spans = [parse_span("--vary", word, "NAME=LOW:HIGH", "r=0.1:0.2") for word in vary]
+    require_once("--vary", [name for name, *_ in spans])
     drawn = {}
-    for k, words in enumerate(vary):
-        name, _, ends = words.partition("=")
-        low, _, high = ends.partition(":")
-        try:
-            limits = parse_number(low), parse_number(high)
-        except UsageError as error:
-            raise no_number(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
-        if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
-            raise no_number(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
-        if name.strip() in drawn:
-            raise at_odds(f"--vary {name.strip()} is given twice")
-        drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
+    for k, (name, low, high, _) in enumerate(spans):
+        if not (isfinite(low) and isfinite(high) and low <= high):
+            raise no_number(f"--vary {vary[k]}: write NAME=LOW:HIGH with two finite numbers in order")
+        drawn[name] = np.random.default_rng([seed, k]).uniform(low, high, count)
     return drawn
 
 
-def read_grid(options: tuple[str, ...]) -> dict[str, tuple[float, float, int]]:
-    """``NAME=LOW:HIGH:COUNT`` of each ``--grid`` -> (low, high, count) by name.
-
-    Raises
-    ------
-    UsageError
-    """
-    grid: dict[str, tuple[float, float, int]] = {}
-    for option in options:
-        name, equals, text = option.partition("=")
-        parts = text.split(":")
-        if not equals or not name.strip() or len(parts) != 3:
-            raise ill_typed(f"--grid {option}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
-        try:
-            low, high = (parse_number(part) for part in parts[:2])
-            count = int(parts[2])
-        except ValueError as error:  # a UsageError too
-            raise no_number(f"--grid {option}: {error}") from None
-        if name.strip() in grid:
-            raise at_odds(f"--grid {option}: give each name once")
-        grid[name.strip()] = (low, high, count)
-    return grid
+def _read_grid(options: tuple[str, ...]) -> dict[str, tuple[float, float, int]]:
+    """Low, high and count by name."""
+    spans = [parse_span("--grid", word, "NAME=LOW:HIGH:COUNT", "theta=0:2*pi:73") for word in options]
+    require_once("--grid", [name for name, *_ in spans])
+    return {name: (low, high, count or 0) for name, low, high, count in spans}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -15,7 +15,7 @@ import click
 from ..base.files import kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
-from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number
+from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
 from ..runtime.argument_checks import unknown
 from ..targets import TARGETS
 from .output import name_options, reports_failures, say, show, stage
@@ -150,6 +150,42 @@ def parse_number(text: str) -> float:
     if value is None:
         raise no_number("the value is not a number")
     return value
+
+
+MOST_POINTS = 10_000_000  #: of a range
+
+
+def parse_span(option: str, word: str, form: str, example: str) -> tuple[str, float, float, int | None]:
+    """Name, ends and count of ``NAME=LOW:HIGH``, with a count where the form has one; ``[:COUNT]`` may be left out.
+
+    Raises
+    ------
+    UsageError
+    """
+    name, equals, text = word.partition("=")
+    parts, most = text.split(":"), form.count(":") + 1
+    if not equals or not name.strip() or len(parts) not in (most, most - form.count("[")):
+        raise ill_typed(f"{option} {word}: write {form}, for example {example}")
+    try:
+        low, high = (parse_number(part) for part in parts[:2])
+    except UsageError as error:
+        remedy = "" if "[" in form else f"write {form} with two numbers; "
+        raise no_number(f"{option} {word}: {remedy}{error}") from None
+    count = parts[2].strip() if len(parts) == 3 else None
+    if count is not None and not (count.isdecimal() and 1 <= int(count) <= MOST_POINTS):
+        raise off_range(f"{option} {word}: the count is 1 to {MOST_POINTS}, a whole number of points, not {count!r}")
+    return name.strip(), low, high, None if count is None else int(count)
+
+
+def require_once(option: str, names: Sequence[str]) -> None:
+    """Refuse a name that several options of a kind give.
+
+    Raises
+    ------
+    UsageError
+    """
+    if len(set(names)) < len(names):
+        raise at_odds(f"{option}: {', '.join(names)}: give each name once")
 
 
 # -- names and files ---------------------------------------------------------------------------------------------------

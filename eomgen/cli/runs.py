@@ -13,7 +13,7 @@ import numpy as np
 from ..base.limits.numbers import RESTING
 from ..base.results import ResultTable
 from ..base.texts import without_noise
-from ..errors import at_odds, bad_file, ill_shaped, ill_typed, incomplete, no_number, off_range
+from ..errors import at_odds, bad_file, ill_shaped, incomplete
 from ..runtime.storage import RUNS
 from .models import operations_of, summary
 from .options import (
@@ -22,8 +22,9 @@ from .options import (
     end_option,
     file_option,
     model_verb,
-    parse_number,
+    parse_span,
     require_folder,
+    require_once,
     solver_options,
     split_names,
 )
@@ -268,31 +269,7 @@ def kinematics(
 
 
 def _read_range(words: str) -> tuple[str, float, float, int | None]:
-    """``NAME=START:END[:COUNT]`` -> its parts.
-
-    Raises
-    ------
-    UsageError
-    """
-    name, equals, text = words.partition("=")
-    parts = text.split(":")
-    if not equals or not name.strip() or len(parts) not in (2, 3):
-        raise ill_typed(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
-    try:
-        start, end = (parse_number(part) for part in parts[:2])
-        count = _count(parts[2]) if len(parts) == 3 else None
-    except ValueError as error:  # a UsageError too
-        raise no_number(f"--range {words}: {error}") from None
-    if count is not None and not 1 <= count <= 10_000_000:
-        raise off_range(f"--range {words}: the count is 1 to 10000000, not {count}")
-    return name.strip(), start, end, count
-
-
-def _count(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise off_range(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
+    return parse_span("--range", words, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
 
 
 def _range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
@@ -303,8 +280,7 @@ def _range_values(module: Module, asked: list[tuple[str, float, float, int | Non
             raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
-    if len(set(names)) < len(names):
-        raise at_odds(f"--range: {', '.join(names)}: give each name once")
+    require_once("--range", names)
     counts = {count for *_, count in asked if count is not None} or {COUNT}
     if len(counts) > 1:
         raise ill_shaped(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
