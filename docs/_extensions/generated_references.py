@@ -1,7 +1,8 @@
 """Parts of reference pages that are made from the package: from its tables of fields, and from its command line.
 
 ``{eomgen-keys} joints`` writes a table of keys for each type of a section, ``{eomgen-verbs}`` a section for each verb,
-``{eomgen-constructs} URDF`` what becomes of each element of a robot file.
+``{eomgen-constructs} URDF`` what becomes of each element of a robot file, ``{eomgen-support}`` which calls exclude
+which kinds of models.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from eomgen.importers.mjcf import MJCF
 from eomgen.importers.urdf import URDF
 from eomgen.importers.xml_file import ANY, INSIDE
 from eomgen.joints import JOINTS
+from eomgen.runtime.refusals import EXCLUDED, KINDS
 
 
 def _cell(text: str) -> str:
@@ -152,9 +154,26 @@ class Constructs(SphinxDirective):
         return self.parse_text_to_nodes("\n".join(lines))
 
 
+def support_table() -> Iterator[str]:
+    """The lines of a table of calls and the kinds of models that each excludes."""
+    yield from ("| call | not for models with |", "|---|---|")
+    for call, excluded in EXCLUDED.items():
+        yield f"| `{call}` | {_cell('; '.join(KINDS[kind].about for kind in excluded))} |"
+    yield ""
+
+
+class Support(SphinxDirective):
+    """``{eomgen-support}``."""
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes in place of the directive."""
+        return self.parse_text_to_nodes("\n".join(support_table()), allow_section_headings=False)
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
     app.add_directive("eomgen-constructs", Constructs)
     app.add_directive("eomgen-keys", Keys)
+    app.add_directive("eomgen-support", Support)
     app.add_directive("eomgen-verbs", Verbs)
     return {"parallel_read_safe": True}

@@ -11,7 +11,7 @@ from ..base.results import Result, plain, same_keys
 from ..base.texts import shown
 from ..errors import ill_typed, off_range
 from ..runtime.argument_checks import read_number, read_numbers, unknown
-from ..runtime.refusals import refuse_states, require_velocities
+from ..runtime.refusals import require_support
 from ..runtime.trajectory import Start
 from ..simulation.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 from ..simulation.kinematic import complete, describe_gap, start_from
@@ -103,8 +103,7 @@ def motion_range(
     PartitionError, AssemblyError, UsageError
         As :meth:`kinematic_analysis`.
     """
-    require_velocities(module.layout)
-    refuse_states(module.layout, "motion_range")
+    require_support(module.layout, "motion_range")
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):

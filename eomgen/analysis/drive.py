@@ -27,7 +27,7 @@ from ..numeric.ranks import partition
 from ..runtime.argument_checks import read_names, read_numbers
 from ..runtime.constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from ..runtime.layout import Layout
-from ..runtime.refusals import refuse_reaction_laws, refuse_states
+from ..runtime.refusals import require_support
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -126,8 +126,7 @@ def actuator_forces(
     """
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout
-    refuse_states(layout, "actuator_forces")
-    refuse_reaction_laws(layout, "actuator_forces")
+    require_support(layout, "actuator_forces")
     states = prepare(module, t, x)
     count = len(states.t)
     names = _drives(layout, actuated)

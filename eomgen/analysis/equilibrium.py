@@ -18,7 +18,7 @@ from ..errors import AssemblyError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.initial import Initial
 from ..runtime.kernels import constraint_system
-from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled, require_velocities
+from ..runtime.refusals import refuse_closed, require_support
 from .balance import Balance, balance_forces, force_slopes
 from .linear import linearize
 from .linearization import Linearization, SecondOrder, stability_of_matrix, stiffness_errors, verdict
@@ -216,9 +216,7 @@ def equilibrium(
     UnavailableError
         A constraint that closes and opens is closed there, or states are sampled, or contacts rigid.
     """
-    require_velocities(module.layout)
-    refuse_rigid(module.layout, "equilibrium")
-    refuse_sampled(module.layout, "equilibrium")
+    require_support(module.layout, "equilibrium")
     module = module if p is None and u is None else module.bind(p, u)
     time = read_number("t", t)
     unknowns = read_names("unknowns", unknowns)

@@ -13,7 +13,7 @@ from ..errors import cannot, ill_chosen, ill_shaped, no_choice
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import partition, rank
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
-from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
+from ..runtime.refusals import refuse_closed, require_support
 from .balance import TangentSpace, displacement_names, displacement_rates, find_tangent, projected_directions
 from .linearization import Linearization, own_accelerations
 
@@ -166,8 +166,7 @@ def linearize(
         refuse_inputs(module.layout)
     if not isinstance(form, str) or form not in FORMS:
         raise no_choice(f"form must be one of {', '.join(FORMS)}, not {form!r}")
-    refuse_rigid(module.layout, "linearize")
-    refuse_sampled(module.layout, "linearize")
+    require_support(module.layout, "linearize")
     module = module if p is None and u is None else module.bind(p, u)
     layout, time = module.layout, read_number("t", t)
     state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))

@@ -17,7 +17,7 @@ from ..errors import bad_data, ill_typed, no_choice, untrue
 from ..runtime.argument_checks import check_names, require_room, require_steps, without_dots
 from ..runtime.identity import code_digest, digest
 from ..runtime.inputs import Forcing, Signal, fill_rates, rate_pairs
-from ..runtime.refusals import refuse_moreau, refuse_rigid
+from ..runtime.refusals import refuse_moreau, require_support
 from ..runtime.trajectory import Span
 from ..simulation.bound_run import Progress, wanted
 from ..simulation.compiled import can_run
@@ -140,7 +140,7 @@ def simulate_many(
     MissingDependencyError
         dask.distributed is not installed.
     """
-    refuse_rigid(module.layout, "simulate_many")
+    require_support(module.layout, "simulate_many")
     check_names("option of simulate_many", options, OPTIONS)
     if grid is not None:
         initial, parameters, inputs = spread_grid(module, grid, (initial, parameters, inputs))

@@ -15,7 +15,7 @@ from ..base.limits.analyses import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
-from ..runtime.refusals import refuse_states
+from ..runtime.refusals import require_support
 from .regressor import (
     STANDARD,
     free_directions,
@@ -404,7 +404,7 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     ProjectionError
         No random state could be put on the constraints.
     """
-    refuse_states(module.layout, "base_parameters")
+    require_support(module.layout, "base_parameters")
     if not 0.0 <= read_number("least", least) < 1.0:
         raise off_range(f"least must be 0 or positive and less than 1, not {least:g}")
     module = module if p is None else module.bind(p)

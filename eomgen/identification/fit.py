@@ -26,7 +26,7 @@ from ..errors import (
 from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
 from ..runtime.inputs import Forcing, Table
 from ..runtime.layout import bounds_of
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import require_support
 from ..runtime.start_values import silent, start_slopes, warn_of_fixed
 from ..runtime.tapes import Expression
 from ..simulation.simulate import simulate
@@ -430,7 +430,7 @@ def fit(
     MissingDependencyError
         SciPy is not installed.
     """
-    refuse_rigid(module.layout, "fit")
+    require_support(module.layout, "fit")
     least_squares: Any = require("scipy.optimize", "scipy", "fit").least_squares
     check_names("option of fit", options, ("loss", "f_scale", "ftol", "xtol", "gtol", "max_nfev"), ("derivatives",))
     if derivatives not in DERIVATIVES:

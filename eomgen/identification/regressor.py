@@ -14,7 +14,7 @@ from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError, cannot, ill_shaped
 from ..runtime.argument_checks import read_numbers
 from ..runtime.kernels import into
-from ..runtime.refusals import refuse_states
+from ..runtime.refusals import require_support
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -159,7 +159,7 @@ def regressor(
     ``inverse_dynamics(q, v, a)`` is Y pi and what no body's inertia makes: springs, dampers and other force elements,
     inputs, and the inertia of drives (``armature``).  :meth:`inertial_remainder` is that part.
     """
-    refuse_states(module.layout, "regressor")
+    require_support(module.layout, "regressor")
     names, (q, v, a), single = _motion(module, q, v, a)
     values, count, n_v = _values(module, p), q.shape[1], module.n_v
     result = np.empty((n_v, len(names), count))

@@ -25,7 +25,7 @@ from .argument_names import both_names
 from .initial import Given, Initial
 from .kernels import DerivedState, Kernels, Projection, Refused, Rows, mechanical
 from .layout import Layout
-from .refusals import refuse_reaction_laws, refuse_states
+from .refusals import require_support
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -96,7 +96,7 @@ class BoundModel:
         names = ("mass_matrix", "embedded_mass_matrix", "bias", "inverse_dynamics", "constraint_jacobian")
         vars(self).update(mechanical(kernels) if self.n_s else {name: getattr(kernels, name) for name in names})
         if layout.reaction_laws:
-            refused = Refused(lambda: refuse_reaction_laws(layout, "inverse_dynamics"))
+            refused = Refused(lambda: require_support(layout, "inverse_dynamics"))
             self.inverse_dynamics = cast("Motion", refused)
         self.velocity_constraints = kernels.velocity_constraints
 
@@ -224,8 +224,7 @@ class BoundModel:
         UnavailableError
             The model has first-order states.
         """
-        refuse_states(self.layout, "inverse_dynamics_derivatives")
-        refuse_reaction_laws(self.layout, "inverse_dynamics_derivatives")
+        require_support(self.layout, "inverse_dynamics_derivatives")
         n_q, n_v, every = self.n_q, self.n_v, self._inverse_slopes(q, v, a, p, u, out, t)
         return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
 

@@ -14,7 +14,7 @@ from ..base.limits.constraints import STATE
 from ..base.limits.numbers import SINGULAR
 from ..errors import UnavailableError, ill_shaped
 from .argument_checks import read_numbers
-from .refusals import refuse_states
+from .refusals import require_support
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -35,7 +35,7 @@ class Canonical:
 
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
-        refuse_states(layout, "the canonical form")
+        require_support(layout, "the canonical form")
         if layout.n_momenta != layout.n_v:
             raise UnavailableError(
                 f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "

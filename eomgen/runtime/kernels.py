@@ -16,7 +16,7 @@ from .argument_checks import fitting, read_numbers
 from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
-from .refusals import require_projection, require_velocities
+from .refusals import require_support
 from .start_values import at_parameters
 
 if TYPE_CHECKING:
@@ -77,12 +77,10 @@ class Kernels:
         """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
         if name not in self._derivatives:
             refused = self.layout.given_rates or not self.layout.projects
-            self._derivatives[name] = cast("Timed", Refused(self._refuse)) if refused else self.timed(name)
+            self._derivatives[name] = (
+                cast("Timed", Refused(lambda: require_support(self.layout, name))) if refused else self.timed(name)
+            )
         return self._derivatives[name]
-
-    def _refuse(self) -> None:
-        require_velocities(self.layout)
-        require_projection(self.layout)
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""

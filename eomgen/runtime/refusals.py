@@ -1,8 +1,9 @@
-"""What a model cannot be asked, and why."""
+"""The table of what each call needs of a model, and the refusals that follow from it, each with what to do instead."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import UnavailableError, no_choice
 
@@ -11,66 +12,97 @@ if TYPE_CHECKING:
     from .layout import Layout
 
 
-def require_velocities(layout: Layout) -> None:
-    """Refuse a model whose q' is given as functions of other velocities.
+class Kind(NamedTuple):
+    """A kind of model that calls exclude."""
+
+    about: str  #: what such a model has, for the table in the documentation
+    names: Callable[[Layout], Sequence[str]]  #: what of a model makes it one; empty of any other
+    message: str  #: with {call}, {model} and {names}
+
+
+def _sampled(layout: Layout) -> list[str]:
+    return [name for clock in layout.metadata.get("clocks", []) for name in clock["states"]]
+
+
+#: What calls with some kinds of models can be used instead.
+OTHERS = "rhs, jacobian, simulate, simulate_many, equilibrium, linearize, modes, sensitivities, reactions"
+KINDS = {
+    "rates": Kind(
+        "rates of coordinates given as functions of velocities",
+        lambda layout: layout.q if getattr(layout, "given_rates", False) else (),
+        "model {model!r} gives the rates of its coordinates as functions of its velocities; this analysis "
+        "is not available for such models, only rhs, jacobian, simulate and linearize are",
+    ),
+    "states": Kind(
+        "first-order states",
+        lambda layout: layout.states,
+        "{call} is not available for models with first-order states, and {model!r} has {names}; "
+        f"available are {OTHERS}, impact, minimal and dae",
+    ),
+    "reaction_laws": Kind(
+        "forces that depend on reactions of joints",
+        lambda layout: layout.reaction_laws,
+        "{call} is not available for models whose forces depend on reactions of joints, as those of {names} do: they "
+        "are solved for in the motion under the model's own forces; "
+        f"available are {OTHERS}, multipliers and driving_forces",
+    ),
+    "sampled": Kind(
+        "sampled states",
+        _sampled,
+        "{call} is not available for models with sampled states, and {model!r} has {names}: between samples these do "
+        "not change, so they have no equations in continuous time; declare the quantity as an input for the mechanism "
+        "alone, or put the law itself in its place",
+    ),
+    "rigid": Kind(
+        "rigid contacts, which exert impulses alone",
+        lambda layout: [repr(name) for name in layout.metadata.get("rigid_only") or ()],
+        "{call} is not available for models with rigid contacts, and contacts {names} of {model!r} have normal_law: "
+        "rigid, which exerts impulses, not forces: shapes would pass through each other; run by simulate with "
+        "method='moreau' and step=, or choose another normal_law",
+    ),
+    "baumgarte": Kind(
+        "constraints stabilised by baumgarte=",
+        lambda layout: () if layout.projects else layout.constraint_labels or ("",),
+        "model {model!r} was derived with baumgarte=, so its right-hand side does not project; analyses of such models "
+        "are not available; derive without baumgarte for analyses",
+    ),
+}
+#: Call -> the kinds of models that it excludes, in the order in which they are looked for.
+EXCLUDED: dict[str, tuple[str, ...]] = {
+    "equilibrium": ("rates", "rigid", "sampled"),
+    "linearize": ("rigid", "sampled"),
+    "sensitivities": ("rates", "baumgarte", "rigid"),
+    "kinematic_analysis": ("rates", "states"),
+    "motion_range": ("rates", "states"),
+    "actuator_forces": ("states", "reaction_laws"),
+    "inverse_dynamics": ("reaction_laws",),
+    "inverse_dynamics_derivatives": ("states", "reaction_laws"),
+    "input_jacobian": ("rates", "baumgarte"),
+    "parameter_jacobian": ("rates", "baumgarte"),
+    "regressor": ("states",),
+    "base_parameters": ("states",),
+    "the canonical form": ("states",),
+    "fit": ("rigid",),
+    "simulate_many": ("rigid",),
+    "simulate_impacts": ("rigid",),
+    "integrator": ("rigid",),
+    "step": ("rigid",),
+    "dae.solve": ("rigid",),
+    "methods of SciPy": ("rigid",),
+}
+
+
+def require_support(layout: Layout, call: str, name: str = "") -> None:
+    """Refuse a model of a kind that the table excludes from a call, which may go by another name in the message.
 
     Raises
     ------
     UnavailableError
     """
-    if getattr(layout, "given_rates", False):
-        raise UnavailableError(
-            f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; this analysis "
-            "is not available for such models, only rhs, jacobian, simulate and linearize are"
-        )
-
-
-def refuse_states(layout: Layout, what: str) -> None:
-    """Refuse a model with first-order states where their values are not asked for.
-
-    Raises
-    ------
-    UnavailableError
-    """
-    if layout.states:
-        raise UnavailableError(
-            f"{what} is not available for models with first-order states, and {layout.name!r} has "
-            f"{', '.join(layout.states)}; available are rhs, jacobian, simulate, simulate_many, equilibrium, "
-            "linearize, modes, sensitivities, reactions, impact, minimal and dae"
-        )
-
-
-def refuse_reaction_laws(layout: Layout, what: str) -> None:
-    """Refuse a model whose forces depend on reactions, where other forces than its own act or the motion is given.
-
-    Raises
-    ------
-    UnavailableError
-    """
-    if layout.reaction_laws:
-        raise UnavailableError(
-            f"{what} is not available for models whose forces depend on reactions of joints, as those of "
-            f"{', '.join(layout.reaction_laws)} do: they are solved for in the motion under the model's own forces; "
-            "available are rhs, jacobian, simulate, simulate_many, equilibrium, linearize, modes, sensitivities, "
-            "reactions, multipliers and driving_forces"
-        )
-
-
-def refuse_sampled(layout: Layout, what: str) -> None:
-    """Refuse a model with sampled states where motions in continuous time are asked for.
-
-    Raises
-    ------
-    UnavailableError
-    """
-    clocks = layout.metadata.get("clocks", [])
-    if clocks:
-        names = ", ".join(name for clock in clocks for name in clock["states"])
-        raise UnavailableError(
-            f"{what} is not available for models with sampled states, and {layout.name!r} has {names}: between "
-            "samples these do not change, so they have no equations in continuous time; declare the quantity as an "
-            "input for the mechanism alone, or put the law itself in its place"
-        )
+    for kind in EXCLUDED[call]:
+        if names := KINDS[kind].names(layout):
+            told = KINDS[kind].message.format(call=name or call, model=layout.name, names=", ".join(names))
+            raise UnavailableError(told)
 
 
 def require_switched(layout: Layout, states: Array) -> None:
@@ -107,22 +139,6 @@ def refuse_closed(layout: Layout, states: Array, what: str) -> None:
         )
 
 
-def refuse_rigid(layout: Layout, what: str) -> None:
-    """Refuse a model with contacts that exert impulses alone, which its equations in continuous time do not have.
-
-    Raises
-    ------
-    UnavailableError
-    """
-    names = layout.metadata.get("rigid_only")
-    if names:
-        raise UnavailableError(
-            f"{what} is not available for models with rigid contacts, and contacts {', '.join(map(repr, names))} of "
-            f"{layout.name!r} have normal_law: rigid, which exerts impulses, not forces: shapes would pass through "
-            "each other; run by simulate with method='moreau' and step=, or choose another normal_law"
-        )
-
-
 def refuse_moreau(method: object, what: str) -> None:
     """Refuse the method for rigid contact where only integrators run.
 
@@ -134,18 +150,4 @@ def refuse_moreau(method: object, what: str) -> None:
         raise UnavailableError(
             f"{what} has no method moreau, which takes contacts as rigid: run by simulate with method='moreau' and "
             "step=, or give the name of an integrator as method="
-        )
-
-
-def require_projection(layout: Layout) -> None:
-    """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
-
-    Raises
-    ------
-    UnavailableError
-    """
-    if not layout.projects:
-        raise UnavailableError(
-            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project; analyses "
-            "of such models are not available; derive without baumgarte for analyses"
         )

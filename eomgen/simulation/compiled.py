@@ -16,7 +16,7 @@ from ..errors import UnavailableError, UsageError, cannot, ill_shaped
 from ..runtime.argument_checks import check_names, fitting, read_plain, read_vector, require
 from ..runtime.inputs import Forcing
 from ..runtime.late import eager
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import require_support
 from .events import Events
 from .integrate import require_one
 from .run_arguments import IMPLICIT, check_tolerances, declare, longest_step, own_step
@@ -145,7 +145,7 @@ def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | 
 
 def find_solver(module: BoundModel, name: str) -> Any:
     """The stepper of a module by name."""
-    refuse_rigid(module.layout, f"method {name}")
+    require_support(module.layout, "methods of SciPy", f"method {name}")
     core: Any = eager(module.core)
     if name in core.methods:
         return solver_class(core, name)
@@ -287,7 +287,7 @@ def step(
     EvaluationError
         An evaluation of the equations failed.
     """
-    refuse_rigid(module.layout, "step")
+    require_support(module.layout, "step")
     if module.layout.n_events and Events(module.layout, None).resets:
         raise cannot(
             f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"

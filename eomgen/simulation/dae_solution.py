@@ -18,7 +18,7 @@ from ..errors import SimulationError, at_odds, cannot, no_choice
 from ..runtime.argument_checks import require, require_steps
 from ..runtime.dae import DaeForm
 from ..runtime.inputs import Forcing
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import require_support
 from ..runtime.trajectory import Span, Start
 from .bound_run import Crawling, Run
 from .events import Events
@@ -81,7 +81,7 @@ class Dae(DaeForm):
             Events that reset the state follow each other ever faster.
         """
         module = self._module
-        refuse_rigid(module.layout, "dae.solve")
+        require_support(module.layout, "dae.solve")
         ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
         for name in OWN:
             if name in options:

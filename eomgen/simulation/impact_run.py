@@ -16,7 +16,7 @@ from ..base.value_rules import read_count
 from ..errors import SimulationError, cannot, no_such, off_range
 from ..runtime.columns import Columns, Residuals, describe, units_of
 from ..runtime.inputs import Forcing
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import require_support
 from ..runtime.trajectory import Span, Start, Trajectory
 from .events import WAIT, Events, RunEvent
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
@@ -286,7 +286,7 @@ def simulate_impacts(
     SimulationError, AssemblyError, MissingDependencyError
         As for ``simulate``; also where a gap is found negative without an impact before.
     """
-    refuse_rigid(module.layout, "simulate_impacts")
+    require_support(module.layout, "simulate_impacts")
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
             raise no_such(

@@ -15,7 +15,7 @@ from ..runtime.argument_checks import check_names, read_plain, read_vector, requ
 from ..runtime.argument_names import both_names
 from ..runtime.inputs import Forcing
 from ..runtime.late import eager
-from ..runtime.refusals import refuse_moreau, refuse_rigid
+from ..runtime.refusals import refuse_moreau, require_support
 from .bound_run import Crawling, Run, StallCheck
 from .compiled import can_run, stepper_options
 from .events import Events
@@ -215,7 +215,7 @@ def integrator(
     Integrator
         ``integrator(t, x, h)`` -> the state at t + h; see :class:`~.integrator.Integrator`.
     """
-    refuse_rigid(module.layout, "integrator")
+    require_support(module.layout, "integrator")
     check_names("option of integrator", options, OPTIONS)
     declared = declare(module)
     method, step = own_step(module, method, options.pop("step", None))

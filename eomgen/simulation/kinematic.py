@@ -33,7 +33,7 @@ from ..numeric.assembly import close
 from ..numeric.projection import largest
 from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_room, unknown
 from ..runtime.columns import Columns, Residuals, describe, units_of
-from ..runtime.refusals import refuse_states, require_velocities
+from ..runtime.refusals import require_support
 from ..runtime.trajectory import Start, Trajectory, last_state
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 
@@ -407,8 +407,7 @@ def kinematic_analysis(
     UsageError
         Unknown names, wrong shapes, too many coordinates led.
     """
-    require_velocities(module.layout)
-    refuse_states(module.layout, "kinematic_analysis")
+    require_support(module.layout, "kinematic_analysis")
     asked = read_range(module, t, led)
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)

@@ -20,7 +20,7 @@ from ..runtime.argument_checks import check_names, read_names, read_number, requ
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.inputs import Forcing
-from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
+from ..runtime.refusals import require_support
 from ..runtime.start_values import start_slopes
 from ..runtime.trajectory import Span, Start
 from .bound_run import Crawling, StallCheck, describe_crawl
@@ -97,9 +97,7 @@ def sensitivities(
     SimulationError, AssemblyError, MissingDependencyError
         As for ``simulate``.
     """
-    require_velocities(module.layout)
-    require_projection(module.layout)
-    refuse_rigid(module.layout, "sensitivities")
+    require_support(module.layout, "sensitivities")
     check_names("option of sensitivities", options, OPTIONS, ("method", "rtol", "atol", "t_eval", "events"))
     bound, forcing, start, stop = set_up(module, span, parameters, inputs)
     layout = bound.layout
