@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,6 +60,91 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class Runs:
+    """Many runs of a module: what differs between them, and what they have in common."""
+
+    module: BoundModel
+    cases: Cases
+    plan: Plan
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return self.cases.count
+
+    def part(self, start: int, stop: int) -> Runs:
+        """The runs from `start` to before `stop`."""
+        return replace(self, cases=self.cases.part(start, stop))
+
+    @property
+    def events(self) -> Events:
+        """The events that are watched.
+
+        Raises
+        ------
+        UsageError
+            One that only a single run can watch.
+        """
+        events = Events(self.module.layout, self.plan.events)
+        for event in (*events.functions, *(event for event in events.model if event.action == WAIT)):
+            what = "is an impact" if event.action == WAIT else "is a function"
+            raise cannot(
+                f"event {event.name} of simulate_many {what}, which needs Python; "
+                "give an expression as text, a reset, or run simulate for each case"
+            )
+        return events
+
+    @property
+    def forcing(self) -> Forcing:
+        """The inputs of all runs; those that are constant count as 0 here."""
+        forcing = Forcing(self.module.layout, {**dict.fromkeys(self.plan.constants, 0.0), **self.plan.inputs})
+        forcing.unsettled = frozenset(self.plan.constants)
+        return forcing
+
+    def forcing_of(self, k: int) -> Forcing:
+        """The inputs of run k."""
+        forcing, bound = self.forcing, self.module
+        with suppress(UsageError):  # where these parameters cannot be bound, the run does not begin
+            bound = bound.bind(**self.cases.column(k))
+        forcing.attach(bound)
+        forcing.unsettled = frozenset()
+        forcing.begin(*self.plan.span)
+        return forcing
+
+    def inputs_at(self, t: Array, x: Array) -> Array:
+        """Inputs (n_u, k) of every run at times (k,) and states (n_x, k)."""
+        cases, forcing = self.cases, self.forcing
+        u = np.array(np.broadcast_to(cases.u if cases.u.ndim > 1 else cases.u[:, None], (len(cases.u), cases.count)))
+        for i, signal in forcing.varying.items():
+            u[i] = signal(t, x)  # type: ignore[arg-type]
+        for i, formula in forcing.formulas.items():
+            for k in range(cases.count):
+                u[i, k] = formula.function(cases.column(k)["p"])(float(t[k]), x[:, k])
+        return u
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """States, then the outputs that do not repeat a coordinate."""
+        module = self.module
+        return (*module.x_names, *(name for name in module.y_names if name not in module.x_names))
+
+    def with_outputs(self, x: Array, t: Array) -> Array:
+        """States (n_x, k) at times (k,) with their outputs, as ``names`` has them; NaN where one has no value."""
+        module, cases = self.module, self.cases
+        further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
+        good = np.flatnonzero(np.isfinite(x).all(axis=0))
+        y = np.full((module.n_y, x.shape[1]), np.nan)
+        if further and good.size:
+            outputs, u = module.kernels.timed("outputs", nan=True), self.inputs_at(t, x)
+            if cases.p.ndim == 1:
+                y[:, good] = outputs(t[good], x[:, good], p=cases.p, u=np.ascontiguousarray(u[:, good]))
+            else:
+                for k in good:
+                    y[:, k] = outputs(float(t[k]), x[:, k], p=cases.column(int(k))["p"], u=u[:, k])
+        return np.concatenate([x, y[further]]) if further else x
+
+
+@dataclass(frozen=True)
 class RunBlock:
     """What became of the runs of a block.
 
@@ -97,115 +181,57 @@ class RunBlock:
     words: dict[int, str] = field(default_factory=dict)
 
     @classmethod
-    def blank(cls, module: BoundModel, plan: Plan, count: int, status: int = 0) -> RunBlock:
-        """A block of which no run has begun."""
-        n = module.n_x
+    def blank(cls, runs: Runs, count: int, status: int = 0) -> RunBlock:
+        """So many of the runs, none of which has begun."""
+        n, plan = runs.module.n_x, runs.plan
         numbers: dict[str, Any] = {name: np.zeros(count, dtype=np.int64) for name in ("failure", *COUNTS)}
         samples = None if plan.t_eval is None else np.full((n, len(plan.t_eval), count), np.nan)
-        notes = np.full((2 + n, plan.keep_events, count), np.nan) if find_events(module, plan).names else None
+        notes = np.full((2 + n, plan.keep_events, count), np.nan) if runs.events.names else None
         x, t, when = np.full((n, count), np.nan), np.full(count, plan.span[0]), np.zeros(count)
         states = np.full(count, status, dtype=np.intc)
         return cls(x=x, t=t, samples=samples, status=states, failure_time=when, notes=notes, **numbers)
 
 
-def run_block(
-    module: BoundModel, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
-) -> RunBlock:
-    """Run every case of a block.
+def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None = None) -> RunBlock:
+    """Run all of a block.
 
     Parameters
     ----------
-    module : BoundModel
-    cases : Cases
-    plan : Plan
+    runs : Runs
     threads : int
         Runs at a time; the results do not depend on it.
     watch : callable, optional
         Told now and then how many runs have ended.
     """
-    x0, failed, words = assemble_states(module, cases, plan.span[0], partial(forcing_of, module, cases, plan))
-    told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
-    core: Any = eager(module.core)
+    cases, plan, count = runs.cases, runs.plan, runs.count
+    x0, failed, words = assemble_states(runs.module, cases, plan.span[0], runs.forcing_of)
+    core: Any = eager(runs.module.core)
     run = _run_compiled if plan.method in core.methods else _run_python
     good = np.flatnonzero(~failed)
-    some = good.size < cases.count
-    rows = _rows(cases, good if some else slice(None))
-    found = run(module, x0[:, good].T if some else x0.T, rows, plan, threads, watch)
-    block = _spread(found, good, RunBlock.blank(module, plan, cases.count, UNASSEMBLED)) if some else found
-    block.words.update(told)
-    project(module, cases, block, plan)
+    some: Any = good if good.size < count else slice(None)
+    p, u = (a if a.ndim == 1 else a[:, some].T for a in (cases.p, cases.u))
+    block = run(runs, x0[:, some].T, p, u, threads, watch)
+    if good.size < count:
+        block = _spread(block, good, RunBlock.blank(runs, count, UNASSEMBLED))
+        block.words.update(zip(np.flatnonzero(failed).tolist(), words, strict=True))
+    project(runs, block)
     return block
 
 
-def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
-    return {name: a if a.ndim == 1 else a[:, chosen].T for name, a in (("p", cases.p), ("u", cases.u))}
-
-
-def _run_compiled(
-    module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
-) -> RunBlock:
+def _run_compiled(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: Any) -> RunBlock:
+    module, plan, forcing = runs.module, runs.plan, runs.forcing
     core: Any = eager(module.core)
-    forcing = find_forcing(module, plan)
     forcing.attach(module)
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
     settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
     ensemble = core.ensemble(
-        plan.method, nodes, x0, rows["p"], rows["u"], max_steps=plan.max_steps, t_eval=plan.t_eval,
-        signals=forcing.encode(), events=find_events(module, plan).encode(), keep=plan.keep_events, **settings,
+        plan.method, nodes, x0, p, u, max_steps=plan.max_steps, t_eval=plan.t_eval,
+        signals=forcing.encode(), events=runs.events.encode(), keep=plan.keep_events, **settings,
     )  # fmt: skip
     work(ensemble, min(threads, max(len(x0), 1)), watch)
     samples, notes = (None if x is None else x.transpose(2, 1, 0) for x in (ensemble.samples, ensemble.notes))
     numbers = {name: getattr(ensemble, name) for name in ("t", "status", "failure", "failure_time", *COUNTS)}
     return RunBlock(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
-
-
-def find_forcing(module: BoundModel, plan: Plan) -> Forcing:
-    """The inputs of all runs; those that are constant count as 0 here."""
-    forcing = Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
-    forcing.unsettled = frozenset(plan.constants)
-    return forcing
-
-
-def forcing_of(module: BoundModel, cases: Cases, plan: Plan, k: int) -> Forcing:
-    """The inputs of run k."""
-    forcing = find_forcing(module, plan)
-    bound = module
-    with suppress(UsageError):  # where these parameters cannot be bound, the run does not begin
-        bound = module.bind(**cases.column(k))
-    forcing.attach(bound)
-    forcing.unsettled = frozenset()
-    forcing.begin(*plan.span)
-    return forcing
-
-
-def inputs_at(module: BoundModel, cases: Cases, plan: Plan, t: Array, x: Array) -> Array:
-    """Inputs (n_u, k) of every run at times (k,) and states (n_x, k)."""
-    u = np.array(np.broadcast_to(cases.u if cases.u.ndim > 1 else cases.u[:, None], (module.n_u, cases.count)))
-    forcing = find_forcing(module, plan)
-    for i, signal in forcing.varying.items():
-        u[i] = signal(t, x)  # type: ignore[arg-type]
-    for i, formula in forcing.formulas.items():
-        for k in range(cases.count):
-            u[i, k] = formula.function(cases.column(k)["p"])(float(t[k]), x[:, k])
-    return u
-
-
-def find_events(module: BoundModel, plan: Plan) -> Events:
-    """The events of the runs.
-
-    Raises
-    ------
-    UsageError
-        One that only a single run can watch.
-    """
-    events = Events(module.layout, plan.events)
-    for event in (*events.functions, *(event for event in events.model if event.action == WAIT)):
-        what = "is an impact" if event.action == WAIT else "is a function"
-        raise cannot(
-            f"event {event.name} of simulate_many {what}, which needs Python; "
-            "give an expression as text, a reset, or run simulate for each case"
-        )
-    return events
 
 
 def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> None:
@@ -240,15 +266,14 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
         raise raised[0]
 
 
-def _run_python(
-    module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
-) -> RunBlock:
+def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: Any) -> RunBlock:
     """The same through ``simulate``, one run after the other: by SciPy's methods."""
-    block = RunBlock.blank(module, plan, len(x0))
+    module, plan = runs.module, runs.plan
+    block = RunBlock.blank(runs, len(x0))
     status, samples = block.status, block.samples
     for k in range(len(x0)):
         try:
-            bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
+            bound = module.bind(*(a if a.ndim == 1 else a[k] for a in (p, u)))
         except UsageError as error:
             status[k], block.words[k] = BAD_PARAMETERS, str(error)
             continue
@@ -295,33 +320,31 @@ def _spread(found: RunBlock, good: Integers, block: RunBlock) -> RunBlock:
     return block
 
 
-def project(module: BoundModel, cases: Cases, block: RunBlock, plan: Plan) -> None:
+def project(runs: Runs, block: RunBlock) -> None:
     """Bring the stored states onto the constraints, as ``simulate`` does; a state that cannot be becomes NaN."""
+    module, plan = runs.module, runs.plan
     if not module.n_rows and not module.layout.space:
         return
-    _project_columns(module, cases, block, plan, block.x[:, None, :], block.t[None])
+    _project_columns(runs, block, block.x[:, None, :], block.t[None])
     if block.samples is not None and plan.t_eval is not None:
-        times = np.repeat(plan.t_eval[:, None], cases.count, axis=1)
-        _project_columns(module, cases, block, plan, block.samples, times)
+        _project_columns(runs, block, block.samples, np.repeat(plan.t_eval[:, None], runs.count, axis=1))
     if block.notes is not None:
-        _project_columns(module, cases, block, plan, block.notes[2:], block.notes[1])
+        _project_columns(runs, block, block.notes[2:], block.notes[1])
 
 
-def _project_columns(
-    module: BoundModel, cases: Cases, block: RunBlock, plan: Plan, states: Array, times: Array
-) -> None:
+def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
-    led = find_forcing(module, plan).constrained
+    led = runs.forcing.constrained
 
     def bring(columns: list[int]) -> None:
-        part, at, given = states[:, :, columns], times[:, columns], cases.column(columns[0])
+        part, at, given = states[:, :, columns], times[:, columns], runs.cases.column(columns[0])
         good = np.asarray(np.isfinite(part).all(axis=0))
         if not good.any():
             return
         try:
             if led:
-                given["u"] = forcing_of(module, cases, plan, columns[0]).sample(at[good], part[:, good])
-            part[:, good] = module.project(part[:, good], t=at[good], **given)
+                given["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
+            part[:, good] = runs.module.project(part[:, good], t=at[good], **given)
             states[:, :, columns] = part
         except EomgenError as error:
             if len(columns) == 1:
@@ -330,5 +353,5 @@ def _project_columns(
             for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
                 bring([k])
 
-    for columns in [[k] for k in range(cases.count)] if led else cases.alike(module.layout):
+    for columns in [[k] for k in range(runs.count)] if led else runs.cases.alike(runs.module.layout):
         bring(columns)

@@ -19,9 +19,9 @@ from ..errors import MissingDependencyError, ToolchainError, UsageError, bad_fil
 from ..runtime.argument_checks import require
 from ..runtime.late import eager
 from ..runtime.pickling import processor_features, restore
-from .block import LOST, MEANING, Plan, RunBlock
+from .block import LOST, MEANING, Plan, RunBlock, Runs, run_block
 from .given_cases import Cases
-from .run_blocks import RUNS, Custom, Kept, Reduction, keep, reduce_block
+from .run_blocks import Custom, Kept, Reduction, keep
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -171,10 +171,7 @@ def count_workers(client: Any) -> int:
 
 def run_on_workers(
     client: Any,
-    module: BoundModel,
-    handle: Handle,
-    cases: Cases,
-    plan: Plan,
+    runs: Runs,
     reduction: Reduction,
     parts: list[tuple[int, int]],
     wanted: list[int],
@@ -185,7 +182,7 @@ def run_on_workers(
     A block whose worker dies is run again by another; one whose task fails is given up, and its runs are marked.
     """
     distributed: Any = require("distributed", "eomgen[cluster]", "cluster=")
-    waiting = iter(wanted)
+    handle, waiting = describe(runs.module), iter(wanted)
     ready = distributed.as_completed()
     indices: dict[str, int] = {}
 
@@ -193,7 +190,7 @@ def run_on_workers(
         index = next(waiting, None)
         if index is not None:
             start, stop = parts[index]
-            future = client.submit(_task, handle, cases.part(start, stop), plan, reduction, pure=False)
+            future = client.submit(_task, handle, runs.cases.part(start, stop), runs.plan, reduction, pure=False)
             indices[future.key] = index
             ready.add(future)
 
@@ -206,7 +203,7 @@ def run_on_workers(
         error = future.exception()
         if isinstance(error, UsageError):
             raise error
-        kept = future.result() if error is None else _lost(module, cases.part(start, stop), plan, reduction, error)
+        kept = future.result() if error is None else _lost(runs.part(start, stop), reduction, error)
         future.release()
         submit()
         done += stop - start
@@ -216,13 +213,12 @@ def run_on_workers(
 
 
 def _task(handle: Handle, cases: Cases, plan: Plan, reduction: Reduction) -> Kept:
-    return reduce_block(handle.open(), cases, plan, reduction)
+    runs = Runs(handle.open(), cases, plan)
+    return keep(runs, reduction, run_block(runs))
 
 
-def _lost(module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, error: BaseException) -> Kept:
+def _lost(runs: Runs, reduction: Reduction, error: BaseException) -> Kept:
     """What is kept of a block that no worker could run: runs without states, marked so."""
-    block = RunBlock.blank(module, plan, cases.count, LOST)
-    words = dict.fromkeys(range(cases.count), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
-    if isinstance(reduction, Custom):  # the function has nothing to work on
-        return {f"runs_{name}": getattr(block, name) for name in RUNS}, words
-    return keep(module, cases, plan, reduction, block, words)
+    block = RunBlock.blank(runs, runs.count, LOST)
+    block.words.update(dict.fromkeys(range(runs.count), f"{MEANING[LOST]}: {type(error).__name__}: {error}"))
+    return keep(runs, Reduction(()) if isinstance(reduction, Custom) else reduction, block)  # it has nothing to work on

@@ -21,16 +21,14 @@ from ..runtime.argument_checks import require, unknown
 from ..runtime.identity import origin, plain, spell_input
 from ..runtime.storage import attributes, free, table_path
 from ..simulation.simulate import simulate
-from .block import EVENT, MEANING, Plan, find_events, find_forcing
-from .given_cases import Cases
-from .run_blocks import Custom, Reduction, Statistics, names_of, summarise, with_outputs
+from .block import EVENT, MEANING, Runs
+from .run_blocks import Custom, Reduction, Statistics, summarise
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
 
-    from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
 
 
@@ -86,24 +84,17 @@ class Ensemble(Result):
     """
 
     def __init__(
-        self,
-        module: BoundModel,
-        cases: Cases,
-        plan: Plan,
-        runs: dict[str, Any],
-        kept: dict[str, Any],
-        words: dict[int, str],
-        reduction: Reduction,
+        self, runs: Runs, numbers: dict[str, Any], kept: dict[str, Any], words: dict[int, str], reduction: Reduction
     ) -> None:
-        self._module, self._cases, self._plan, self._words = module, cases, plan, words
-        self.count = cases.count
-        self.names = names_of(module)
+        self._runs, self._words = runs, words
+        self._module, self._cases, self._plan = runs.module, runs.cases, runs.plan
+        self.count, self.names, plan = runs.count, runs.names, runs.plan
         self.grid: dict[str, Array] = {}
         self.t = np.array([plan.span[1]]) if plan.t_eval is None else plan.t_eval
-        self.t_end, self.status = runs["t"], runs["status"]
-        self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
-        self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
-        self._failure, self._failure_time = runs["failure"], runs["failure_time"]
+        self.t_end, self.status = numbers["t"], numbers["status"]
+        self.steps, self.rejected, self.evaluations = numbers["steps"], numbers["rejected"], numbers["evaluations"]
+        self.event_names, self.event_counts = tuple(runs.events.names), numbers["noted"]
+        self._failure, self._failure_time = numbers["failure"], numbers["failure_time"]
         self._statistics = isinstance(reduction, Statistics)
         self.reduced = kept if isinstance(reduction, Statistics | Custom) else {}
         found = {} if self.reduced else kept
@@ -145,18 +136,15 @@ class Ensemble(Result):
         if row < len(self.x):
             found = states[row]
         elif self.samples is None:
-            found = self._outputs(self.x, self.t_end)[None, row]
+            found = self._runs.with_outputs(self.x, self.t_end)[None, row]
         else:
             times = np.repeat(self.t[:, None], self.count, axis=1)
-            found = np.stack([self._outputs(states[:, j], t)[row] for j, t in enumerate(times)])
+            found = np.stack([self._runs.with_outputs(states[:, j], t)[row] for j, t in enumerate(times)])
         return np.asarray(found[0] if self.samples is None else found)
 
     @property
     def _kept_only(self) -> str:
         return f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)})"
-
-    def _outputs(self, x: Array, t: Array) -> Array:
-        return with_outputs(self._module, self._cases, self._plan, x, t)
 
     def events(self, name: str) -> tuple[Array, Array]:
         """Times (m, k) of an event in each run, and the projected states (n_x, m, k) there; NaN where it was not."""
@@ -177,7 +165,7 @@ class Ensemble(Result):
         elif self.x is None:
             raise cannot("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
         else:
-            parts = summarise(self._outputs(self.x, self.t_end))
+            parts = summarise(self._runs.with_outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
             rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
         keys = ("mean", "deviation", "least", "greatest")
@@ -238,7 +226,7 @@ class Ensemble(Result):
             columns |= {"t": np.tile(self.t, self.count)}
             columns |= {name: np.asarray(self[name]).T.ravel() for name in self.names}
         elif self.x is not None:
-            end = self._outputs(self.x, self.t_end)
+            end = self._runs.with_outputs(self.x, self.t_end)
             columns |= dict(zip(self.names, end, strict=True))
         return pd.DataFrame(columns)
 
@@ -328,7 +316,7 @@ class Ensemble(Result):
             "span": list(plan.span),
             "method": plan.method,
             "options": {name: plain(value) for name, value in plan.options.items()},
-            "inputs": {name: spell_input(value) for name, value in find_forcing(self._module, plan).values.items()},
+            "inputs": {name: spell_input(value) for name, value in self._runs.forcing.values.items()},
             "parameters": {name: float(row[0]) for name, row in shared if row.size and np.ptp(row) == 0.0},
             "values": cases.digest(),
         }

@@ -16,11 +16,10 @@ from ..base.files import as_path, open_plain, remove_parts, write_whole
 from ..base.texts import shown
 from ..errors import bad_data, bad_file, ill_typed, no_choice
 from ..runtime.storage import BROKEN, read_arrays, sealed
-from .block import COUNTS, EVENT, Plan, RunBlock, inputs_at, run_block
-from .given_cases import Cases
+from .block import COUNTS, EVENT, RunBlock, Runs
 
 if TYPE_CHECKING:
-    from ..runtime.bound_model import BoundModel
+    pass
 
 # -- reductions --------------------------------------------------------------------------------------------------------
 
@@ -44,7 +43,7 @@ class Reduction:
     def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
         self.kept = tuple(kept)
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+    def reduce(self, runs: Runs, block: RunBlock) -> Arrays:
         """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
         return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
 
@@ -60,16 +59,17 @@ class Statistics(Reduction):
     sample variance, The American Statistician 37 (1983).
     """
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+    def reduce(self, runs: Runs, block: RunBlock) -> Arrays:
         """count, mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
-        if plan.t_eval is None or block.samples is None:
+        times = runs.plan.t_eval
+        if times is None or block.samples is None:
             ended = (block.status == 0) | (block.status == EVENT)
-            states, times = np.where(ended, block.x, np.nan)[:, None, :], block.t[None]
+            states, when = np.where(ended, block.x, np.nan)[:, None, :], block.t[None]
         else:
-            states, times = block.samples, np.repeat(plan.t_eval[:, None], cases.count, axis=1)
+            states, when = block.samples, np.repeat(times[:, None], runs.count, axis=1)
         grains = []
-        values = [with_outputs(module, cases, plan, states[:, j], t) for j, t in enumerate(times)]
-        for start in range(0, max(cases.count, 1), GRAIN):
+        values = [runs.with_outputs(states[:, j], t) for j, t in enumerate(when)]
+        for start in range(0, max(runs.count, 1), GRAIN):
             parts = [summarise(x[:, start : start + GRAIN]) for x in values]
             grains.append(stacked(parts, -1))
         return stacked(grains, 0)
@@ -90,7 +90,7 @@ class Custom(Reduction):
         super().__init__(())
         self.function = function
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
+    def reduce(self, runs: Runs, block: RunBlock) -> Arrays:
         """As the function says."""
         made = self.function(block)
         if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
@@ -119,29 +119,6 @@ def choose_reduction(reduce: Any) -> Reduction:
     if reduce == "statistics":
         return Statistics()
     raise no_choice(f"{WANTED}, not {reduce!r}")
-
-
-def with_outputs(module: BoundModel, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:
-    """States (n_x, k) at times (k,) with their outputs, as ``names_of`` has them; NaN where one cannot be evaluated."""
-    further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
-    if not further:
-        return x
-    y = np.full((module.n_y, x.shape[1]), np.nan)
-    good = np.flatnonzero(np.isfinite(x).all(axis=0))
-    if not good.size:
-        return np.concatenate([x, y[further]])
-    outputs, u = module.kernels.timed("outputs", nan=True), inputs_at(module, cases, plan, t, x)
-    if cases.p.ndim == 1:
-        y[:, good] = outputs(t[good], x[:, good], p=cases.p, u=np.ascontiguousarray(u[:, good]))
-    else:
-        for k in good:
-            y[:, k] = outputs(float(t[k]), x[:, k], p=cases.column(int(k))["p"], u=u[:, k])
-    return np.concatenate([x, y[further]])
-
-
-def names_of(module: BoundModel) -> tuple[str, ...]:
-    """States, then the outputs that do not repeat a coordinate."""
-    return (*module.x_names, *(name for name in module.y_names if name not in module.x_names))
 
 
 def summarise(values: Array) -> Arrays:
@@ -273,20 +250,10 @@ RUNS = ("t", "status", "failure", "failure_time", *COUNTS)
 Kept = tuple[Arrays, dict[int, str]]
 
 
-def reduce_block(
-    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, threads: int = 1, watch: Any = None
-) -> Kept:
-    """Run a block and keep of it what a reduction makes, with the numbers of each run under ``runs_``."""
-    block = run_block(module, cases, plan, threads, watch)
-    return keep(module, cases, plan, reduction, block, block.words)
-
-
-def keep(
-    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, block: RunBlock, words: dict[int, str]
-) -> Kept:
-    """What a reduction makes of a block, and the numbers of each run."""
+def keep(runs: Runs, reduction: Reduction, block: RunBlock) -> Kept:
+    """What a reduction makes of a block, and the numbers of each run under ``runs_``."""
     numbers = {f"runs_{name}": getattr(block, name).copy() for name in RUNS}  # a user's function may change the block
-    return {**reduction.reduce(module, cases, plan, block), **numbers}, words
+    return {**reduction.reduce(runs, block), **numbers}, block.words
 
 
 def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:

@@ -31,9 +31,9 @@ from ..simulation.run_arguments import (
     ordered_times,
     own_step,
 )
-from .block import LOST, Plan, find_events
+from .block import LOST, Plan, Runs, run_block
 from .ensemble import Ensemble
-from .given_cases import Cases, collect_cases, grid_axes, spread_grid
+from .given_cases import collect_cases, grid_axes, spread_grid
 from .run_blocks import (
     GRAIN,
     RUNS,
@@ -42,7 +42,7 @@ from .run_blocks import (
     Store,
     choose_reduction,
     choose_size,
-    reduce_block,
+    keep,
     split,
     stored_length,
 )
@@ -149,16 +149,17 @@ def simulate_many(
     reduction = choose_reduction(reduce)
     named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
     plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, {**options}, (events, keep_events))
+    runs = Runs(module, cases, plan)
     threads = (os.cpu_count() or 1) if threads is None else read_count("threads", threads, 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
     each = module.n_x * (1 if plan.t_eval is None else len(plan.t_eval))
-    each += plan.keep_events * (2 + module.n_x) if find_events(module, plan).names else 0
+    watched = bool(runs.events.names)
+    each += plan.keep_events * (2 + module.n_x) if watched else 0
     whole = cases.count * (len(RUNS) + 2 * module.n_x) + each * (
         cases.count if reduce in (None, "states", "events") else 1
     )
     fewer = "give fewer runs, fewer t_eval, fewer keep_events, or reduce='statistics'"
     require_room(f"simulate_many with {cases.count} runs", whole, fewer)
-    size = 8 * each
     with ExitStack() as stack:
         if watch is not None:
             stack.callback(watch.close)
@@ -168,26 +169,26 @@ def simulate_many(
 
             client = stack.enter_context(open_client(cluster))
             workers = count_workers(client)
-        length = choose_size(cases.count, size, workers or 1) if block is None else read_count("block", block, 1)
+        length = choose_size(cases.count, 8 * each, workers or 1) if block is None else read_count("block", block, 1)
         if store is not None and block is None:
-            lanes = 1 if find_events(module, plan).names else WIDEST
+            lanes = 1 if watched else WIDEST
             length = stored_length(store) or min(length, max(lanes * threads, -(-cases.count // STORED)))
         if reduce == "statistics":  # whole grains, so that rounding does not depend on blocks
             length = -(-length // GRAIN) * GRAIN
         parts = split(cases.count, length)
-        store_of = None if store is None else _open_store(store, module, cases, plan, reduce, parts)
+        store_of = None if store is None else _open_store(store, runs, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
             found = {index: store_of.load(index) for index in range(len(parts))}
             kept = {index: value for index, value in found.items() if value is not None}
         missing = [index for index in range(len(parts)) if index not in kept]
         look = None if watch is None else watch.look
-        for index, value in _run(module, cases, plan, reduction, parts, missing, threads, client, look):
+        for index, value in _run(runs, reduction, parts, missing, threads, client, look):
             kept[index] = value
             if store_of is not None and not (value[0]["runs_status"] == LOST).any():
                 store_of.save(index, *value)
     try:
-        ensemble = _gather(module, cases, plan, reduction, parts, kept)
+        ensemble = _gather(runs, reduction, parts, kept)
         ensemble.grid = {} if grid is None else grid_axes(without_dots(grid, module.layout.instances))
         return ensemble
     except (KeyError, ValueError, TypeError, IndexError) as error:
@@ -197,20 +198,21 @@ def simulate_many(
 
 
 def _run(
-    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]],
-    missing: list[int], threads: int, client: Any, watch: Callable[[float], None] | None,
+    runs: Runs, reduction: Reduction, parts: list[tuple[int, int]], missing: list[int], threads: int, client: Any,
+    watch: Callable[[float], None] | None,
 ) -> Iterator[tuple[int, Kept]]:  # fmt: skip
     """The missing blocks: one after the other, each on all threads, or on the workers of a cluster."""
     if client is not None:
-        from .cluster import describe, run_on_workers
+        from .cluster import run_on_workers
 
-        yield from run_on_workers(client, module, describe(module), cases, plan, reduction, parts, missing, watch)
+        yield from run_on_workers(client, runs, reduction, parts, missing, watch)
         return
     before = 0
     for index in missing:
         start, stop = parts[index]
         look = None if watch is None else partial(_look_from, watch, before)
-        yield index, reduce_block(module, cases.part(start, stop), plan, reduction, threads, look)
+        part = runs.part(start, stop)
+        yield index, keep(part, reduction, run_block(part, threads, look))
         before += stop - start
 
 
@@ -218,19 +220,12 @@ def _look_from(watch: Callable[[float], None], before: int, done: int) -> None:
     watch(before + done)
 
 
-def _gather(
-    module: BoundModel,
-    cases: Cases,
-    plan: Plan,
-    reduction: Reduction,
-    parts: list[tuple[int, int]],
-    kept: dict[int, Kept],
-) -> Ensemble:
+def _gather(runs: Runs, reduction: Reduction, parts: list[tuple[int, int]], kept: dict[int, Kept]) -> Ensemble:
     ordered = [kept[index] for index in range(len(parts))]
-    runs = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
+    numbers = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
     made = [{name: x for name, x in arrays.items() if not name.startswith("runs_")} for arrays, _ in ordered]
     words = {start + k: text for (start, _), (_, told) in zip(parts, ordered, strict=True) for k, text in told.items()}
-    return Ensemble(module, cases, plan, runs, reduction.join(made), words, reduction)
+    return Ensemble(runs, numbers, reduction.join(made), words, reduction)
 
 
 def _plan(
@@ -256,10 +251,8 @@ def _plan(
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)
     times = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
-    most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", watched[1], 1)
-    plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep, constants)
-    find_events(module, plan)
-    return plan
+    most, kept = read_count("max_steps", max_steps, 1), read_count("keep_events", watched[1], 1)
+    return Plan((start, end), method, chosen, most, times, tables, watched[0], kept, constants)
 
 
 def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
@@ -286,10 +279,9 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
     return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
 
 
-def _open_store(
-    folder: str | Path, module: BoundModel, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
-) -> Store:
+def _open_store(folder: str | Path, runs: Runs, reduce: Any, parts: list[tuple[int, int]]) -> Store:
     """The store of an ensemble, whose identity is all that its results depend on."""
+    module, cases, plan = runs.module, runs.cases, runs.plan
 
     def _plain(x: Any) -> Any:
         if isinstance(x, Signal):
