@@ -467,9 +467,12 @@ class Prepared(NamedTuple):
         """Print what an analysis at a time found: its parts, or with --json the values, those of the result if none."""
         from ..runtime.identity import origin
 
-        head = {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
+        if not as_json:
+            show(False, {}, *parts, files=files)
+            return
         found = parts[0].to_dict() if values is None and isinstance(parts[0], Result) else values
-        show(as_json, {**head, **found} if as_json else {}, *parts, files=files)
+        head = {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
+        show(True, head | found, files=files)
 
 
 def model_verb(*names: str, target: Decorator | None = None) -> Callable[[Callable[..., Any]], Verb]:

@@ -535,8 +535,6 @@ class _Problem:
 
     def run(self, values: Array, one: Experiment) -> Trajectory:
         """The run of an experiment."""
-        from ..simulation.simulate import simulate
-
         with silent():
             return simulate(self.module, **self.arguments(values, one))
 

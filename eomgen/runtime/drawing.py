@@ -16,7 +16,7 @@ from ..base.inline_pictures import picture_html, side_by_side
 from ..base.kernel_table import KERNELS
 from ..base.notation import Notation
 from ..base.picture_data import read_picture
-from ..base.texts import html_table, html_text, shown, visible
+from ..base.texts import aligned_rows, html_table, html_text, shown, visible
 from ..errors import MissingDependencyError, ill_shaped, ill_typed, incomplete
 from .argument_checks import read_number, require, unknown, with_numbers
 from .plotting import choose, height, refined, stack, states_at
@@ -115,10 +115,8 @@ def line(module: BoundModel) -> str:
 
 def report(module: BoundModel, /) -> str:
     """Describe the model as a text: its sizes, names, constraints and how it was compiled."""
-    lines = facts(module)
-    width = max(len(label) for label, _ in lines)
     head = module.name + (f": {visible(module.doc)}" if module.doc else "")
-    return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
+    return "\n".join([head, *aligned_rows(facts(module))])
 
 
 def trajectory_facts(trajectory: Any) -> tuple[str, list[tuple[str, str]]]:

@@ -207,7 +207,7 @@ FAULTS = (
     ),
     Fault(
         "spin-rate", "joint_rates",
-        "vec.add(spin_rate, vec.scale(rate, _three(flows, at)))",
+        "vec.add(spin_rate, vec.scale(rate, vec.three(flows, at)))",
         "spin_rate",
         "axes of Euler angles turn, but their change is left out",
         "tests/mechanics/test_joints.py::test_a_heavy_top_in_euler_angles[embedding]",
