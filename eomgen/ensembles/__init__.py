@@ -1,6 +1,5 @@
-"""A Module and many cases (initial values, parameters, inputs) -> Ensemble of all their runs.
+"""A Module and many initial values, parameters and inputs -> Ensemble of all their runs.
 
-``cases`` says what differs between the runs, ``block`` runs a block of them in compiled code on several threads,
-``local`` and ``cluster`` run all blocks, ``store`` keeps finished blocks on disk, ``reductions`` boil blocks down as
-they come, ``ensemble`` is the result.
+``given_cases`` says what differs between the runs, ``block`` runs a block of them in compiled code on several threads,
+``run_blocks`` reduces blocks and keeps them in a store, ``cluster`` runs them on workers, ``ensemble`` is the result.
 """
