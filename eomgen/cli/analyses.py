@@ -17,6 +17,7 @@ from ..base.texts import without_noise
 from ..errors import at_odds, bad_file, ill_typed, incomplete, no_such
 from .options import (
     Number,
+    NumberRange,
     Prepared,
     analysis_verb,
     end_option,
@@ -274,7 +275,7 @@ def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random states.")
 @click.option(
     "--seconds",
-    type=Number(min=0.0),
+    type=NumberRange(min=0.0),
     default=12.0,
     show_default=True,
     help="Time limit for all checks in s; variants get what is left.",

@@ -27,7 +27,7 @@ from ..base.results import ResultTable
 from ..base.texts import visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
 from ..syntax_trees import parse_module
-from .options import Number, Verb, json_option, target_option
+from .options import NumberRange, Verb, json_option, target_option
 from .output import (
     MODEL,
     TOOLCHAIN,
@@ -243,8 +243,10 @@ def listing(as_json: bool) -> None:
 
 
 @cache.command()
-@click.option("--older-than", type=Number(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS.")
-@click.option("--max-size", type=Number(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
+@click.option(
+    "--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS."
+)
+@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
 @json_option
 @reports_failures
 def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:

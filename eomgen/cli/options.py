@@ -89,14 +89,21 @@ def _number(value: Any) -> Any:
         raise click.BadParameter(str(error)) from None
 
 
-class Number(click.FloatRange):
-    """A number, which may have bounds; an expression of numbers as in a model file."""
+class Number(click.types.FloatParamType):
+    """Any number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return super().convert(_number(value), param, ctx)
 
 
-POSITIVE = Number(min=0, min_open=True)
+class NumberRange(click.FloatRange):
+    """A number within bounds."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return super().convert(_number(value), param, ctx)
+
+
+POSITIVE = NumberRange(min=0, min_open=True)
 
 
 def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
