@@ -74,3 +74,8 @@ def place_of_marker(name: object) -> tuple[str, str] | None:
     """``x`` or ``vx`` and the marker of a name such as ``x(rod.tip)``; None for other names."""
     found = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
     return (found[1], found[2]) if found else None
+
+
+def acceleration_name(velocity: str) -> str:
+    """``theta_dot`` -> ``theta_ddot``; ``ball_wx`` -> ``ball_wx_dot``."""
+    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"

@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from ..base.limits.constraints import HELD_STEP
+from ..base.names import acceleration_name
 from ..base.notation import split_rate
 from ..base.operations import OPERATIONS
 from ..base.value_rules import RANGE
@@ -26,7 +27,6 @@ from ..kinematics import Kinematics
 from ..kinematics.constraint_functions import row_groups, row_scales, row_velocities
 from ..kinematics.mobility import Mobility, initial_values
 from ..kinematics.near_pairs import describe_contacts
-from ..kinematics.topology import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .picture import describe_picture
 from .terms import flag_forces, independent_places, resets, resolved

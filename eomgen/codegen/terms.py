@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cached_property, partial
 
 from ..base.kernel_table import Sizes
+from ..base.names import acceleration_name
 from ..base.notation import rate_of
 from ..base.operations import operations_with
 from ..equations.embedding import can_differentiate
@@ -22,7 +23,6 @@ from ..kinematics.constraint_functions import row_groups, row_scales
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import motion_axes, near_pairs
-from ..kinematics.topology import acceleration_name
 from ..kinematics.wrenches import cut_drives, find_wrenches
 from .factor import has_long_paths
 from .reactions import multiplier_values

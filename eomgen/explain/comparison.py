@@ -12,11 +12,11 @@ import numpy as np
 import sympy
 
 from ..base.limits.numbers import ALIKE, EPS, ROUNDED
+from ..base.names import acceleration_name
 from ..errors import EomgenError
 from ..graph.core import Expr, symbols_of
 from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
-from ..kinematics.topology import acceleration_name
 from ..verification.cases import Case, random_cases
 from .author import Author
 

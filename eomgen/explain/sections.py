@@ -550,7 +550,7 @@ def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
 
 
 def _acceleration_names(eqs: Any) -> list[str]:
-    from ..kinematics.topology import acceleration_name
+    from ..base.names import acceleration_name
 
     return [acceleration_name(name) for name in eqs.kinematics.velocity_names]
 

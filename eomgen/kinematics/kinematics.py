@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
+from ..base.names import acceleration_name
 from ..describe.input_rates import clock
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
@@ -27,7 +28,7 @@ from .loops import (
     refuse_unusable,
 )
 from .motion import MarkerMotion, entries_of, with_entries
-from .topology import MotionSymbols, Topology, acceleration_name, find_topology, lay_out, length_scale
+from .topology import MotionSymbols, Topology, find_topology, lay_out, length_scale
 from .tree import Link, Poses, build_links, link_twists
 
 

@@ -221,11 +221,6 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
 # -- layout of coordinates ---------------------------------------------------------------------------------------------
 
 
-def acceleration_name(velocity: str) -> str:
-    """``theta_dot`` -> ``theta_ddot``; ``ball_wx`` -> ``ball_wx_dot``."""
-    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
-
-
 @dataclass(frozen=True)
 class StateLayout:
     """Names and kinds of the tree's coordinates and velocities.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ..base.names import acceleration_name
 from ..base.notation import Notation
 from ..describe.expressions import parse
 from ..describe.printed_names import MULTIPLIERS, numbered
@@ -23,7 +24,6 @@ from ..graph.spatial import Wrench
 from ..graph.tensors import solve_symmetric
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
-from ..kinematics.topology import acceleration_name
 from ..kinematics.wrenches import JointWrenches, cut_drives
 from ..runtime.argument_checks import unknown
 from .quantities import Quantities, Row, Rows, require_bodies

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import sympy
 
+from ..base.names import acceleration_name
 from ..base.notation import Notation, dotted, raised
 from ..frames import GROUND
 from ..graph.core import Expr, symbols_of
-from ..kinematics.topology import acceleration_name
 from ..printing import PAGE, Formulas, Order, number, text, width
 from ..printing.formula import (
     COORDINATE,

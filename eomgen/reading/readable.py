@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..base.names import hint
+from ..base.names import acceleration_name, hint
 from ..base.notation import Notation, split_rate
 from ..describe.visit import Undotted
 from ..equations import TreeEquations
@@ -17,7 +17,6 @@ from ..graph.core import Expr, Graph, copied, symbols_of
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from ..kinematics.topology import acceleration_name
 from ..runtime.argument_checks import UnknownNameError
 from .methods import (
     BlockSystem,

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
+from ..base.names import acceleration_name
 from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
 from ..errors import ParameterError, Problem, bad_data, cannot, ill_shaped
 from ..numeric.scales import Scales, Space
@@ -342,8 +343,3 @@ def _table(rows: Sequence[Sequence[int]], n: int) -> Any:
     for own, columns in zip(found, rows, strict=True):
         own[list(columns)] = True
     return found
-
-
-def acceleration_name(velocity: str) -> str:
-    """``theta_dot`` -> ``theta_ddot``; ``w`` -> ``w_dot``."""
-    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
