@@ -11,18 +11,10 @@ from .base.operations import tape_rows
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
-    *("control", "signals", "tape"),
-    *("plain", "rk4"),
-    *("dense_begin", "products", "lu", "lu_large", "lu_complex", "lu_large_complex"),
-    *("newton_parts", "newton_sparse", "newton", "radau", "radau_step", "dense_end"),
-    *("taylor_terms", "taylor"),
-    *("event_values", "event_zero", "crossings", "loop"),
+    *("control", "plain", "rk4", "products", "lu", "lu_large", "newton", "radau"),
+    *("taylor_terms", "taylor", "events", "loop"),
 )
-CONTACTS = ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
-CYTHON = (
-    *("model", "numbers", "batches", "python", "kernel", "calls", "lanes", "steppers"),
-    *("journeys", "called", "integrators", "ensembles"),
-)
+CYTHON = ("arguments", "model", "kernel", "runs", "integrators", "ensembles", "contacts")
 
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
 SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_straight.h")
@@ -39,19 +31,18 @@ LAYER = {
     "eomgen_methods.h": ("steppers/dop853.c", "steppers/rk45.c"),
     "eomgen_steppers.c": tuple(f"steppers/{name}.c" for name in STEPPERS),
     SOLVER: tuple(f"{name}.c" for name in SOLVERS),
-    "_contacts.pxi": ("_contacts.pxi",),
     "eomgen_contacts.h": ("contacts/eomgen_contacts.h",),
-    "eomgen_contact_steps.h": ("contacts/maps.c", "steppers/lu.c", *(f"contacts/{name}.c" for name in CONTACTS)),
+    "eomgen_contact_steps.h": (
+        *("contacts/maps.c", "steppers/lu.c"),
+        *("contacts/impulses.c", "contacts/collide.c", "contacts/step.c"),
+    ),
     "eomgen_contacts.c": ("contacts/plain.c",),
     "eomgen_wide_contacts.c": ("contacts/wide.c",),
     "eomgen_wide_steps.c": ("steppers/wide.c",),
     "eomgen_ensembles.h": ("ensembles/eomgen_ensembles.h",),
-    "eomgen_ensembles.c": ("ensembles/one_run.c", "ensembles/ensembles.c"),
-    "eomgen_lane_runs.h": (
-        *("ensembles/lane_steps.c", "steppers/taylor_terms.c"),
-        *(f"ensembles/lane_{name}.c" for name in ("taylor", "alone", "runs")),
-    ),
-    **{f"eomgen_runs{width}.c": (f"ensembles/lanes{width}.c",) for width in (2, 4, 8)},
+    "eomgen_ensembles.c": ("ensembles/ensembles.c",),
+    "eomgen_lane_runs.h": ("ensembles/lane_steps.c", "steppers/taylor_terms.c", "ensembles/lane_runs.c"),
+    **{f"eomgen_runs{width}.c": ("ensembles/lanes.c",) for width in (2, 4, 8)},
 }
 
 #: Headers that models and the layer share.
@@ -63,6 +54,8 @@ def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
     texts = {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
     texts["eomgen_steppers.c"] = tape_rows() + texts["eomgen_steppers.c"]
+    for width in (2, 4, 8):
+        texts[f"eomgen_runs{width}.c"] = f"#define LANES {width}\n" + texts[f"eomgen_runs{width}.c"]
     return {name: definitions(text) + text if name.endswith((".c", ".h")) else text for name, text in texts.items()}
 
 

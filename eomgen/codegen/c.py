@@ -234,7 +234,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "arguments": _describe_arguments(program),
         "equations": describe_equations(program, areas, _linked(program, apart), stepping) if program.drivers else None,
         "straight": straight,
-        "regular": BY_MOTIONS[0] in program.block_names,
+        "shorter": BY_MOTIONS[0] in program.block_names,
         "starts": {name: start for name, start, _ in areas},
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,

@@ -67,7 +67,10 @@ def lane_kernels(program: Program) -> list[str]:
 
 
 def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[str, Printed]) -> dict[str, str]:
-    """The header with the text of the functions, and a file for each width; none without such functions."""
+    """The header with the text of the functions, and files for each width; none without such functions.
+
+    A library that stands alone has no ensembles, which take their own ``rhs`` and series.
+    """
     blocks, first = lane_blocks(program), rhs_blocks(program)
     if not blocks:
         return {}
@@ -81,14 +84,15 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
         "closed": loops_in_lanes(program),
     }
     call = next((k["call"] for k in context["kernels"] if k["name"] == "rhs"), "")
+    ensembles = bool(first) and not context["library"]
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
     for width, (tests, feature) in WIDTHS.items():
-        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": bool(first)}
-        shown["series"] = context["series"]
+        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": ensembles}
+        shown["series"] = ensembles and context["series"]
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
-        if first:
+        if ensembles:
             fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": call}
             files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", fused)
-            if context["series"]:
+            if shown["series"]:
                 files[f"{name}_series_lanes{width}.c"] = render("c/series_lanes.c.j2", fused)
     return files

@@ -256,7 +256,7 @@ def _label_results(program: Program, block: str) -> dict[object, str]:
     known: dict[str, Sequence[str]] = {
         **dict.fromkeys(("bias", "inverse_dynamics"), v),
         **dict.fromkeys(("constraints", "velocity_constraints"), rows),
-        **dict.fromkeys(("dynamics", "regular_dynamics"), (*v, *rates[len(program.coordinates) :])),
+        **dict.fromkeys(("dynamics", "short_dynamics"), (*v, *rates[len(program.coordinates) :])),
         **dict.fromkeys(("outputs", "motion_outputs", "accelerated_outputs"), facts.get("y_names", ())),
         "position": rows[: program.sizes.n_h],
         "energy": ("kinetic", "potential"),

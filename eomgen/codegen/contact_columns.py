@@ -18,7 +18,7 @@ from ..numeric.pair_sums import POSE
 from .terms import SystemTerms
 
 #: Blocks of M of the bodies and h, of the operands of the sums, and of the residual along wrenches on their bodies.
-COLUMNS = ("held_terms", "held_operands", "held_loads")
+COLUMNS = ("contact_terms", "contact_operands", "contact_loads")
 LEAST = 48  #: states of contacts from which the driver is worth its text
 WRENCH = 6  #: numbers of what a body gets
 LOADED = -1  #: in a set of velocities: what a body gets
@@ -44,10 +44,10 @@ class ContactColumns(NamedTuple):
 
     def block(self, name: str, terms: SystemTerms) -> tuple[str, list[Expr]]:
         """Ports and outputs of one of the blocks."""
-        if name == "held_terms":  # M of bodies lower packed, h
+        if name == "contact_terms":  # M of bodies lower packed, h
             lower = [terms.mass_matrix[i][k] for i in range(terms.n_v - terms.n_states) for k in range(i + 1)]
             return "q v", [*lower, *terms.bias]
-        return ("q v", [*self.operands]) if name == "held_operands" else ("q v a multipliers loads", [*self.along])
+        return ("q v", [*self.operands]) if name == "contact_operands" else ("q v a multipliers loads", [*self.along])
 
 
 def contact_columns(terms: SystemTerms) -> ContactColumns | None:

@@ -385,7 +385,7 @@ class BlockMaker:
                 return block(name, "q v", every, self._turned)
             case "position":  # C, C_q
                 return block(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
-            case "closing" | "dynamics" | "regular_closing" | "regular_dynamics":
+            case "closing" | "dynamics" | "short_closing" | "short_dynamics":
                 form = self._loops if name in BY_SYSTEM else self._by_motions
                 assert form is not None
                 if name.endswith("closing"):  # a Newton step
@@ -409,10 +409,10 @@ class BlockMaker:
                 return block(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return block(name, "q v a multipliers", self.slopes.packed())
-            case "held_terms" | "held_operands" | "held_loads":
+            case "contact_terms" | "contact_operands" | "contact_loads":
                 assert self.contacts is not None
                 ports, results = self.contacts.block(name, terms)
-                return block(name, ports, results, self._turned if name == "held_terms" else ())
+                return block(name, ports, results, self._turned if name == "contact_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
                 given = [self.port(port) for port in DAE]
                 y = [symbol for port in given for symbol in port.symbols]

@@ -206,10 +206,10 @@ def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
     """
     if loops is None or not loops.gentle:
         return None
-    regular = MotionLoops(loops)
-    if not regular.possible or regular.estimate > LONGER * longest:
+    shorter = MotionLoops(loops)
+    if not shorter.possible or shorter.estimate > LONGER * longest:
         return None
-    return regular if _operations(regular) < SAVED * _operations(loops) else None
+    return shorter if _operations(shorter) < SAVED * _operations(loops) else None
 
 
 def _operations(blocks: LoopBlocks | MotionLoops) -> int:

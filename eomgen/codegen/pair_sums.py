@@ -267,10 +267,10 @@ def contact_areas(program: Program) -> list[tuple[str, int]]:
         return []
     functions = [one.function for one in program.contacts.sums]
     return [
-        ("HELD_OPERANDS", len(program.contacts.operands)),
-        ("HELD_GIVEN", max(function.count for function in functions)),
-        ("HELD_LIST", 1 + STATE_RECORD * max(map(room_of_states, functions))),
-        ("HELD_WORK", max(map(work_of, functions))),
+        ("CONTACT_OPERANDS", len(program.contacts.operands)),
+        ("CONTACT_GIVEN", max(function.count for function in functions)),
+        ("CONTACT_LIST", 1 + STATE_RECORD * max(map(room_of_states, functions))),
+        ("CONTACT_WORK", max(map(work_of, functions))),
     ]
 
 

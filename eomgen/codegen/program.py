@@ -23,7 +23,7 @@ COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h,
 RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
 
 #: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
-BY_SYSTEM, BY_MOTIONS = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")
+BY_SYSTEM, BY_MOTIONS = ("closing", "dynamics"), ("short_closing", "short_dynamics")
 
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}

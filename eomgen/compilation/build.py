@@ -279,7 +279,7 @@ def compile_lanes(file: Path) -> CacheEntry | None:
         return entry  # needs no compiler
     name, recipe = manifest["name"], manifest["recipe"]
     flags = [flag for flag in recipe["flags"] if not flag.startswith("-DEOMGEN_LANES=")]
-    flags = ["-DEOMGEN_LATE", *flags, f"-DEOMGEN_LANES={width}"]
+    flags = ["-DEOMGEN_LAZY", *flags, f"-DEOMGEN_LANES={width}"]
     called = tuple(f"{name}_{part}" for part in ("tables.", "native_", "pairs_"))
     chosen = [*_deferred(files, name), *(f for f in files if f.startswith(called) and f.endswith(".c"))]
     compiler = find_compiler(recipe["options"]["compiler"])

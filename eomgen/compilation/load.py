@@ -80,7 +80,7 @@ def _find_lanes(file: Path) -> int:
         if (entry := compile_lanes(file)) is None:
             return 0
         try:
-            return _table(ctypes.CDLL(str(entry.product)), "eomgen_late_lanes")
+            return _table(ctypes.CDLL(str(entry.product)), "eomgen_lazy_lanes")
         except (OSError, AttributeError):
             Cache(entry.directory.parents[1]).discard(entry.key)
             raise

@@ -77,7 +77,7 @@ cdef class Ensemble:
     signals : list
         Inputs over time, as for a Stepper.
     events : dict or None
-        As in the plan of a Journey; none may wait for Python.
+        As in the plan of a Run; none may wait for Python.
     keep : int
         Events kept of each trajectory.
 
@@ -152,14 +152,14 @@ cdef class Ensemble:
     def work(self):
         """Run trajectories until none is left, without the GIL; called by every thread."""
         cdef eomgen_thread own
-        cdef Journey journey
+        cdef Run trajectory
         held = []
         own.signals, own.events, own.notes, own.notes_room = make_signals(self.signals, self.all.model.n_u, held), NULL, NULL, 0
         if self.watched:
             plan = {"nodes": [0.0], "t_eval": [0.0], "dense": False, "watch": None, "events": self.watched}
             atol = np.ones(self.all.n)
-            journey = Journey(self.all.method.name.decode(), self.context, 0.0, atol, 0.0, 1.0, atol, 1.0, plan=plan)
-            own.events, own.notes, own.notes_room = &journey.events, journey.journey.notes, journey.journey.notes_room
+            trajectory = Run(self.all.method.name.decode(), self.context, 0.0, atol, 0.0, 1.0, atol, 1.0, plan=plan)
+            own.events, own.notes, own.notes_room = &trajectory.events, trajectory.trajectory.notes, trajectory.trajectory.notes_room
         memory = np.zeros(eomgen_ensemble_memory(&self.all, &own))
         own.memory = <double *>cnp.PyArray_DATA(<cnp.ndarray>memory)
         with nogil:

@@ -10,7 +10,7 @@ Threads: contexts never change but for the work array that one call leaves to th
 to itself, on the stack when small and on the heap otherwise. So any number of threads may call one kernel at once, in
 free-threaded Pythons too; only ``failure`` is shared: it holds the last failure of any thread. Batches and long kernels
 run without the GIL. Lanes that are compiled when needed are published by atomic operations (_lanes.pxi). Steppers and
-journeys are of one thread each; their solutions (interpolants, dense) may be read by many.
+runs are of one thread each; their solutions (interpolants, dense) may be read by many.
 """
 cimport cython
 cimport numpy as cnp
@@ -154,32 +154,16 @@ cdef enum:
 sources = EOMGEN_SOURCES.decode()  # digest of the texts that this was compiled from
 
 
-include "_numbers.pxi"
-
-
-cdef cnp.ndarray copy(const double *data, cnp.npy_intp n):
-    cdef cnp.ndarray array = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
-    memcpy(cnp.PyArray_DATA(array), data, n * sizeof(double))
-    return array
-
-
-cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
-    cdef cnp.npy_intp[2] dims = [n, k]
-    return cnp.PyArray_EMPTY(2, dims, cnp.NPY_DOUBLE, 0)
-
-
-include "_batches.pxi"
-include "_python.pxi"
+include "_arguments.pxi"
 include "_model.pxi"
-include "_lanes.pxi"
-
 include "_kernel.pxi"
-include "_steppers.pxi"
+include "_runs.pxi"
+include "_integrators.pxi"
 include "_ensembles.pxi"
 include "_contacts.pxi"
 
 MAKERS = {
-    "timed": timed, "state": state, "motion": Motion, "stepper": Stepper, "journey": Journey, "called": CalledJourney, "integrator": Integrator,
+    "timed": timed, "state": state, "motion": Motion, "stepper": Stepper, "run": Run, "called": CalledRun, "integrator": Integrator,
     "march": march, "solve_contacts": solve_contacts,
 }  # of a Model, whose context they take
 if EOMGEN_OWN_TABLE != NULL:

@@ -78,10 +78,10 @@ enum {
     AREA_CHANGE,      /* of q' and v' */
     AREA_SPAN,        /* such changes along independent directions */
     AREA_SHARES,      /* of independent velocities in these (f f) */
-    AREA_HELD_OPERANDS, /* of contacts with states: operands, numbers of pairs, list of pairs, work */
-    AREA_HELD_GIVEN,
-    AREA_HELD_LIST,
-    AREA_HELD_WORK,
+    AREA_CONTACT_OPERANDS, /* of contacts with states: operands, numbers of pairs, list of pairs, work */
+    AREA_CONTACT_GIVEN,
+    AREA_CONTACT_LIST,
+    AREA_CONTACT_WORK,
     AREA_TORQUES,     /* q, v, a, dq, dv, da; d(M a + h) */
     AREAS
 };
@@ -121,8 +121,8 @@ typedef struct {
     const short (*relax)[2];        /* and those that are relaxed */
     const eom_contacts *contacts;
     int areas[AREAS];
-    /* close_directly (eomgen_straight.h) with fixed sizes and `closing`, `regular_closing` as parts of it, or NULL. */
-    int (*close)(const struct eom_at *at, double *q, double *w, int *regular);
+    /* close_directly (eomgen_straight.h) with fixed sizes and `closing`, `short_closing` as parts of it, or NULL. */
+    int (*close)(const struct eom_at *at, double *q, double *w, int *shorter);
     /* Straight-line functions; NULL where the model has none. */
     eomgen_function scales;
     eomgen_function position;       /* q -> C, C_q */
@@ -139,8 +139,8 @@ typedef struct {
     eomgen_function gamma;
     eomgen_function closing;        /* a Newton step onto the constraints, */
     eomgen_function dynamics;       /* velocities and accelerations at a closed position, */
-    eomgen_function regular_closing; /* both in a shorter form that is tried first */
-    eomgen_function regular_dynamics;
+    eomgen_function short_closing; /* both in a shorter form that is tried first */
+    eomgen_function short_dynamics;
     eomgen_function system;         /* the linear system K z = r of the accelerations */
     eomgen_function joint_accelerations; /* q, v, z -> v' */
     eomgen_function accelerated_outputs;
@@ -156,9 +156,9 @@ typedef struct {
     eomgen_function loop_slopes;    /* coefficients of the derivatives of x' by bodies, */
     eomgen_function slopes_by_position; /* and these along dq, */
     eomgen_function slopes_by_velocity; /* along dv */
-    eomgen_function held_terms;     /* of contacts with states: M and h without them, */
-    eomgen_function held_operands;  /* operands of their sums, */
-    eomgen_function held_loads;     /* generalized forces of loads on bodies */
+    eomgen_function contact_terms;     /* of contacts with states: M and h without them, */
+    eomgen_function contact_operands;  /* operands of their sums, */
+    eomgen_function contact_loads;     /* generalized forces of loads on bodies */
 } eom_model;
 
 /* Where a function is evaluated: time, inputs, constants made by precompute; w: n_work doubles of work. */

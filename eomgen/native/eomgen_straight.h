@@ -10,16 +10,16 @@
 #ifdef MODEL
 #define NAMED_STEPS /* so that they become parts of their caller */
 #define STEP(function, q, out) function##_block(at->t, q, at->u, at->c, out, at->w)
-#ifdef REGULAR
+#ifdef SHORT_FORM
 #define SHORTER 1
 #else
 #define SHORTER 0
-#define regular_closing_block closing_block
+#define short_closing_block closing_block
 #endif
 #else
 #define MODEL (at->m)
 #define STEP EVALUATE
-#define SHORTER (MODEL->regular_closing != NULL)
+#define SHORTER (MODEL->short_closing != NULL)
 #endif
 #define N (MODEL->n_v)
 #define NQ (MODEL->n_q)
@@ -181,7 +181,7 @@ static double step_fraction(const eom_at *at, const double *restrict q, const do
 static int step_directly(const eom_at *at, const double *restrict q, double *restrict closing)
 {
     if (SHORTER) {
-        if (STEP(regular_closing, q, closing) == 0) {
+        if (STEP(short_closing, q, closing) == 0) {
             if (closing[2] <= CONSTRAINTS_NEARBY) {
                 return 1;
             }
@@ -197,31 +197,31 @@ static int step_directly(const eom_at *at, const double *restrict q, double *res
     return SHORTER;
 }
 
-/* Velocities and accelerations at the closed position y to the area of `dynamics`. regular: whether the shorter form
+/* Velocities and accelerations at the closed position y to the area of `dynamics`. shorter: whether the shorter form
    may hold. */
-static int accelerate_directly(const eom_at *at, const double *restrict y, int regular)
+static int accelerate_directly(const eom_at *at, const double *restrict y, int shorter)
 {
     double *const dynamics = AT(DYNAMICS);
-    regular = regular && MODEL->regular_dynamics != NULL;
-    if (regular && EVALUATE(regular_dynamics, y, dynamics) == 0 && dynamics[2 * N] != 0.0) {
+    shorter = shorter && MODEL->short_dynamics != NULL;
+    if (shorter && EVALUATE(short_dynamics, y, dynamics) == 0 && dynamics[2 * N] != 0.0) {
         return 0;
     }
     return EVALUATE(dynamics, y, dynamics);
 }
 
-/* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. *regular: whether the shorter form held
+/* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. *shorter: whether the shorter form held
    last. w: that of `at`, an argument so that both forms share their sines: compilers see that it holds no q. */
-static int close_directly(const eom_at *at, double *restrict q, double *restrict w, int *restrict regular)
+static int close_directly(const eom_at *at, double *restrict q, double *restrict w, int *restrict shorter)
 {
     double *const closing = w + MODEL->areas[AREA_CLOSING];
 #ifndef NAMED_STEPS
     if (MODEL->close != NULL) {
-        return MODEL->close(at, q, w, regular);
+        return MODEL->close(at, q, w, shorter);
     }
 #endif
-    *regular = 0;
+    *shorter = 0;
     for (int step = 0, all = 0; step < 6 && all < 25; all++) {
-        *regular = step_directly(at, q, closing);
+        *shorter = step_directly(at, q, closing);
         const double left = closing[1], length = closing[2];
         if (!(length <= 0.25)) { /* or not a number */
             const double part = step_fraction(at, q, closing);
@@ -251,11 +251,11 @@ static int rhs_directly(const eom_at *at, const double *restrict x, double *rest
 {
     double *const y = AT(X);
     const double *const dynamics = AT(DYNAMICS);
-    int regular;
+    int shorter;
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
-    if (close_directly(at, y, at->w, &regular) != 0 || accelerate_directly(at, y, regular) != 0 || dynamics[2 * N] == 0.0) {
+    if (close_directly(at, y, at->w, &shorter) != 0 || accelerate_directly(at, y, shorter) != 0 || dynamics[2 * N] == 0.0) {
         return 0;
     }
     form_rates(at, y, dynamics, out);
@@ -275,7 +275,7 @@ EOMGEN_SHARED int rhs_or_solved(const eom_at *at, const double *restrict x, doub
     return sound && far ? EOMGEN_SUCCESS : eom_finish_rhs(at, x, out, sound);
 }
 #else
-/* Of states side by side, whose closing_block and dynamics_block and, where REGULAR is defined, the shorter forms of
+/* Of states side by side, whose closing_block and dynamics_block and, where SHORT_FORM is defined, the shorter forms of
    both stand above; AT_X, AT_CLOSING, AT_DYNAMICS: their areas of w. */
 
 /* A Newton step onto the constraints; whether the shorter form holds. The long code runs where a lane needs it, and
@@ -283,8 +283,8 @@ EOMGEN_SHARED int rhs_or_solved(const eom_at *at, const double *restrict x, doub
 static flag step_directly(real t, const real *restrict q, const real *restrict u, const real *restrict c,
     real *restrict closing, real *restrict w)
 {
-#ifdef REGULAR
-    (void)regular_closing_block(t, q, u, c, closing, w);
+#ifdef SHORT_FORM
+    (void)short_closing_block(t, q, u, c, closing, w);
     const flag shorter = closing[2] <= CONSTRAINTS_NEARBY;
     if (any_of(~shorter)) {
         real other[N + 3];
@@ -304,8 +304,8 @@ static flag step_directly(real t, const real *restrict q, const real *restrict u
 static flag accelerate_directly(real t, const real *restrict y, const real *restrict u, const real *restrict c,
     flag shorter, real *restrict dynamics, real *restrict w)
 {
-#ifdef REGULAR
-    shorter &= ~regular_dynamics_block(t, y, u, c, dynamics, w) & (dynamics[2 * N] != 0.0);
+#ifdef SHORT_FORM
+    shorter &= ~short_dynamics_block(t, y, u, c, dynamics, w) & (dynamics[2 * N] != 0.0);
     const flag none = { 0 };
     flag failed = none;
     if (any_of(~shorter)) {

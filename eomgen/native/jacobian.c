@@ -316,12 +316,12 @@ static int jacobian_here(const eom_at *at, const double *restrict x, double *res
     double *const y = AT(X);
     const double *const slopes = AT(SLOPES);
     const int few = NQ == N && MH == M && 2 * F <= N;
-    int regular;
+    int shorter;
     if (MODEL->loop_slopes == NULL) {
         return jacobian_by_partition(at, x, out, weakest);
     }
     copy(NX, x, y);
-    if (close_directly(at, y, at->w, &regular) != 0 || EVALUATE(loop_slopes, y, AT(SLOPES)) != 0 || slopes[N] == 0.0) {
+    if (close_directly(at, y, at->w, &shorter) != 0 || EVALUATE(loop_slopes, y, AT(SLOPES)) != 0 || slopes[N] == 0.0) {
         return jacobian_by_partition(at, x, out, weakest);
     }
     for (double *near = AT(MET); near < AT(SHAPES); near++) { /* pairs of shapes near at another state */
@@ -543,12 +543,12 @@ static int contact_body_rows(const eom_at *at, double *restrict out)
 {
     enum { RECORD = 15 };
     const eom_contacts *const c = MODEL->contacts;
-    double *const list = AT(HELD_LIST), *const loads = AT_DQ;
-    (void)EVALUATE(held_operands, AT(X), AT(HELD_OPERANDS));
+    double *const list = AT(CONTACT_LIST), *const loads = AT_DQ;
+    (void)EVALUATE(contact_operands, AT(X), AT(CONTACT_OPERANDS));
     for (int sum = 0; sum < c->sums; sum++) {
         int load = 0;
         const int *const slots =
-            c->pairs(sum, AT(X), AT(HELD_OPERANDS), AT(HELD_GIVEN), list, AT(HELD_WORK), &load);
+            c->pairs(sum, AT(X), AT(CONTACT_OPERANDS), AT(CONTACT_GIVEN), list, AT(CONTACT_WORK), &load);
         const int count = (int)list[0];
         if (count < 0) {
             return 1;
@@ -560,7 +560,7 @@ static int contact_body_rows(const eom_at *at, double *restrict out)
             copy(6, record + 3, first);
             copy(6, record + 9, second);
             fill(N, 0.0, AT(ALONG));
-            (void)EVALUATE(held_loads, AT(X), AT(ALONG));
+            (void)EVALUATE(contact_loads, AT(X), AT(ALONG));
             if (state >= 0) {
                 take_column(at, NQ + state, MOVING, out);
             }

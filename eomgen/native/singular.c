@@ -54,8 +54,8 @@ static int rhs_here(const eom_at *at, const double *restrict x, double *restrict
 /* The nearest q with C(q) = 0, in place. */
 static int bring(const eom_at *at, double *restrict q)
 {
-    int regular;
-    if (MODEL->dynamics != NULL && MODEL->system == NULL && close_directly(at, q, at->w, &regular) == 0) {
+    int shorter;
+    if (MODEL->dynamics != NULL && MODEL->system == NULL && close_directly(at, q, at->w, &shorter) == 0) {
         return 0;
     }
     return close_position(at, q);

@@ -58,7 +58,7 @@ static int tree_accelerate(const eom_at *at, const double *restrict x, int conta
     const double *const bias = AT(TERMS) + n * (n + 1) / 2;
     double *const a = AT_ACC;
     (void)EVALUATE(scales, x, AT(SCALES));
-    (void)(contacts ? EVALUATE(held_terms, x, AT(TERMS)) : evaluate_terms(at, x, AT(TERMS)));
+    (void)(contacts ? EVALUATE(contact_terms, x, AT(TERMS)) : evaluate_terms(at, x, AT(TERMS)));
     copy(NX, x, AT(X));
     for (int k = 0; k < N; k++) {
         a[k] = -bias[k];

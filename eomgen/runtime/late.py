@@ -39,7 +39,7 @@ class LateCore:
         self.names = (*core.names, *(name for name in late if name not in core.names))
         self.load = load
         self.further: dict[str, Core] = {}
-        self.journey = core.journey  # here, because every run asks for it
+        self.run = core.run  # here, because every run asks for it
 
     def having(self, name: str) -> Core:
         """The core with a rarer kernel, made now if there is none yet."""

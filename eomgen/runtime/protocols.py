@@ -105,7 +105,7 @@ class Core(Protocol):
     metadata: str
     names: tuple[str, ...]
     methods: tuple[str, ...]
-    journey: Any
+    run: Any
 
     def context(self, p: Any = None, u: Any = None, error: Callable[[str], Exception] = ValueError) -> Any: ...
     def timed(

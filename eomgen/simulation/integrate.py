@@ -205,52 +205,52 @@ def integrate(
             options.get("max_step", inf),
             options.get("first_step", 0.0),
         )
-        journey = core.journey(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
+        run = core.run(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
     else:
         plan |= {"make": partial(_make, method, rates, forcing, nodes, dict(options)), "rates": rates}
         plan["inputs"] = forcing if forcing else None
-        journey = core.called("called", module.kernels.context, start, x0, end, 0.0, 0.0, inf, 0.0, (), plan)
+        run = core.called("called", module.kernels.context, start, x0, end, 0.0, 0.0, inf, 0.0, (), plan)
     status, raised = 0, None
     quiet = nullcontext() if isinstance(method, str) else np.errstate(all="ignore")  # NaN of a failure shortens a step
     try:
         with quiet:
-            status = journey.travel()
+            status = run.proceed()
             while status in (WAITING, RESET_FAILED) and events is not None:
-                later = (k for k, at in enumerate(nodes[1:-1]) if (at - journey.t) * (end - start) >= 0.0)
+                later = (k for k, at in enumerate(nodes[1:-1]) if (at - run.t) * (end - start) >= 0.0)
                 k = next(later, len(nodes) - 2)
                 forcing.enter(nodes[k], nodes[k + 1])  # as the loop has it
-                after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
+                after = events.reset(module, forcing, run.t, run.state(), run.fired())
                 if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
                     break
-                jumped = journey.jump(after)
-                status = TERMINAL if events.over else jumped or journey.travel()
+                jumped = run.jump(after)
+                status = TERMINAL if events.over else jumped or run.proceed()
     except KeyboardInterrupt as interrupt:  # in a reset
         status, raised = STOPPED, interrupt
     finally:
         if forcing:
             forcing.enter(start, end)  # who asks for inputs from here on asks for those of the whole run
-    times, states, notes = journey.outcome()
-    raised = journey.raised if raised is None else raised
+    times, states, notes = run.outcome()
+    raised = run.raised if raised is None else raised
     if events is not None and raised is None:
-        warn_of_unknown([events.names[i] for i in journey.unknown()])
+        warn_of_unknown([events.names[i] for i in run.unknown()])
     if status == ZENO and events is not None:
-        raise events.crowded(journey.t, journey.resets)
+        raise events.crowded(run.t, run.resets)
     t_events, x_events = [], []
     if events is not None:
         which = notes[:, 0]
         t_events = [notes[which == i, 1] for i in range(len(events))]
         x_events = [np.ascontiguousarray(notes[which == i, 2:].T) for i in range(len(events))]
-    counts = {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations}
-    trail = None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T))
-    between: Any = journey.dense() if dense else None
+    counts = {"nfev": run.evaluations, "njev": run.differentiations, "nlu": run.factorizations}
+    trail = None if (trail := run.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T))
+    between: Any = run.dense() if dense else None
     if between and not isinstance(method, str):
         between = Joined(between, end >= start)
-    message = MESSAGES.get(status, getattr(journey, "message", "") or TOO_SMALL)
+    message = MESSAGES.get(status, getattr(run, "message", "") or TOO_SMALL)
     solution = Solution(
         times, states, t_events, x_events, between or None, STATUS.get(status, -1), message, counts,
-        (start, journey.t), trail, journey.finite,
+        (start, run.t), trail, run.finite,
     )  # fmt: skip
-    return solution, journey.failure, raised
+    return solution, run.failure, raised
 
 
 def _make(

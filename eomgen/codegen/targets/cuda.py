@@ -34,8 +34,8 @@ METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
 #: Where the steppers have them; rk4_step is in the text of the model.
 SOURCES = {"dop853": "steppers/plain", "rk4": "steppers/rk4"}
 #: What else is compiled of the steppers, in order.
-STEPPERS = ("steppers/control", "steppers/signals", "steppers/loop")
-EVENTS = ("steppers/event_values", "steppers/event_zero", "steppers/crossings")
+STEPPERS = ("steppers/control", "steppers/loop")
+EVENTS = ("steppers/events",)
 _FUNCTION = re.compile(r"^static (int|flag|void|double) ", re.MULTILINE)
 _OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTILINE)
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
@@ -62,7 +62,7 @@ def emit_device_text(program: Program) -> str:
     unrolled = replace(program, limits=replace(program.limits, rolled=sys.maxsize))  # threads have little memory
     sources = dict(emit_c(unrolled, lanes=False, separate=False))
     parts = (*STEPPERS, *(EVENTS if program.metadata.get("events") else ()))
-    texts = {**sources, **read_layer(), "steppers": read_sources((*parts, "ensembles/one_run"))}
+    texts = {**sources, **read_layer(), "steppers": read_sources((*parts, "ensembles/ensembles"))}
     texts |= {name: read_sources([part]) for name, part in SOURCES.items()}
     texts["eomgen_methods.h"] = read_sources(["steppers/dop853"])
     there: set[str] = set()

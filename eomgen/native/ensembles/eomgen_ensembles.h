@@ -7,7 +7,7 @@
 
 #include "eomgen_loop.h"
 
-/* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_travel or this. */
+/* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_advance or this. */
 enum { EOMGEN_BAD_PARAMETERS = -110 };
 
 #ifndef EOMGEN_PRECOMPUTE /* as EOMGEN_RHS */
@@ -75,7 +75,7 @@ typedef struct {
 ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e);
 
 /* Keep the events noted by now for trajectory k, as many as there is room for. */
-void eomgen_keep_notes(eomgen_ensemble *e, eomgen_journey *journey, ptrdiff_t k);
+void eomgen_keep_notes(eomgen_ensemble *e, eomgen_trajectory *trajectory, ptrdiff_t k);
 
 /* Doubles of memory that one thread needs. */
 ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own);

@@ -1,3 +1,313 @@
+/* Taylor's method in lanes. Its round begins with coefficients, which tell the step: those that the last step ended with,
+   or new ones where a lane begins. */
+static void expand_lanes(lane_run *run, real t, const real *y, flag wanted)
+{
+    real *const rows = run->after;
+    if (run->signals != NULL) {
+        read_tables(run, t);
+    }
+    const flag failed = run->expand(t, y, run->u, run->c, run->order, rows, run->series_work);
+    real sum = same(0.0); /* NaN where a result is not finite */
+    for (int i = 0; i < run->n; i++) {
+        sum += rows[run->n + i] * 0.0;
+    }
+    const flag bad = failed | (sum != 0.0);
+    if (any_of(bad & wanted)) {
+        run->awake = wanted;
+        note_failures(run, t, y, rows + run->n, failed, bad, NULL);
+    }
+}
+
+static void taylor_attempt(lane_run *run, real h)
+{
+    const flag awake = run->awake;
+    taylor_sum(run, run->K, h, run->y, run->f);
+    run->calls++;
+    expand_lanes(run, run->t_new, run->y, awake);
+    run->awake = awake;
+}
+
+static real taylor_error(const lane_run *run, real h)
+{
+    return taylor_defect(run, h, run->f, run->after + run->n);
+}
+
+static const lane_method lane_taylor = {"Taylor", 2 * (TAYLOR_MOST + 1), TAYLOR_MOST, 0, taylor_attempt, taylor_error,
+                                        taylor_prepare, taylor_interpolate}; /* order 0: rejected steps are halved */
+
+/* taylor_log2, taylor_exp2 and taylor_reach of every lane; 2^52 and half as much again make integers of their last bits. */
+static inline real log2_of(real a)
+{
+    const numeral word = (numeral)a;
+    const real exponent = (real)((word >> 52 & 2047) | 0x4330000000000000u) - (0x1p52 + 1023.0);
+    a = (real)((word & 0xfffffffffffffu) | 0x3ff0000000000000u) - 1.0;
+    return exponent + a + a * (1.0 - a) * (0.44245418 + a * (-0.27016007 + a * (0.15202092 - a * 0.04584151)));
+}
+
+static inline real exp2_of(real a)
+{
+    const real nearest = (a + 0x1.8p52) - 0x1.8p52, whole = nearest - choose(nearest > a, same(1.0), same(0.0));
+    a -= whole;
+    const real power = (real)((numeral)(whole + (0x1.8p52 + 1023.0)) << 52);
+    return power * (1.0 + a + a * (a - 1.0) * (0.30691046 + a * (0.06561149 + a * 0.01371135)));
+}
+
+static inline real reach_of(real before, real last, int p)
+{
+    const real first = log2_of(before) * (-1.0 / (p - 1)), second = log2_of(last) * (-1.0 / p);
+    const real reach = exp2_of(choose(first < second, first, second) - TAYLOR_SAFETY / (p - 1));
+    return choose(before + last < 1e300, reach, same((double)NAN));
+}
+
+/* Coefficients at the states of all lanes, and the sizes of the steps to try; NaN where there is none. */
+static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
+{
+    const int p = run->order, last = (p + 1) * run->n;
+    const flag begins = run->begins & run->active, moved = run->active & ~begins & ~run->again;
+    if (!any_of(run->active & ~moved)) {
+        real *const rows = run->K;
+        run->K = run->after, run->after = rows;
+    } else if (any_of(moved)) {
+        for (int i = 0; i < last; i++) {
+            run->K[i] = choose(moved, run->after[i], run->K[i]);
+        }
+    }
+    if (any_of(begins)) {
+        expand_lanes(run, run->t, run->y, begins);
+        run->evaluations -= begins;
+        for (int i = 0; i < last; i++) {
+            run->K[i] = choose(begins, run->after[i], run->K[i]);
+        }
+    }
+    real before, size;
+    taylor_sizes(run, run->K, p, &before, &size);
+    const real first = same(e->first_step);
+    real reach = reach_of(before, size, p);
+    if (any_of((reach != reach) & (begins | moved))) {
+        reach = taylor_straight(run, run->K, reach);
+    }
+    const flag none = { 0 }, given = (run->steps == 0) & (first > 0.0) & (first < reach);
+    run->size = choose(begins | moved, choose(given, first, reach), run->size); /* others try again, or have nothing to do */
+    run->begins = none;
+}
+
+/* What a lane cannot do beside others is done for it single, by the text of one trajectory: its events with their resets, and
+   inputs that are expressions. Nothing of it depends on the other lanes. */
+typedef struct lane_single {
+    eomgen_run run; /* first, so that a method's functions find the rest */
+    eomgen_method method;
+    eomgen_trajectory trajectory;
+    eomgen_events events;
+    const lane_run *lanes;
+    int l;
+} lane_single;
+
+/* Numbers that a structure takes the place of. */
+#define ROOM_OF(type, count) ((ptrdiff_t)((sizeof(type) * (size_t)(count) + sizeof(double) - 1) / sizeof(double)))
+
+static int plays_expressions(const eomgen_ensemble *e, const eomgen_thread *own)
+{
+    for (int i = 0; own->signals != NULL && i < e->model->n_u; i++) {
+        if (own->signals[i].n > 0 && own->signals[i].tape != NULL) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static int has_single(const eomgen_ensemble *e, const eomgen_thread *own)
+{
+    return own->events != NULL || plays_expressions(e, own);
+}
+
+/* Doubles of what each lane keeps, and of work that they share. */
+static ptrdiff_t single_each(const eomgen_ensemble *e, const eomgen_events *events)
+{
+    const eomgen_method *const method = e->method;
+    const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, n = events != NULL ? events->n : 0;
+    const ptrdiff_t kept = events != NULL ? e->n + 7 * n + ROOM_OF(long, n) + ROOM_OF(int, 3 * n) : 0;
+    return ROOM_OF(lane_single, 1) + rows * e->n + e->model->n_const + e->model->n_u + kept;
+}
+
+static ptrdiff_t single_shared(const eomgen_ensemble *e, const eomgen_events *events)
+{
+    const ptrdiff_t n = events != NULL ? events->n : 0;
+    return e->model->n_work + e->n_eval + (events != NULL ? events->n_resets + 8 * n + ROOM_OF(int, 2 * n) : 0);
+}
+
+/* The stages of the step just made, and the polynomial from them. */
+static void prepare_single(eomgen_run *run)
+{
+    const lane_single *const single = (const lane_single *)run;
+    const lane_run *const lanes = single->lanes;
+    for (int i = 0; i < single->method.rows_K * run->n; i++) {
+        run->K[i] = lanes->K[i][single->l];
+    }
+    single->lanes->all->method->prepare(run);
+}
+
+static double *lay_out_events(eomgen_events *events, const eomgen_thread *own, int states, double *memory, double *shared)
+{
+    *events = *own->events;
+    const int n = events->n;
+    double **const kept[] = { &events->g, &events->g_new, &events->slope, &events->slope_new, &events->size, &events->trial,
+                              &events->latest };
+    for (int i = 0; i < 7; i++, memory += n) {
+        *kept[i] = memory;
+    }
+    events->y = memory, memory += states;
+    events->count = (long *)(void *)memory, memory += ROOM_OF(long, n);
+    events->leaving = (int *)(void *)memory, events->fired = events->leaving + n, events->touch = events->fired + n;
+    events->values_reset = shared, events->bracket = shared + events->n_resets;
+    events->whose = (int *)(void *)(events->bracket + 8 * n);
+    return memory + ROOM_OF(int, 3 * n);
+}
+
+/* Set up what is done single, W times, in so many doubles as the two functions above say. */
+static lane_single *lay_out_single(const eomgen_ensemble *e, const eomgen_thread *own, const lane_run *lanes, double *memory)
+{
+    const int n = e->n;
+    const eomgen_method *const method = e->method;
+    double *const w = memory, *const times = w + e->model->n_work, *const shared = times + e->n_eval;
+    lane_single *const all = (lane_single *)(void *)(memory + single_shared(e, own->events));
+    double *next = (double *)(void *)all + W * ROOM_OF(lane_single, 1);
+    for (int l = 0; l < W; l++) {
+        lane_single *const single = (lane_single *)(void *)((double *)(void *)all + l * ROOM_OF(lane_single, 1));
+        eomgen_run *const run = &single->run;
+        memset(single, 0, sizeof *single);
+        single->lanes = lanes, single->l = l, single->method = *method, single->method.prepare = prepare_single;
+        run->rhs = e->rhs, run->meeting = e->meeting, run->n_q = e->n_q;
+        run->signals = own->signals, run->n_u = e->model->n_u, run->n = n;
+        run->rtol = e->rtol, run->atol = e->atol, run->max_step = e->max_step;
+        run->direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
+        run->w = w, run->closed = e->model->closed_at ? w + e->model->closed_at : NULL;
+        double **const rows[] = { &run->y, &run->y_old, &run->f, &run->failure_state, &run->next };
+        for (int i = 0; i < 5; i++, next += n) {
+            *rows[i] = next;
+        }
+        run->K = next, run->F = run->K + method->rows_K * n, next = run->F + method->rows_F * n;
+        run->c = next, run->u = next + e->model->n_const, next = run->u + e->model->n_u;
+        if (own->events != NULL) {
+            next = lay_out_events(&single->events, own, n, next, shared);
+        }
+        single->trajectory.t_eval = e->t_eval, single->trajectory.n_eval = e->n_eval, single->trajectory.times = times;
+        single->trajectory.span = fabs(e->nodes[e->n_nodes - 1] - e->nodes[0]);
+        single->trajectory.events = own->events != NULL ? &single->events : NULL;
+        single->trajectory.notes = own->notes, single->trajectory.notes_room = own->notes_room;
+    }
+    return all;
+}
+
+static lane_single *single_of(const lane_run *run, int l)
+{
+    return (lane_single *)(void *)((double *)(void *)run->singles + l * ROOM_OF(lane_single, 1));
+}
+
+/* A lane takes trajectory k: its constants and inputs, and no event so far. */
+static void fill_single(const eomgen_ensemble *e, const lane_run *lanes, int l, ptrdiff_t k, const double *constants)
+{
+    lane_single *const single = single_of(lanes, l);
+    eomgen_run *const run = &single->run;
+    memcpy((double *)run->c, constants, (size_t)e->model->n_const * sizeof(double));
+    memcpy(run->u, e->u + k * e->u_stride, (size_t)e->model->n_u * sizeof(double));
+    run->step = run->t_old = 0.0, run->failure = 0, run->evaluations = 0;
+    if (single->trajectory.events != NULL) {
+        single->trajectory.states = e->n_eval > 0 ? e->samples + k * e->n_eval * e->n : NULL;
+        single->events.crowded = 0, single->events.last_reset = (double)NAN;
+        memset(single->events.count, 0, (size_t)single->events.n * sizeof(long));
+    }
+}
+
+/* The inputs of every lane at its time and state. */
+static EOMGEN_APART void play_lanes(lane_run *lanes, real t, const real *y)
+{
+    for (int l = 0; l < W; l++) {
+        eomgen_run *const run = &single_of(lanes, l)->run;
+        double *const state = run->failure_state; /* free until something fails */
+        if (!lanes->awake[l]) {
+            continue;
+        }
+        for (int i = 0; i < lanes->n; i++) {
+            state[i] = y[i][l];
+        }
+        run->hold = lanes->hold[l];
+        eomgen_force(run, t[l], state);
+        for (int i = 0; i < lanes->n_u; i++) {
+            lanes->u[i][l] = run->u[i];
+        }
+    }
+}
+
+/* The inputs of a lane where it stands. */
+static const double *inputs_single(const lane_run *lanes, int l)
+{
+    eomgen_run *const run = &single_of(lanes, l)->run;
+    double *const state = run->failure_state;
+    for (int i = 0; i < lanes->n; i++) {
+        state[i] = lanes->y[i][l];
+    }
+    run->hold = lanes->hold[l];
+    eomgen_force(run, lanes->t[l], state);
+    return run->u;
+}
+
+/* The lane's part of a run, as it stands after a step or at the start. */
+static eomgen_run *take_out(const lane_run *lanes, int l)
+{
+    eomgen_run *const run = &single_of(lanes, l)->run;
+    for (int i = 0; i < lanes->n; i++) {
+        run->y[i] = lanes->y[i][l], run->y_old[i] = lanes->y_old[i][l], run->f[i] = lanes->f[i][l];
+    }
+    run->t = lanes->t[l], run->t_old = lanes->t_old[l], run->t_bound = lanes->t_bound[l], run->hold = lanes->hold[l];
+    run->h_abs = lanes->size[l], run->until_callback = -1, run->interpolates = 0, run->stopped = 0;
+    run->evaluations = 0, run->failure = 0;
+    return run;
+}
+
+/* Back into the lane; whether the state is another. */
+static void put_back(lane_run *lanes, int l, const eomgen_run *run, int changed)
+{
+    lanes->evaluations[l] += run->evaluations;
+    if (run->failure != 0) {
+        lanes->failure[l] = run->failure, lanes->failure_time[l] = run->failure_time;
+    }
+    for (int i = 0; changed && i < lanes->n; i++) {
+        lanes->y[i][l] = run->y[i], lanes->f[i][l] = run->f[i];
+        if (lanes->closed != NULL) {
+            lanes->next[i][l] = run->next[i];
+        }
+    }
+    if (changed) {
+        lanes->t[l] = run->t, lanes->size[l] = run->h_abs;
+    }
+}
+
+/* Values of the events where a trajectory begins. */
+static void arm_lane(lane_run *lanes, int l)
+{
+    eomgen_run *const run = take_out(lanes, l);
+    eomgen_arm(run, &single_of(lanes, l)->events);
+    put_back(lanes, l, run, 0);
+}
+
+/* What the step of a lane brought: samples, events, resets; as eomgen_advance returns it, 0 to go on. */
+static EOMGEN_APART int end_lane_step(eomgen_ensemble *e, lane_run *lanes, int l)
+{
+    lane_single *const single = single_of(lanes, l);
+    eomgen_run *const run = take_out(lanes, l);
+    eomgen_trajectory *const trajectory = &single->trajectory;
+    const ptrdiff_t k = lanes->index[l];
+    run->step = run->t - run->t_old;
+    trajectory->done = trajectory->stored = lanes->done[l];
+    const double t = run->t;
+    const long resets = trajectory->resets;
+    const int status = eomgen_end_step(&single->method, run, trajectory);
+    eomgen_keep_notes(e, trajectory, k);
+    lanes->done[l] = trajectory->done;
+    put_back(lanes, l, run, run->t != t || trajectory->resets != resets);
+    return status;
+}
+
 /* The queue of trajectories and the rounds of steps. */
 /* Store what is asked for up to now of the lanes that have moved. */
 static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run *run, flag moved, double direction)
@@ -93,7 +403,7 @@ static EOMGEN_APART void fill_lane(eomgen_ensemble *e, lane_run *run, int l, dou
         }
         run->t[l] = run->t_old[l] = e->nodes[0];
         if (run->singles != NULL) {
-            fill_alone(e, run, l, k, constants);
+            fill_single(e, run, l, k, constants);
         }
         if (status != 0) {
             end_lane(e, run, l, EOMGEN_BAD_PARAMETERS);
@@ -122,7 +432,7 @@ static void advance_nodes(eomgen_ensemble *e, lane_run *run, double direction, d
 static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *run, int l, double direction, double least)
 {
     const eomgen_model *const model = e->model;
-    double *const x = run->alone, *const u = x + 2 * run->n, *const c = u + run->n_u, *const w = c + model->n_const;
+    double *const x = run->single, *const u = x + 2 * run->n, *const c = u + run->n_u, *const w = c + model->n_const;
     double found[5];
     for (int i = 0; i < run->n; i++) {
         x[i] = i < e->n_q ? run->y[i][l] : run->y[i][l] * direction;
@@ -132,7 +442,7 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
     }
     for (int i = 0; i < run->n_u; i++) {
         const int table = run->signals != NULL && run->signals[i].n > 0 && !run->plays;
-        u[i] = run->plays ? inputs_alone(run, l)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
+        u[i] = run->plays ? inputs_single(run, l)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
     }
     for (int i = 0; i < model->n_const; i++) {
         c[i] = run->c[i][l];
@@ -215,16 +525,16 @@ static const lane_method *find_method(const char *name)
 static int takes(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const lane_method *const method = find_method(e->method->name);
-    return method != NULL && (method != &lane_taylor || !has_alone(e, own));
+    return method != NULL && (method != &lane_taylor || !has_single(e, own));
 }
 
 static ptrdiff_t lane_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const lane_method *const method = find_method(e->method->name);
     const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
-    const ptrdiff_t each = e->model->n_work + e->model->n_u + e->model->n_const; /* alone, and in every lane */
-    const ptrdiff_t alone = has_alone(e, own) ? alone_shared(e, own->events) + W * alone_each(e, own->events) : 0;
-    return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further) + alone;
+    const ptrdiff_t each = e->model->n_work + e->model->n_u + e->model->n_const; /* single, and in every lane */
+    const ptrdiff_t single = has_single(e, own) ? single_shared(e, own->events) + W * single_each(e, own->events) : 0;
+    return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further) + single;
 }
 
 static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread *own, const lane_method *method, real *memory)
@@ -240,14 +550,14 @@ static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread
     run->y_old = run->y + n, run->f = run->y_old + n, run->z = run->f + n, run->next = run->z + n;
     run->K = run->next + n;
     run->closed = e->model->closed_at && method != &lane_taylor ? run->w + e->model->closed_at : NULL;
-    run->all = e, run->alone = own->memory + e->model->n_const;
+    run->all = e, run->single = own->memory + e->model->n_const;
     run->after = run->K + (TAYLOR_MOST + 1) * n, run->series_work = run->K + method->rows_K * n;
     run->F = run->series_work + eomgen_further(e->method, n, e->series);
     run->expand = (lane_series)e->lane_series;
     run->order = method == &lane_taylor ? taylor_order(e->rtol, e->series->most) : 0;
-    if (has_alone(e, own)) {
+    if (has_single(e, own)) {
         run->plays = plays_expressions(e, own);
-        run->singles = lay_out_alone(e, own, run, (double *)(run->F + method->rows_F * n));
+        run->singles = lay_out_single(e, own, run, (double *)(run->F + method->rows_F * n));
     }
 }
 
@@ -300,7 +610,7 @@ static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run
         sample_lanes(e, method, run, moved, direction);
     }
     for (int l = 0; has_events && l < W; l++) {
-        const int status = moved[l] ? settle_lane(e, run, l) : 0;
+        const int status = moved[l] ? end_lane_step(e, run, l) : 0;
         if (status != 0) {
             end_lane(e, run, l, status == EOMGEN_TERMINAL ? 1 : status);
             fill_lane(e, run, l, constants);
@@ -314,7 +624,7 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
     const lane_method *const method = find_method(e->method->name);
     const double direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
     double *const constants = own->memory, *memory = constants + e->model->n_const;
-    memory += e->model->n_work + e->model->n_u + e->model->n_const + 2 * e->n; /* of lanes that are evaluated alone */
+    memory += e->model->n_work + e->model->n_u + e->model->n_const + 2 * e->n; /* of lanes that are evaluated single */
     memory += (W - ((uintptr_t)memory / sizeof(double)) % W) % W; /* vectors lie at multiples of their size */
     lane_run run;
     lay_out(&run, e, own, method, (real *)memory);

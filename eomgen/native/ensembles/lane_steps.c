@@ -28,7 +28,7 @@ typedef struct {
     real *after, *series_work; /* of Taylor: coefficients at the ends of the steps, and the series' work */
     real *closed, *next; /* in w and beside: as in eomgen_run, or NULL */
     const eomgen_ensemble *all;
-    double *alone; /* room of the function of one state: x, x', u, c, w */
+    double *single; /* room of the function of one state: x, x', u, c, w */
     int calls;
     flag active, begins, awake, again; /* has a trajectory; needs x' and a first step; evaluations count; was rejected */
     real size, size_before, t_new, t_bound; /* size_before: as it was before the last step */
@@ -37,7 +37,7 @@ typedef struct {
     double failure_time[W];
     ptrdiff_t index[W], done[W]; /* trajectory; samples stored */
     int node[W];
-    struct lane_alone *singles; /* what is done for each lane alone, or NULL */
+    struct lane_single *singles; /* what is done for each lane single, or NULL */
     int plays;                  /* whether inputs are expressions */
 } lane_run;
 
@@ -53,10 +53,10 @@ typedef struct {
 } lane_method;
 
 /* x' of one lane by the function of one state, into k; its status. */
-static int evaluate_alone(lane_run *run, int l, real t, const real *y, real *k)
+static int evaluate_single(lane_run *run, int l, real t, const real *y, real *k)
 {
     const eomgen_model *const model = run->all->model;
-    double *const x = run->alone, *const out = x + run->n, *const u = out + run->n, *const c = u + run->n_u, *const w = c + model->n_const;
+    double *const x = run->single, *const out = x + run->n, *const u = out + run->n, *const c = u + run->n_u, *const w = c + model->n_const;
     for (int i = 0; i < run->n; i++) {
         x[i] = y[i][l];
     }
@@ -97,7 +97,7 @@ static EOMGEN_APART flag complete_lanes(lane_run *run, real t, const real *y, re
 {
     flag failed = { 0 };
     for (int l = 0; l < W; l++) {
-        codes[l] = left[l] ? evaluate_alone(run, l, t, y, k) : 0;
+        codes[l] = left[l] ? evaluate_single(run, l, t, y, k) : 0;
         failed[l] = codes[l] != 0 ? -1 : 0;
     }
     return failed;

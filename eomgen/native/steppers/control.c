@@ -205,3 +205,95 @@ void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, doub
     }
     EOMGEN_METHOD(method, interpolate)(run, t, y);
 }
+
+/* Inputs over time: the value of a table or of an expression. */
+
+double eomgen_table_value(const eomgen_signal *s, double t, double hold)
+{
+    int low = 0, high = s->n - 1;
+    const int size = s->order >= 3 ? 4 : 1;
+    const double at = (s->order == 0 || s->order == 4) && !isnan(hold) ? hold : t; /* picks the piece */
+    if (at <= s->times[0] || high == 0) {
+        return s->values[0];
+    }
+    if (at >= s->times[high]) {
+        return s->values[high * size];
+    }
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (s->times[middle] <= at) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const double x = t - s->times[low], *const v = s->values + low * size;
+    if (s->order == 0 || s->order == 2) {
+        return v[0];
+    }
+    if (s->order == 1) {
+        return v[0] + x * ((v[1] - v[0]) / (s->times[low + 1] - s->times[low]));
+    }
+    return v[0] + x * (v[1] + x * (v[2] + x * v[3]));
+}
+
+void eomgen_force(eomgen_run *run, double t, const double *y)
+{
+#ifndef EOMGEN_ALONE
+    if (run->ask != NULL) {
+        run->stopped = run->ask(run->callback_data, t, y, run->u, NULL) != 0 || run->stopped;
+        return;
+    }
+#endif
+    for (int i = 0; i < run->n_u; i++) {
+        const eomgen_signal *const s = run->signals + i;
+#ifndef EOMGEN_ALONE
+        if (s->n > 0 && s->tape != NULL) {
+            eomgen_play(s->tape, t, y, run->u, run->c, run->u + i);
+            continue;
+        }
+#else
+        (void)y;
+#endif
+        if (s->n > 0) {
+            run->u[i] = eomgen_table_value(s, t, run->hold);
+        }
+    }
+}
+
+#include "eomgen_real.h"
+
+#ifndef EOMGEN_ALONE
+/* Expressions given at run time, one instruction after the other: the operations of the graph that models are made of. */
+/* EOMGEN_TAPE(X) lists X(name, value of a, b, c) for each row of the table of operations; leaves come before. */
+#define NAME_OF(NAME, VALUE) #NAME,
+#define CODE_OF(NAME, VALUE) TAPE_##NAME,
+#define CASE_OF(NAME, VALUE) case TAPE_##NAME: r[k] = (VALUE); break;
+
+/* The names in the order of the codes. */
+const char *const eomgen_operations[] = {"const", "t", "x", "u", "p", EOMGEN_TAPE(NAME_OF) NULL};
+
+enum { TAPE_CONST, TAPE_T, TAPE_X, TAPE_U, TAPE_P, EOMGEN_TAPE(CODE_OF) TAPE_END };
+
+void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out)
+{
+    double *const r = tape->results;
+    for (int k = 0; k < tape->n; k++) {
+        const int *const at = tape->code + 4 * k;
+        const int i = at[1];
+        const double a = at[0] > TAPE_P ? r[i] : 0.0, b = r[at[2]], c = r[at[3]]; /* unused operands name an earlier result */
+        switch (at[0]) {
+        case TAPE_CONST: r[k] = tape->numbers[i]; break;
+        case TAPE_T: r[k] = t; break;
+        case TAPE_X: r[k] = y[i]; break;
+        case TAPE_U: r[k] = u[i]; break;
+        case TAPE_P: r[k] = p[i]; break;
+        EOMGEN_TAPE(CASE_OF)
+        default: r[k] = (double)NAN;
+        }
+    }
+    for (int k = 0; k < tape->n_out; k++) {
+        out[k] = r[tape->out[k]];
+    }
+}
+#endif

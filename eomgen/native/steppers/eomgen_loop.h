@@ -1,4 +1,4 @@
-/* Whole trajectories in C: no Python, no memory of its own, one eomgen_run and one eomgen_journey for each, so that many
+/* Whole trajectories in C: no Python, no memory of its own, one eomgen_run and one eomgen_trajectory for each, so that many
    can run at the same time. The caller owns every array. */
 #ifndef EOMGEN_LOOP_H
 #define EOMGEN_LOOP_H
@@ -66,7 +66,7 @@ typedef struct {
     double *trail;
     long node, done, stored, n_pieces, n_notes, n_trail, resets; /* start at 0; the caller may take rows and set back their counts */
     int begun, ended;
-} eomgen_journey;
+} eomgen_trajectory;
 
 enum {
     EOMGEN_FULL = 0,     /* an array is full: take what is there and call again */
@@ -78,21 +78,21 @@ enum {
 };
 
 /* Go on until something of the above, or a failure of eomgen_step. */
-int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+int eomgen_advance(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *trajectory);
 
 /* Go on from the present time at another state: that of run->y, which the caller has changed. 0 or EOMGEN_ZENO. */
-int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *trajectory);
 
 /* What the last step brought: output, events, resets; 0 to go on, or something of the above. */
-int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+int eomgen_end_step(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *trajectory);
 
 /* Events: values at the start; zeros of the last step in order, noted, up to one at which the run stops, at *t. Returns
    whether it stops, 2 if it is to end there, -1 if the caller's own events stopped the run, -2 if resets die away. */
 void eomgen_arm(eomgen_run *run, eomgen_events *events);
-int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey, double *t);
+int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *trajectory, double *t);
 /* Right before a reset: how fast values come. */
-void eomgen_arrive(eomgen_run *run, eomgen_events *events);
+void eomgen_before_reset(eomgen_run *run, eomgen_events *events);
 /* After a reset: which side of zero it led to. Not 0 if it led nowhere. */
-int eomgen_depart(eomgen_run *run, eomgen_events *events);
+int eomgen_after_reset(eomgen_run *run, eomgen_events *events);
 
 #endif

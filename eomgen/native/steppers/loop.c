@@ -4,7 +4,7 @@
 
 #include "eomgen_loop.h"
 
-static void store(const eomgen_run *run, eomgen_journey *j, double t, const double *y)
+static void store(const eomgen_run *run, eomgen_trajectory *j, double t, const double *y)
 {
     j->times[j->stored] = t;
     memcpy(j->states + j->stored * run->n, y, (size_t)run->n * sizeof(double));
@@ -12,7 +12,7 @@ static void store(const eomgen_run *run, eomgen_journey *j, double t, const doub
 }
 
 /* A step, or a state after a reset, where every step is stored or followed. */
-static void store_step(const eomgen_run *run, eomgen_journey *j)
+static void store_step(const eomgen_run *run, eomgen_trajectory *j)
 {
     if (j->n_eval < 0) {
         store(run, j, run->t, run->y);
@@ -24,13 +24,13 @@ static void store_step(const eomgen_run *run, eomgen_journey *j)
 }
 
 /* Begin the part that ends at the next corner. */
-static void begin_part(eomgen_run *run, const eomgen_journey *j)
+static void begin_part(eomgen_run *run, const eomgen_trajectory *j)
 {
     run->t_bound = j->nodes[j->node];
     run->hold = run->t + 0.5 * (run->t_bound - run->t);
 }
 
-static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+static void begin(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j)
 {
     j->begun = 1;
     run->direction = j->nodes[j->n_nodes - 1] < run->t ? -1.0 : 1.0;
@@ -47,7 +47,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     }
 }
 
-static void keep_piece(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double end)
+static void keep_piece(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j, double end)
 {
     const int n = run->n;
     double *const row = j->pieces + j->n_pieces++ * (3 + n * (1 + method->rows_F));
@@ -57,7 +57,7 @@ static void keep_piece(const eomgen_method *method, eomgen_run *run, eomgen_jour
     memcpy(row + 3 + n, run->F, (size_t)(n * method->rows_F) * sizeof(double));
 }
 
-int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j)
 {
     eomgen_events *const ev = j->events;
     int changes = 0;
@@ -72,11 +72,11 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
         ev->last_reset = run->t;
         j->resets++;
     }
-    return (eomgen_depart(run, ev) && changes) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
+    return (eomgen_after_reset(run, ev) && changes) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */
-static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j)
 {
     eomgen_events *const ev = j->events;
     for (int i = 0; i < ev->n_model; i++) {
@@ -113,7 +113,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
     return eomgen_jump(method, run, j);
 }
 
-int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+int eomgen_end_step(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j)
 {
     double t = run->t;
     const int stop = j->events != NULL ? eomgen_find_events(method, run, j, &t) : 0;
@@ -136,7 +136,7 @@ int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         eomgen_between(method, run, t, j->events->y);
         memcpy(run->y, j->events->y, (size_t)run->n * sizeof(double));
         run->t = t;
-        eomgen_arrive(run, j->events);
+        eomgen_before_reset(run, j->events);
     }
     store_step(run, j);
     if (stop == 2) {
@@ -150,7 +150,7 @@ int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     return stop ? apply_resets(method, run, j) : 0;
 }
 
-int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+int eomgen_advance(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j)
 {
     if (!j->begun) {
         begin(method, run, j);
@@ -163,7 +163,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         }
         const double h_abs = run->h_abs;
         int status = eomgen_step(method, run);
-        status = status != 0 ? status : eomgen_settle(method, run, j);
+        status = status != 0 ? status : eomgen_end_step(method, run, j);
         if (status != 0) {
             return status;
         }

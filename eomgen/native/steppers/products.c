@@ -1,3 +1,9 @@
+/* Loops over rows of matrices, until dense_end.c, are worth more of gcc's work than the rest of this file. */
+#if defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__)
+#pragma GCC push_options
+#pragma GCC optimize("O2", "tree-vectorize")
+#endif
+
 /* Products of dense row-major matrices, two numbers at a time; every entry is summed in the order
    of its terms, and nothing is contracted, so that the bits are the same everywhere. */
 #include "eomgen_real.h"

@@ -1,4 +1,283 @@
-# Journeys: whole trajectories by eomgen_loop.h, with a call of Python every few milliseconds.
+# Steppers: the explicit Runge-Kutta methods of eomgen_steppers.h over the model's right-hand side.
+
+cdef class Tape:
+    """An expression of t, x, u and p given at run time.
+
+    Parameters
+    ----------
+    code : sequence of (operation, i, j, k)
+        Operations by name; operands are earlier instructions, or an index into numbers, x, u or p.
+    numbers : sequence of float
+    out : sequence of int
+        Instructions whose results are wanted.
+    """
+
+    cdef eomgen_tape tape
+    cdef cnp.ndarray code, numbers, out, results
+
+    def __cinit__(self, code, numbers, out):
+        self.code = np.array([(TAPES[row[0]], *row[1:]) for row in code], dtype=np.intc).reshape(-1, 4)
+        self.numbers, self.out = np.array(numbers, dtype=float), np.array(out, dtype=np.intc)
+        self.results = np.zeros(len(code) + 1)
+        self.tape.n, self.tape.n_out = len(code), len(out)
+        self.tape.code = <const int *>cnp.PyArray_DATA(self.code)
+        self.tape.numbers = <const double *>cnp.PyArray_DATA(self.numbers)
+        self.tape.out = <const int *>cnp.PyArray_DATA(self.out)
+        self.tape.results = <double *>cnp.PyArray_DATA(self.results)
+
+
+cdef dict TAPES = {}
+cdef int _code = 0
+while eomgen_operations[_code] != NULL:
+    TAPES[eomgen_operations[_code].decode()] = _code
+    _code += 1
+
+
+cdef cnp.ndarray numbers_of(list given):
+    """A list of floats as an array: quicker than NumPy's for the few of a run."""
+    cdef cnp.npy_intp n = len(given), i
+    cdef cnp.ndarray result = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
+    cdef double *data = <double *>cnp.PyArray_DATA(result)
+    for i in range(n):
+        data[i] = given[i]
+    return result
+
+
+cdef class Interpolant:
+    """The solution within one step: ``f(t)`` for t (k,) gives (n, k), for one number (n,)."""
+
+    cdef eomgen_run run
+    cdef const eomgen_method *method
+    cdef cnp.ndarray memory
+    cdef readonly double t_old, t
+
+    def __call__(self, t):
+        cdef cnp.ndarray flat = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError)), result
+        cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
+        cdef int j
+        cdef double *at = <double *>cnp.PyArray_DATA(flat)
+        cdef cnp.ndarray state = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)  # of this call: threads may share the object
+        cdef double *y = <double *>cnp.PyArray_DATA(state)
+        cdef double *out
+        if cnp.PyArray_NDIM(flat) == 0:
+            self.method.interpolate(&self.run, at[0], y)
+            return state
+        result = rows(n, k)
+        out = <double *>cnp.PyArray_DATA(result)
+        for i in range(k):
+            self.method.interpolate(&self.run, at[i], y)
+            for j in range(n):
+                out[j * k + i] = y[j]
+        return result
+
+    @property
+    def t_min(self):
+        return min(self.t_old, self.t)
+
+    @property
+    def t_max(self):
+        return max(self.t_old, self.t)
+
+
+cdef const eomgen_signal *make_signals(signals, int n_u, list held) except? NULL:
+    """The inputs over time as C reads them, in arrays that `held` keeps alive."""
+    cdef eomgen_signal *table
+    cdef cnp.npy_intp bytes = n_u * sizeof(eomgen_signal)
+    if not signals:
+        return NULL
+    memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
+    table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
+    held.append(memory)
+    for index, *given in signals:
+        if len(given) == 1:
+            tape = Tape(*given[0])
+            held.append(tape)
+            table[<int>index].n, table[<int>index].tape = 1, &(<Tape>tape).tape
+            continue
+        order, times, values = given
+        pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
+        held.extend(pair)
+        table[<int>index].n, table[<int>index].order = len(times), order
+        table[<int>index].times = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[0])
+        table[<int>index].values = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[1])
+    return table
+
+
+cdef class Stepper:
+    """One integration of the right-hand side.
+
+    Parameters
+    ----------
+    method : str
+        One of ``methods``.
+    context : Context
+        Parameters and inputs.
+    t0, t_bound : float
+        Start and end.
+    y0 : (n_x,) array
+    rtol : float
+    atol : float or (n_x,) array
+    max_step, first_step : float
+        A first step of 0 is chosen.
+    signals : list of (index, order, times, values) or (index, (code, numbers, out)), optional
+        Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values; or an expression.
+    plan : dict, optional
+        Of a Run; then the first evaluation is left to it, and each step starts on the constraints.
+
+    Attributes
+    ----------
+    t, t_old, evaluations, rejected, differentiations, factorizations
+        Time, time before the last step, calls of the right-hand side so far, steps tried in vain; of implicit methods,
+        calls of the Jacobian and matrices factored.
+    """
+
+    cdef eomgen_run run
+    cdef const eomgen_method *method
+    cdef Context context
+    cdef cnp.ndarray memory, atol
+    cdef list held
+
+    def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
+                  double max_step, double first_step=0.0, signals=(), plan=None):
+        cdef Model model = context.model
+        cdef const eomgen_model *table = model.table
+        cdef const eomgen_kernel *rhs = model.kernel("rhs")
+        cdef int n = len(y0)
+        self.method = &CALLED if method == "called" else model.method(method)
+        self.context, self.held = context, []
+        if isinstance(atol, float):
+            self.atol = numbers_of([atol] * n)
+        else:
+            self.atol = np.array(vector(atol, n, "atol", ValueError))
+        cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
+        cdef cnp.npy_intp length = table.n_work + table.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
+        if self.method.squares > 0:
+            self.run.jacobian = model.kernel("jacobian").call
+        if "meeting_time" in model.places:
+            self.run.meeting = model.kernel("meeting_time").call
+        self.run.n_q, self.run.n_beside = model.n_q, n - rhs.n_in
+        if method != "called" and n != rhs.n_in:
+            raise ValueError(f"y0 must have shape ({rhs.n_in},)")
+        cdef const eomgen_series *series = seen_series(model.series)
+        self.run.series = series
+        length += eomgen_further(self.method, n, series)
+        self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
+        cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
+        cdef eomgen_run *run = &self.run
+        run.rhs, run.n, run.n_u = rhs.call, n, table.n_u
+        run.c = <const double *>cnp.PyArray_DATA(context.c)
+        run.w = free
+        run.u = run.w + table.n_work
+        run.y = run.u + table.n_u
+        run.y_old = run.y + n
+        run.f = run.y_old + n
+        run.failure_state = run.f + n
+        run.next = run.failure_state + n
+        run.closed = run.w + table.closed_at if plan is not None and table.closed_at else NULL
+        run.K = run.next + n
+        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, series)
+        memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
+        memcpy(run.u, cnp.PyArray_DATA(context.u), table.n_u * sizeof(double))
+        run.atol = <const double *>cnp.PyArray_DATA(self.atol)
+        run.rtol, run.max_step, run.h_abs = rtol, max_step, first_step
+        run.t = run.t_old = t0
+        run.t_bound, run.direction, run.hold = t_bound, -1.0 if t_bound < t0 else 1.0, NAN
+        run.signals = make_signals(signals, table.n_u, self.held)
+        if plan is None:
+            eomgen_start(self.method, run)
+            tell_raised()
+
+    def step(self):
+        """Take one step; False if it would have to be too small."""
+        cdef int status = eomgen_step(self.method, &self.run)
+        tell_raised()
+        return status == 0
+
+    def state(self):
+        """A copy of the state (n_x,)."""
+        return copy(self.run.y, self.run.n)
+
+    def interpolant(self):
+        """The solution within the last step."""
+        cdef Interpolant result = Interpolant.__new__(Interpolant)
+        cdef int n = self.run.n
+        eomgen_between(self.method, &self.run, self.run.t, self.run.next)  # forms the coefficients
+        tell_raised()
+        result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
+        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
+        result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
+        cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
+        memcpy(data, self.run.y_old, n * sizeof(double))
+        memcpy(data + n, self.run.F, n * self.method.rows_F * sizeof(double))
+        result.run.y_old, result.run.F = data, data + n
+        return result
+
+    @property
+    def t(self):
+        return self.run.t
+
+    @property
+    def t_old(self):
+        return self.run.t_old
+
+    @property
+    def evaluations(self):
+        return self.run.evaluations
+
+    @property
+    def rejected(self):
+        return self.run.rejected
+
+    @property
+    def differentiations(self):
+        return self.run.differentiations
+
+    @property
+    def factorizations(self):
+        return self.run.factorizations
+
+    @property
+    def failure(self):
+        """(status, t, x) of the last evaluation that failed, or None."""
+        if self.run.failure == 0:
+            return None
+        return self.run.failure, self.run.failure_time, copy(self.run.failure_state, self.run.n)
+
+
+cdef cnp.ndarray target(out, cnp.npy_intp n, error):
+    """The array (n,) that a state is written into."""
+    if not (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
+            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_NDIM(<cnp.ndarray>out) == 1
+            and cnp.PyArray_DIM(<cnp.ndarray>out, 0) == n):
+        raise error(f"out must be a contiguous writeable float64 array of shape ({n},)")
+    return out
+
+
+def march(Context context not None, t, h, x, u=None, out=None, error=ValueError):
+    """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
+    cdef const eomgen_model *table = context.model.table
+    cdef const eomgen_kernel *rhs = context.model.kernel("rhs")
+    cdef int n = rhs.n_in, status
+    cdef double begin = finite(t, "t", error), size = finite(h, "h", error)
+    cdef cnp.ndarray start = vector(x, n, "x", error), inputs = context.u
+    cdef cnp.npy_intp length = n, n_work = table.n_work + 5 * n
+    cdef double[STACK] stack
+    cdef double *w = stack
+    cdef cnp.ndarray result
+    if u is not None:
+        inputs = vector(u, table.n_u, "u", error)
+    result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, error)
+    if n_work > STACK:
+        heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
+        w = <double *>cnp.PyArray_DATA(heap)
+    status = eomgen_march(rhs.call, n, begin, size, <double *>cnp.PyArray_DATA(start),
+                          <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
+                          <double *>cnp.PyArray_DATA(result), w, w + table.n_work)
+    tell_raised()
+    return status, result
+
+
+# Runs: whole trajectories by eomgen_loop.h, with a call of Python every few milliseconds.
 
 from cpython.exc cimport PyErr_CheckSignals
 from libc.math cimport INFINITY, isnan
@@ -37,7 +316,7 @@ cdef extern from "eomgen_loop.h" nogil:
         double *latest
         double last_reset
         int crowded, for_slope
-    ctypedef struct eomgen_journey:
+    ctypedef struct eomgen_trajectory:
         const double *nodes
         long n_nodes
         const double *t_eval
@@ -56,16 +335,16 @@ cdef extern from "eomgen_loop.h" nogil:
         long node, done, stored, n_pieces, n_notes, n_trail, resets
         int begun
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED, EOMGEN_STOPPED
-    int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
-    int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
+    int eomgen_advance(const eomgen_method *, eomgen_run *, eomgen_trajectory *) noexcept
+    int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_trajectory *) noexcept
 
 
 cdef long call_python(void *callback_data, const double *t) noexcept with gil:
-    return (<Journey>callback_data).callback(t[0])
+    return (<Run>callback_data).callback(t[0])
 
 
 cdef int ask_outside(void *asker, double t, const double *y, double *g) noexcept with gil:
-    return (<Journey>asker).ask(t, y, g)
+    return (<Run>asker).ask(t, y, g)
 
 
 cdef class Dense:
@@ -99,7 +378,7 @@ cdef class Dense:
         return np.ascontiguousarray(result.T)
 
 
-cdef class Journey(Stepper):
+cdef class Run(Stepper):
     """A whole integration in C.
 
     Parameters
@@ -121,7 +400,7 @@ cdef class Journey(Stepper):
         Whether all states of the outcome are.
     """
 
-    cdef eomgen_journey journey
+    cdef eomgen_trajectory trajectory
     cdef eomgen_events events
     cdef object watch, stall_check, outside
     cdef long seen
@@ -134,18 +413,18 @@ cdef class Journey(Stepper):
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
-        cdef eomgen_journey *journey = &self.journey
+        cdef eomgen_trajectory *trajectory = &self.trajectory
         self.stored, self.raised, self.stride = [[], [], [], [], []], None, 16
         cdef cnp.ndarray nodes = numbers_of(list(plan["nodes"]))
         self.held.append(nodes)
-        journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(nodes), cnp.PyArray_DIM(nodes, 0)
-        journey.span, journey.n_eval = abs(t_bound - t0), -1
+        trajectory.nodes, trajectory.n_nodes = <const double *>cnp.PyArray_DATA(nodes), cnp.PyArray_DIM(nodes, 0)
+        trajectory.span, trajectory.n_eval = abs(t_bound - t0), -1
         if plan["t_eval"] is not None:
             asked = self.hold(plan["t_eval"], float)
-            journey.t_eval, journey.n_eval = <const double *>cnp.PyArray_DATA(<cnp.ndarray>asked), len(asked)
-        journey.pieces_room = 256 if plan["dense"] else 0
+            trajectory.t_eval, trajectory.n_eval = <const double *>cnp.PyArray_DATA(<cnp.ndarray>asked), len(asked)
+        trajectory.pieces_room = 256 if plan["dense"] else 0
         self.most = plan.get("trail", 0)
-        journey.trail_room = 256 if self.most > 0 and journey.n_eval >= 0 else 0
+        trajectory.trail_room = 256 if self.most > 0 and trajectory.n_eval >= 0 else 0
         if plan["events"] is not None:
             self.expect(**plan["events"])
         self.allocate(512)
@@ -193,11 +472,11 @@ cdef class Journey(Stepper):
         ev.count = <long *>self.work(n, np.dtype("l"))
         cdef int *whole = <int *>self.work(5 * n, np.intc)
         ev.leaving, ev.fired, ev.touch, ev.whose = whole, whole + n, whole + 2 * n, whole + 3 * n
-        self.journey.events = ev
+        self.trajectory.events = ev
 
     cdef allocate(self, long room):
         """Room for results, after what is there has been taken out."""
-        cdef eomgen_journey *j = &self.journey
+        cdef eomgen_trajectory *j = &self.trajectory
         cdef int n = self.run.n
         cdef cnp.npy_intp long_room
         if j.n_eval >= 0:
@@ -222,7 +501,7 @@ cdef class Journey(Stepper):
 
     cdef take(self):
         """Take out what has been stored."""
-        cdef eomgen_journey *j = &self.journey
+        cdef eomgen_trajectory *j = &self.trajectory
         if j.n_eval < 0:
             self.stored[0].append(self.times[:j.stored])
             self.stored[1].append(self.states[:j.stored])
@@ -242,15 +521,15 @@ cdef class Journey(Stepper):
                 j.trail_room = 0
             j.n_trail = 0
 
-    def travel(self):
+    def proceed(self):
         """Go on without the GIL until the end (1), a terminal event (2), an event that waits (3), or a failure (< 0)."""
         cdef int status
         while True:
             with nogil:
-                status = eomgen_travel(self.method, &self.run, &self.journey)
+                status = eomgen_advance(self.method, &self.run, &self.trajectory)
             if status != EOMGEN_FULL:
                 return self.tell(status)
-            room = min(2 * max(self.journey.room, 256), 1 << 16)
+            room = min(2 * max(self.trajectory.room, 256), 1 << 16)
             self.take()
             self.allocate(room)
 
@@ -259,12 +538,12 @@ cdef class Journey(Stepper):
         cdef cnp.ndarray state = vector(x, self.run.n, "x", ValueError)
         cdef int status
         memcpy(self.run.y, cnp.PyArray_DATA(state), self.run.n * sizeof(double))
-        if (self.journey.n_eval < 0 and self.journey.stored + 2 > self.journey.room) or (
-                self.journey.trail_room > 0 and self.journey.n_trail + 2 > self.journey.trail_room):
+        if (self.trajectory.n_eval < 0 and self.trajectory.stored + 2 > self.trajectory.room) or (
+                self.trajectory.trail_room > 0 and self.trajectory.n_trail + 2 > self.trajectory.trail_room):
             self.take()
-            self.allocate(self.journey.room)
+            self.allocate(self.trajectory.room)
         with nogil:
-            status = eomgen_jump(self.method, &self.run, &self.journey)
+            status = eomgen_jump(self.method, &self.run, &self.trajectory)
         return self.tell(status)
 
     cdef int tell(self, int status):
@@ -286,7 +565,7 @@ cdef class Journey(Stepper):
 
     def outcome(self):
         """Times (k,), states (n_x, k), and rows (event, t, state) of events, in order; None without events."""
-        cdef eomgen_journey *j = &self.journey
+        cdef eomgen_trajectory *j = &self.trajectory
         if j.n_eval >= 0:
             pair = [[self.times[:j.stored]], [self.states[:j.stored]]]
             self.take()
@@ -319,7 +598,7 @@ cdef class Journey(Stepper):
 
     @property
     def resets(self):
-        return self.journey.resets
+        return self.trajectory.resets
 
     cdef long callback(self, double t):
         now = self.called_at

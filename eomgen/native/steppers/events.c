@@ -1,8 +1,221 @@
-/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again. */
+/* Events: zeros of functions of time and state within a step, by the dense output. A change of sign is found as SciPy's
+   solve_ivp does; a value that comes to zero and back within one step is looked for as well. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "eomgen_loop.h"
+
+static int event_values(eomgen_run *run, eomgen_events *ev, double t, const double *y, double *g)
+{
+    if (!EOMGEN_HAS_EVENTS(ev) && ev->tape == NULL && ev->outside == NULL) {
+        return 0;
+    }
+    if (run->signals != NULL) {
+        eomgen_force(run, t, y);
+    }
+    for (int i = 0; i < ev->n_model; i++) {
+        g[i] = (double)NAN; /* if nothing is written */
+    }
+    const int status = EOMGEN_HAS_EVENTS(ev) ? EOMGEN_EVENTS(ev)(t, y, run->u, run->c, g, run->w) : 0;
+    if (status != 0 && status != EOMGEN_NON_FINITE) {
+        for (int i = 0; i < ev->n_model; i++) {
+            g[i] = (double)NAN;
+        }
+    }
+#ifndef EOMGEN_ALONE
+    if (ev->tape != NULL) {
+        eomgen_play(ev->tape, t, y, run->u, run->c, g + ev->n_model);
+    }
+    if (ev->outside != NULL && ev->outside(ev->asker, t, y, g + ev->n_model + ev->n_tape) != 0) {
+        run->stopped = 1;
+    }
+#endif
+    for (int i = 0; i < ev->n; i++) {
+        if (!isfinite(g[i])) {
+            g[i] = (double)NAN; /* no event here, and none of the others' business */
+        }
+    }
+    return run->stopped;
+}
+
+/* Rates of the values along the motion, by a short way along x', onward (1) or back (-1): at the end of a step by a way
+   beyond it, at the beginning of the next by a way before it, so that a value that turns just there is looked at in both. */
+static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, double *slope, double way)
+{
+    double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs;
+    if (length == 0.0) { /* at the end of a part, where no step is chosen */
+        length = run->t - run->t_old;
+    }
+    const double least = RUNS_MOMENTARY * fmax(fabs(run->t), 1.0);
+    if (fabs(length) < least) { /* a step that ends with a part of the run may be as short as rounding */
+        length = run->direction * least;
+    }
+    const double h = way * RUNS_ASIDE * length;
+    for (int i = 0; i < run->n; i++) {
+        ev->y[i] = run->y[i] + h * run->f[i];
+    }
+    ev->for_slope = 1;
+    event_values(run, ev, run->t + h, ev->y, slope);
+    ev->for_slope = 0;
+    for (int i = 0; i < ev->n; i++) {
+        slope[i] = (slope[i] - g[i]) / h;
+    }
+}
+
+void eomgen_arm(eomgen_run *run, eomgen_events *ev)
+{
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
+    for (int i = 0; i < ev->n; i++) {
+        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->touch[i] = 0, ev->latest[i] = (double)NAN;
+    }
+}
+
+void eomgen_before_reset(eomgen_run *run, eomgen_events *ev)
+{
+    eomgen_evaluate(run, run->t, run->y, run->f);
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
+}
+
+int eomgen_after_reset(eomgen_run *run, eomgen_events *ev)
+{
+    int stuck = 0;
+    for (int i = 0; i < ev->n; i++) {
+        const double came = run->direction * ev->slope[i] * (ev->leaving[i] == 0 ? ev->fired[i] : 0);
+        const int at_zero = fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i]; /* not beyond a jump of an input */
+        /* it goes the other way: less than the accuracy is left */
+        stuck = stuck || (at_zero && abs(ev->fired[i]) == 1 && came < 0.0);
+        ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
+        ev->touch[i] = !at_zero && !ev->fired[i] && ev->action[i] == EOMGEN_RESET && abs(ev->direction[i]) == 1;
+    }
+    run->step = 0.0;
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
+    for (int i = 0; i < ev->n; i++) {
+        if (ev->touch[i] && fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i]) {
+            ev->leaving[i] = ev->direction[i]; /* what a reset brings to zero has not fallen to it */
+        }
+        ev->touch[i] = 0;
+        if (!ev->fired[i] || ev->action[i] == EOMGEN_GO_ON) {
+            ev->fired[i] = 0;
+            continue;
+        }
+        const double rate = run->direction * ev->slope[i];
+        const int touching = fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i];
+        const int through = ev->action[i] == EOMGEN_WAIT && rate < 0.0; /* a gap that goes on closing */
+        if (ev->leaving[i] != 0) { /* it only touched zero */
+            ev->fired[i] = 0;
+            continue;
+        }
+        stuck = stuck || (touching && (through || !(fabs(rate) > RUNS_TOUCHING * ev->trial[i])));
+        ev->leaving[i] = touching ? (rate > 0.0 ? 1 : -1) : 0;
+        ev->fired[i] = 0;
+    }
+    return stuck;
+}
+
+/* Value of event i at time t of the last step. */
+static double value_at(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double t)
+{
+    eomgen_between(method, run, t, ev->y);
+    event_values(run, ev, t, ev->y, ev->trial);
+    return ev->trial[i];
+}
+
+#include <float.h>
+
+/* The edge of the domain of a value, between a time where it is a number and one where it is none: the last time found
+   where it is one, and its value there; no further than to where its sign is another. */
+static void domain_edge(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *in, double *g, double out)
+{
+    const double first = *g;
+    for (int k = 0; k < RUNS_HALVED && *g != 0.0 && (*g > 0.0) == (first > 0.0); k++) {
+        const double t = 0.5 * (*in + out), value = value_at(method, run, ev, i, t);
+        if (isnan(value)) {
+            out = t;
+        } else {
+            *in = t, *g = value;
+        }
+    }
+}
+
+/* From a bracket within which, at a time, the value is no number, to one on either side of that gap; 0 if none is there. */
+static int leave_gap(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *bracket, double gap)
+{
+    double first[4] = {bracket[0], bracket[0], bracket[2], bracket[2]};
+    domain_edge(method, run, ev, i, &first[1], &first[3], gap);
+    if (first[3] == 0.0 || (first[3] > 0.0) != (first[2] > 0.0)) {
+        memcpy(bracket, first, sizeof first);
+        return 1;
+    }
+    double last[4] = {bracket[1], bracket[1], bracket[3], bracket[3]};
+    domain_edge(method, run, ev, i, &last[0], &last[2], gap);
+    memcpy(bracket, last, sizeof last);
+    return last[2] == 0.0 || (last[2] > 0.0) != (last[3] > 0.0);
+}
+
+/* The zero between a and b, where the values fa and fb differ in sign: R. P. Brent, Algorithms for Minimization without
+   Derivatives, 1973, chapter 4; to four roundings, like SciPy's. Where the value jumps,
+   the far side of the jump: a run that goes on from the near one would meet it again. NaN, and when, where the value is
+   no number. */
+static double zero_of_numbers(
+    const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket, double *gap)
+{
+    double a = bracket[0], b = bracket[1], fa = bracket[2], fb = bracket[3], c = a, fc = fa, d = b - a, e = d;
+    for (int k = 0; k < 100 && fb != 0.0; k++) {
+        if (fb * fc > 0.0) {
+            c = a, fc = fa, d = e = b - a;
+        }
+        if (fabs(fc) < fabs(fb)) {
+            a = b, b = c, c = a;
+            fa = fb, fb = fc, fc = fa;
+        }
+        if (fb == 0.0) {
+            break;
+        }
+        const double tolerance = 2.0 * DBL_EPSILON * (1.0 + fabs(b)), m = 0.5 * (c - b);
+        if (fabs(m) <= tolerance) {
+            break;
+        }
+        d = fabs(e) < tolerance || fabs(fa) <= fabs(fb) ? (e = m) : d;
+        if (d != m || e != m) {
+            const double s = fb / fa, q0 = fa / fc, r = fb / fc;
+            double p = a == c ? 2.0 * m * s : s * (2.0 * m * q0 * (q0 - r) - (b - a) * (r - 1.0));
+            double q = a == c ? 1.0 - s : (q0 - 1.0) * (r - 1.0) * (s - 1.0);
+            q = p > 0.0 ? -q : q, p = fabs(p);
+            if (2.0 * p < 3.0 * m * q - fabs(tolerance * q) && p < fabs(0.5 * e * q)) {
+                e = d, d = p / q;
+            } else {
+                d = e = m;
+            }
+        }
+        a = b, fa = fb;
+        b += fabs(d) > tolerance ? d : m > 0.0 ? tolerance : -tolerance;
+        fb = value_at(method, run, ev, i, b);
+        if (isnan(fb)) {
+            *gap = b;
+            return fb;
+        }
+    }
+    const int jumps = fb * bracket[2] > 0.0 && fb * fc < 0.0 && fabs(fb) > RUNS_TOUCHING * ev->size[i];
+    return jumps ? c : b;
+}
+
+/* The zero in a bracket; NaN if it lies where the value is no number. No recursion: a device has to know its stack. */
+static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket)
+{
+    double own[4] = {bracket[0], bracket[1], bracket[2], bracket[3]}, gap = 0.0;
+    for (;;) {
+        const double zero = zero_of_numbers(method, run, ev, i, own, &gap);
+        if (!isnan(zero) || !leave_gap(method, run, ev, i, own, gap)) {
+            return zero;
+        }
+    }
+}
+
+/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again. */
 
 static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, double fb)
 {
@@ -186,7 +399,7 @@ static int sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_event
     return found;
 }
 
-int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double *t)
+int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_trajectory *j, double *t)
 {
     eomgen_events *const ev = j->events;
     int stop = 0;
