@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base.files import as_path
-from .codegen.package import emit_package
-from .codegen.write import write_package
+from .codegen.package import emit_package, write_package
 from .errors import EomgenError, cannot
 from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel

@@ -11,21 +11,18 @@ from typing import Any
 from ..base.kernel_table import KERNELS
 from ..base.texts import comment_lines
 from ..layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
-from .c_bounds import operations_of, stack_of, states_beside_change_points
-from .c_branches import print_block_of_branches
 from .c_functions import declarations, function_files, used_calls
-from .c_lanes import lane_blocks, lane_files, lane_kernels
+from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files
 from .c_layout import describe_equations, is_straight, work_areas
 from .c_pairs import pair_declarations, pair_files
-from .c_rolled import print_rolled, print_rolled_precompute
-from .c_series import series_files
+from .c_rolled import print_block_of_branches, print_rolled, print_rolled_precompute
 from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .loop_systems import LARGE
 from .pair_sums import contact_tables
 from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import NoSeriesError
-from .single_precision import in_single_precision, refuse_double
+from .standalone_c import in_single_precision, operations_of, refuse_double, stack_of, states_beside_change_points
 
 #: Headers of the numbers that functions compute with, and those that lanes need besides.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h")

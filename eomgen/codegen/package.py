@@ -1,16 +1,21 @@
-"""Program -> a package that stands alone: C library, or Python package with a compiled core."""
+"""Program -> a package that stands alone, C library or Python package with a compiled core, in a folder."""
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
+from ..base.files import open_plain, refuse_link
 from ..base.texts import summary_text
-from ..errors import UsageError, cannot, no_choice
+from ..errors import UsageError, bad_file, cannot, no_choice
 from ..layer import read_native
 from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
@@ -18,7 +23,6 @@ from .c import emit_c
 from .c_lanes import DERIVATIVES
 from .files import SourceSet, describe_layouts, metadata_json, number_texts, render, trace_provenance
 from .program import Program
-from .python_calls import describe_calls
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -164,3 +168,197 @@ def _context(program: Program, analyses: bool) -> dict[str, Any]:
         "p_values": number_texts(metadata.get("p_values")),
         "u_values": number_texts(metadata.get("u_values")),
     }
+
+
+MANIFEST = "model.json"  #: lists the files of the package under "files"
+
+
+def write_package(sources: Mapping[str, str], folder: Path) -> Path:
+    """Write a package so that no file is ever half there.
+
+    Files of an earlier generation that are not part of this one are removed; others are left alone.
+
+    Parameters
+    ----------
+    sources : mapping of str to str
+        Relative file names and their text; ``model.json`` among them.
+    folder : Path
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    UsageError
+        The folder holds something else, or a file in the way that eomgen did not write; the folder, or one in it that
+        files go to, is a symbolic link.
+    """
+    _refuse_links(folder, sources)
+    earlier = _earlier_files(folder)
+    for name in sources:
+        if earlier is not None and name not in earlier and os.path.lexists(folder / name):
+            raise bad_file(f"{folder / name} exists and was not written by eomgen; move it, or choose another --out")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
+        stage = Path(private) / folder.name
+        try:
+            for name, text in {**sources, MANIFEST: _with_files(sources)}.items():
+                (stage / name).parent.mkdir(parents=True, exist_ok=True)
+                (stage / name).write_text(text, encoding="utf-8")
+        except OSError as error:  # most often a full disk; nothing is in its place yet
+            raise OSError(error.errno, error.strerror, str(folder)) from error
+        if not folder.exists():
+            os.rename(stage, folder)
+            return folder
+        for name in sorted(sources, key=lambda name: name == MANIFEST):  # the list of files last
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            _refuse_links(folder, (name,))
+            os.replace(stage / name, folder / name)
+    for name in sorted((earlier or set()) - set(sources)):
+        _remove(folder, name)
+    return folder
+
+
+def _refuse_links(folder: Path, names: Iterable[str]) -> None:
+    """Refuse links that lead elsewhere: the folder itself, and those in it that files go to.
+
+    A link in the place of a file needs no refusal: the file replaces it.
+    """
+    refuse_link(folder)
+    inner = {parent for name in names for parent in Path(name).parents if parent.name}
+    for path in sorted(inner):
+        refuse_link(folder / path)
+
+
+def _earlier_files(folder: Path) -> set[str] | None:
+    """Files that eomgen wrote here; None if it kept no list."""
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return set()
+    try:
+        with open_plain(folder / MANIFEST) as file:
+            listed: Any = json.load(file)
+        if not isinstance(listed, dict) or "abi" not in listed:
+            raise ValueError
+    except (OSError, ValueError, RecursionError, UsageError):
+        message = f"{folder} exists and is not a generated package; choose another --out or remove it"
+        raise bad_file(message) from None
+    files = listed.get("files")
+    return {name for name in files if isinstance(name, str)} if isinstance(files, list) else None
+
+
+def _with_files(sources: Mapping[str, str]) -> str:
+    """model.json with the list of files."""
+    data = json.loads(sources[MANIFEST]) | {"files": sorted(sources)}
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _remove(folder: Path, name: str) -> None:
+    """Remove a file of an earlier generation, with its folders if nothing else is in them."""
+    path = folder / name
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        return  # not a name that eomgen wrote
+    if any(parent.is_symlink() for parent in path.parents if parent.is_relative_to(folder)):
+        return  # the file lies elsewhere
+    with suppress(FileNotFoundError):
+        path.unlink()
+    for parent in path.parents:
+        if parent == folder:
+            return
+        shutil.rmtree(parent / "__pycache__", ignore_errors=True)  # of modules that are gone
+        try:
+            parent.rmdir()
+        except OSError:
+            return
+
+
+class Call(NamedTuple):
+    """One call, as a user writes it."""
+
+    text: str  #: with its arguments
+    result: str  #: shape of the result for one state
+    meaning: str
+
+    @property
+    def name(self) -> str:
+        """Without its arguments."""
+        return self.text.partition("(")[0]
+
+
+def describe_calls(program: Program) -> list[Call]:
+    """Every call of a generated package or Module, with its sizes as numbers."""
+    s = program.sizes
+    rows = len(program.metadata.get("independent_rows", range(s.n_c)))
+    holonomic = len([i for i in program.metadata.get("independent_rows", range(s.n_c)) if i < s.n_h])
+    unknowns = s.n_x + rows + holonomic
+    independent = "q_i, v_i, a_i"
+    calls = [
+        Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
+        Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs; wrt='u', 'p' as the next two"),
+        Call("input_jacobian(t, x)", _shape(s.n_x, s.n_u), "dx'/du of the complete rhs"),
+        Call("parameter_jacobian(t, x)", _shape(s.n_x, s.n_p), "dx'/dp of the complete rhs"),
+        Call("mass_matrix(q)", _shape(s.n_v, s.n_v), "M of the spanning tree"),
+        Call("embedded_mass_matrix(q)", _shape(s.n_dof, s.n_dof), "M of the independent coordinates"),
+        Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
+        Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
+        Call(
+            "inverse_dynamics_derivatives(q, v, a)",
+            ", ".join(_shape(s.n_v, n) for n in (s.n_q, s.n_v, s.n_v)),
+            "derivatives of inverse_dynamics by q, v and a",
+        ),
+        Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
+        Call("center_of_mass(q)", _shape(3), "centre of mass of all bodies, ground axes (m)"),
+        Call("com_jacobian(q)", _shape(3, s.n_v), "velocity of the centre of mass = com_jacobian v"),
+        Call("momentum(x)", _shape(6), "linear and angular momentum about the centre of mass, ground axes (SI)"),
+        Call("centroidal_inertia(q)", _shape(3, 3), "inertia of all bodies about their centre of mass (kg m^2)"),
+        Call("constraints(q)", _shape(holonomic), "independent loop residuals (m, rad)"),
+        Call("constraint_jacobian(q)", _shape(rows, s.n_v), "C_q of C_q v + C_t = 0, nonholonomic rows last"),
+        Call("velocity_constraints(x)", _shape(rows), "C_q v + C_t"),
+        Call('constraints(q, rows="all")', _shape(s.n_h), "all loop residuals, redundant ones included"),
+        Call('constraint_jacobian(q, rows="all")', _shape(s.n_c, s.n_v), "C_q of all rows"),
+        Call("project(x, t=0.0)", _shape(s.n_x), "the nearest state on the constraints"),
+        Call("x0(**values)", _shape(s.n_x), "a state assembled from named values"),
+        Call("assemble(**guess)", _shape(s.n_q), "q with the loops closed, from a guess"),
+        Call(
+            f"kinematics({independent})",
+            ", ".join(_shape(n) for n in (s.n_q, s.n_v, s.n_v)),
+            f"q, v, a of the whole tree; {independent} are {_shape(s.n_dof)}",
+        ),
+        Call("kinematic_analysis(t, **led)", "KinematicAnalysis", "motion over a range of time or of coordinates"),
+        Call("motion_range(name)", "MotionRange", "the limits between which a coordinate can move"),
+        Call("poses(q)", _shape(s.n_bodies, 4, 4), "body frames to ground, homogeneous"),
+        Call("outputs(t, x)", _shape(s.n_y), "the outputs of the model at the projected state"),
+        Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),
+        Call("minimal.x0(**values)", _shape(2 * s.n_dof), "x_min assembled from named values"),
+        Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
+        Call("dae.residual(t, y, yp)", _shape(unknowns), "F(t, y, y') of y = [q; v; multipliers; corrections]"),
+        Call("dae.jacobian(t, y, yp, cj)", _shape(unknowns, unknowns), "dF/dy + cj dF/dy'"),
+        Call("dae.initial(x)", f"{_shape(unknowns)}, {_shape(unknowns)}", "consistent y and y' of a state"),
+        Call("canonical.rhs(t, z)", _shape(s.n_x), "z' of z = [q; p] by Hamilton's equations"),
+        Call("canonical.of(x)", _shape(s.n_x), "z = [q; p] of a state x"),
+        Call("canonical.expand(z)", _shape(s.n_x), "x = [q; v] of z"),
+        Call("canonical.hamiltonian(z)", "number", "H = p v - L (J)"),
+        Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
+        Call("simulate(span, initial=None)", "Trajectory", "a run; SciPy where its methods or functions are asked for"),
+        Call("linearize(x=None, t=0.0)", "Linearization", "A, B, C, D along the constraints, eigenvalues"),
+        Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
+        Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
+        Call("multipliers(t, x)", _shape(s.n_c), "l of all constraint rows in M v' + h + C_q^T l = 0"),
+        Call("reactions(t, x)", _shape(len(program.metadata.get("joint_names", ())), 6), "force and moment in joints"),
+        Call("actuator_forces(t, x, a, actuated=None)", "ActuatorForces", "forces of drives that make a motion"),
+        Call("impact(t, x, {gap: restitution})", "Impact", "the state after an impact, impulses"),
+        Call("consistent(x, t=0.0)", _shape(s.n_x), "the nearest consistent state, with weights"),
+        Call("sensitivities(names, span)", "Sensitivities", "a run with its derivatives; needs SciPy"),
+    ]
+    plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
+    calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]
+    calls = [call for call in calls if s.n_momenta or not call.text.startswith("canonical")]
+    sums = ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
+    kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
+    kept = [call for call in kept if s.n_wrenches or not call.text.startswith("reactions")]
+    return [call for call in kept if s.n_c or not ("constraint" in call.text or call.text.startswith("multipliers"))]
+
+
+def _shape(*sizes: int) -> str:
+    return str(sizes)

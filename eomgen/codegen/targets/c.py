@@ -7,7 +7,7 @@ from typing import Any
 from ..c import emit_c
 from ..files import example_state, number_texts, render
 from ..program import Program
-from ..single_precision import in_single_precision
+from ..standalone_c import in_single_precision
 
 
 def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:

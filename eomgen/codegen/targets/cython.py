@@ -13,7 +13,7 @@ from ...compilation.compiler import Options
 from ...compilation.load import load_core
 from ...errors import ModelError, Problem, ToolchainError, no_such
 from ...graph.functions import Function
-from ..fingerprint import fingerprint
+from ..build import fingerprint
 from ..program import Program
 
 
