@@ -39,8 +39,6 @@ LEFT = 1e-8
 FREE = 1e-10
 #: Inverse mass along a normal below which an impulse moves nothing.
 PUSHES = 1e-14
-#: Part of a step to which the least of a gap is found by bisection: its value there is known to the square.
-FOUND = 1e-7
 #: Part of C_p along the direction of lost rank that opens a change point: the direction is known to the singular
 #: value at a point that was found, 1e-4.
 OPENS = 1e-3

@@ -73,7 +73,4 @@ CONTINUOUS = 1e-9  #: part of the largest value or slope of a table by which it 
 CONTRADICTS = 1e-2  #: part of what an input changes in a run, by which a rate given beside it may be wrong
 CONTRADICTS_TABLE = 1e-1  #: the same where one of them is a table, which is coarse between its points
 DIFFERENCE = 1e-6  #: part of a variable over which a function of it is differenced
-#: The same, h, by the central formula of sixth order: it misses h^6/140 times the seventh derivative, which is 7! where
-#: Euler parameters are divided by their length, 3e-14, and rounds 2 eps/h = 1.5e-13.
-WIDE_DIFFERENCE = 3e-3
 LOCATED = 1e-12  #: part of an interval to which the jump of a text is located: beside it lie 4,000 numbers
