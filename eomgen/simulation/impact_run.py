@@ -181,10 +181,12 @@ class GapEvents(Events):
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
         """The state after events at time t."""
-        x = super().reset(module, forcing, t, x, [i for i in fired if i < self._first])
+        own = [i for i in fired if i < self._first]
+        x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action != WAIT])
         closed = self.gaps.values(t, x) <= self.limits
         closed[[i - self._first for i in fired if i >= self._first]] = True
-        return self._impact_of(t, x, closed)
+        x = self._impact_of(t, x, closed)  # before the model's own impact of the same gap, which then finds it opening
+        return super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
 
     def crowded(self, t: float, count: int) -> SimulationError:
         """The error for gaps that close without an impact."""
