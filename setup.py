@@ -15,9 +15,9 @@ from setuptools.command.build import build
 ROOT = Path(__file__).parent
 sys.path.insert(0, str(ROOT))
 
-from eomgen.compilation.compiler import find_compiler  # noqa: E402
-from eomgen.compilation.native import build_native, product_in  # noqa: E402
 from eomgen.errors import ToolchainError  # noqa: E402
+from eomgen.toolchain.compiler import find_compiler  # noqa: E402
+from eomgen.toolchain.native import build_native, product_in  # noqa: E402
 
 
 class BuildNative(Command):

@@ -15,10 +15,10 @@ import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.program import Limits
-from eomgen.compilation.build import compile_sources
-from eomgen.compilation.compiler import Options
-from eomgen.compilation.load import load_core
 from eomgen.module import Module
+from eomgen.toolchain.build import compile_sources
+from eomgen.toolchain.compiler import Options
+from eomgen.toolchain.load import load_core
 
 from .large_loops import closed_chain, timed
 from .latency import cold_cache

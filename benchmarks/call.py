@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 import eomgen as eg
-from eomgen.compilation.compiler import find_compiler
 from eomgen.runtime.late import eager
+from eomgen.toolchain.compiler import find_compiler
 
 from .measure import interleaved, seconds_per_call
 from .models import EXAMPLES

@@ -4,21 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .spatial import (
-    Body,
-    Matrix,
-    Tree,
-    Vector,
-    add,
-    apply,
-    dot,
-    product,
-    rotated,
-    scale,
-    skew,
-    subtract,
-    transpose,
-)
+from .spatial import Body, Matrix, Tree, Vector, add, apply, dot, product, rotated, scale, skew, subtract, transpose
 
 GRAVITY = 9.81
 

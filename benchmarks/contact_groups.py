@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import eomgen as eg
-from eomgen.generation import generate
+from eomgen.api.generation import generate
 
 LAW = {"stiffness": 1e5, "dissipation": 0.5, "friction": 0.4, "smoothing": 1e-3}
 

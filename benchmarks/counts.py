@@ -10,11 +10,11 @@ from tempfile import TemporaryDirectory
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.program import BY_SYSTEM
-from eomgen.equations import METHODS
-from eomgen.equations.reduction import reduce_to_independent
-from eomgen.graph.core import substitute
-from eomgen.graph.schedule import count
-from eomgen.kinematics import analyse
+from eomgen.expr.core import substitute
+from eomgen.expr.schedule import count
+from eomgen.mechanics import analyse
+from eomgen.mechanics.methods import METHODS
+from eomgen.mechanics.methods.reduction import reduce_to_independent
 
 from .large_loops import closed_chain, four_bars
 from .loop_robots import ROBOTS as LOOP_ROBOTS

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from eomgen import pipeline
-from eomgen.compilation.compiler import Options, compile_flags, find_compiler
+from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
 
 from .call import compile_call_loop, over_kernel
 from .casadi_recursions import write_derivatives

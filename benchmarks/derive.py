@@ -69,7 +69,7 @@ def largest_difference(n: int) -> float:
     """
     import sympy as sm
 
-    from eomgen.graph.evaluate import evaluate
+    from eomgen.expr.evaluate import evaluate
 
     from . import models, peers
 

@@ -108,8 +108,8 @@ def registers(quick: bool) -> Table | None:
     """What the machine code needs, which NVRTC tells without a GPU; None without NVRTC."""
     from eomgen import pipeline
     from eomgen.codegen.targets.cuda import emit_device_text
-    from eomgen.device.cuda_device import compile_with_log
     from eomgen.errors import MissingDependencyError
+    from eomgen.runtime.device.cuda_device import compile_with_log
 
     rows = []
     for name in NAMES[:1] if quick else NAMES:
@@ -144,8 +144,8 @@ def resources(log: str, kernel: str) -> tuple[int | None, int | None, int | None
 
 def run(quick: bool) -> Report:
     """Compare and time where there is a GPU; else tell what the machine code needs."""
-    from eomgen.device.cuda_device import CudaDevice
     from eomgen.errors import EomgenError
+    from eomgen.runtime.device.cuda_device import CudaDevice
 
     code = registers(quick)
     tables = [] if code is None else [code]

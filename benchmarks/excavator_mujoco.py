@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from tracked_excavator import Track
 
-from eomgen.graph.evaluate import evaluate
+from eomgen.expr.evaluate import evaluate
 
 #: Shapes that meet: shoes and ground, rails and wheels, bushings and sprocket.
 PAIRS = {"shoe": (1, 2), "ground": (2, 1), "rail": (4, 8), "wheel": (8, 4), "bushing": (16, 32), "sprocket": (32, 16)}

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
-from eomgen.identification.fit import run_slopes
+from eomgen.analysis.fit import run_slopes
 
 from .measure import interleaved, seconds_of
 from .report import Limit, Report, Table

@@ -7,7 +7,7 @@ from typing import Any
 
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.graph.schedule import count
+from eomgen.expr.schedule import count
 
 from .models import chain, spatial_chain
 from .report import Limit, Report, Table

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 from scipy.integrate._ivp import dop853_coefficients as dop
 
-from eomgen.compilation.compiler import find_compiler
 from eomgen.pipeline import build
+from eomgen.toolchain.compiler import find_compiler
 
 from . import taylor
 from .measure import Sample, interleaved, seconds_of

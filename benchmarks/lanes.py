@@ -58,7 +58,7 @@ class Ours:
     def __init__(self, file: str, lock: tuple[str, ...], folder: Path) -> None:
         from eomgen import pipeline
         from eomgen.codegen.c import emit_c
-        from eomgen.compilation.compiler import Options, compile_flags, find_compiler
+        from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
 
         model = robot(file, lock)
         equations = model.derive()
@@ -117,7 +117,7 @@ class Peer:
         import pinocchio as pin
         from shipped_robots import EXAMPLES
 
-        from eomgen.compilation.compiler import find_compiler
+        from eomgen.toolchain.compiler import find_compiler
 
         from .casadi_robots import casadi_source
 

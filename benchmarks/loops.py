@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation.compiler import Options, compile_flags, find_compiler
+from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
 
 from .linkages import n_four_bar
 from .models import EXAMPLES

@@ -15,7 +15,7 @@ from .robot_calls import ROBOTS, build, load_pinocchio, state
 
 TITLE = "operations of right-hand sides, the same instructions for all"
 #: Where eomgen takes regrouped inertia from.
-REGROUPING = ("eomgen.equations.embedding.regroup", "eomgen.equations.recursive.regroup")
+REGROUPING = ("eomgen.mechanics.methods.embedding.regroup", "eomgen.mechanics.methods.recursive.regroup")
 
 #: By how much accelerations of what is counted may differ from Pinocchio's, relative.
 AGREED = 1e-9

@@ -13,8 +13,8 @@ import numpy as np
 
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation.build import compile_sources
-from eomgen.compilation.compiler import Options, compile_flags, find_compiler
+from eomgen.toolchain.build import compile_sources
+from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
 
 from .latency import cold_cache
 from .measure import Sample

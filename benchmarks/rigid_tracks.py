@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from eomgen.simulation.moreau import ContactWarning
+from eomgen.runtime.runs.moreau import ContactWarning
 
 from .report import Limit, Report, Table
 

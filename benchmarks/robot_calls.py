@@ -17,7 +17,7 @@ import numpy as np
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.c import emit_c
-from eomgen.compilation.compiler import find_compiler
+from eomgen.toolchain.compiler import find_compiler
 
 from .measure import ROOT, Sample
 

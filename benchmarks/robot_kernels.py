@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import eomgen as eg
-from eomgen.graph.schedule import count
+from eomgen.expr.schedule import count
 
 from .call import compile_call_loop, over_kernel
 from .report import Limit, Report, Table

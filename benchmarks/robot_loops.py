@@ -14,7 +14,7 @@ import numpy as np
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.codegen.program import BY_MOTIONS, BY_SYSTEM
-from eomgen.graph.schedule import Operations
+from eomgen.expr.schedule import Operations
 
 from .call import compile_call_loop, over_kernel
 from .loop_robots import ROBOTS

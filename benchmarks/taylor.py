@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.graph.core import reachable
+from eomgen.expr.core import reachable
 
 
 def available() -> bool:

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 import eomgen as eg
-from eomgen.compilation.compiler import find_compiler
+from eomgen.toolchain.compiler import find_compiler
 
 from .call import compile_call_loop, over_kernel
 from .measure import interleaved

@@ -18,8 +18,8 @@ from eomgen import pipeline
 from eomgen.base.kernel_table import KERNELS
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.c_pairs import pair_files
-from eomgen.compilation.compiler import Options, compile_flags, find_compiler
-from eomgen.layer import read_header
+from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
+from eomgen.toolchain.layer import read_header
 
 from .report import Limit, Report, Table
 from .tracks import track

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from . import errors as errors
     from .api.equations import Equations as Equations
+    from .api.loading import load as load
+    from .api.loading import load_example as load_example
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
     from .errors import AssemblyError as AssemblyError
@@ -37,8 +39,6 @@ if TYPE_CHECKING:
     from .errors import UnsolvedError as UnsolvedError
     from .errors import UsageError as UsageError
     from .errors import ZenoError as ZenoError
-    from .loading import load as load
-    from .loading import load_example as load_example
     from .module import Module as Module
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
-_HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
+_HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "api.loading", "load_example": "api.loading"}
 #: For annotations: what calls return, so no name that a misspelt one stands for.
 _TYPES = {"Equations": "api.equations", "Module": "module", "Trajectory": "runtime.trajectory"}
 _HOMES |= _TYPES

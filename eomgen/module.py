@@ -18,64 +18,64 @@ from .runtime.argument_names import both_names, plain_names
 from .runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
+    from .analysis.base_parameters import base_parameters as _base_parameters
     from .analysis.consistent import consistent as _consistent
     from .analysis.coordinate_range import motion_range as _motion_range
     from .analysis.drive import actuator_forces as _actuator_forces
     from .analysis.equilibrium import equilibrium as _equilibrium
+    from .analysis.fit import fit as _fit
     from .analysis.linear import linearize as _linearize
     from .analysis.modes import modes as _modes
     from .analysis.reactions import driving_forces as _driving_forces
     from .analysis.reactions import reactions as _reactions
     from .analysis.reactions import undetermined_reactions as _undetermined_reactions
-    from .ensembles.simulate_many import simulate_many as _simulate_many
-    from .identification.base_parameters import base_parameters as _base_parameters
-    from .identification.fit import fit as _fit
-    from .identification.regressor import inertial_remainder as _inertial_remainder
-    from .identification.regressor import regressor as _regressor
-    from .identification.regressor import standard_parameters as _standard_parameters
+    from .analysis.regressor import inertial_remainder as _inertial_remainder
+    from .analysis.regressor import regressor as _regressor
+    from .analysis.regressor import standard_parameters as _standard_parameters
     from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
     from .runtime.drawing import explore as _explore
     from .runtime.drawing import report as _report
+    from .runtime.ensembles.simulate_many import simulate_many as _simulate_many
     from .runtime.minimal import Minimal
-    from .simulation.compiled import step as _step
-    from .simulation.dae_solution import Dae
-    from .simulation.impact import impact as _impact
-    from .simulation.impact_run import simulate_impacts as _simulate_impacts
-    from .simulation.integrator import integrator as _integrator
-    from .simulation.kinematic import kinematic_analysis as _kinematic_analysis
-    from .simulation.sensitivities import sensitivities as _sensitivities
-    from .simulation.simulate import simulate as _simulate
-    from .verification.verify import verify as _verify
+    from .runtime.runs.compiled import step as _step
+    from .runtime.runs.dae_solution import Dae
+    from .runtime.runs.impact import impact as _impact
+    from .runtime.runs.impact_run import simulate_impacts as _simulate_impacts
+    from .runtime.runs.integrator import integrator as _integrator
+    from .runtime.runs.kinematic import kinematic_analysis as _kinematic_analysis
+    from .runtime.runs.sensitivities import sensitivities as _sensitivities
+    from .runtime.runs.simulate import simulate as _simulate
+    from .verify.verify import verify as _verify
 
 
 #: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
 CALLS: dict[str, str | Callable[..., Any]] = {
-    "simulate": "simulation.simulate",
-    "simulate_many": "ensembles.simulate_many",
-    "integrator": "simulation.integrator",
-    "step": "simulation.compiled",
-    "verify": "verification.verify",
+    "simulate": "runtime.runs.simulate",
+    "simulate_many": "runtime.ensembles.simulate_many",
+    "integrator": "runtime.runs.integrator",
+    "step": "runtime.runs.compiled",
+    "verify": "verify.verify",
     "linearize": "analysis.linear",
     "modes": "analysis.modes",
     "equilibrium": "analysis.equilibrium",
-    "sensitivities": "simulation.sensitivities",
-    "fit": "identification.fit",
-    "standard_parameters": "identification.regressor",
-    "regressor": "identification.regressor",
-    "inertial_remainder": "identification.regressor",
-    "base_parameters": "identification.base_parameters",
+    "sensitivities": "runtime.runs.sensitivities",
+    "fit": "analysis.fit",
+    "standard_parameters": "analysis.regressor",
+    "regressor": "analysis.regressor",
+    "inertial_remainder": "analysis.regressor",
+    "base_parameters": "analysis.base_parameters",
     "multipliers": "runtime.constrained",
     "reactions": "analysis.reactions",
     "undetermined_reactions": "analysis.reactions",
     "driving_forces": "analysis.reactions",
     "actuator_forces": "analysis.drive",
-    "impact": "simulation.impact",
-    "simulate_impacts": "simulation.impact_run",
+    "impact": "runtime.runs.impact",
+    "simulate_impacts": "runtime.runs.impact_run",
     "consistent": "analysis.consistent",
-    "kinematic_analysis": "simulation.kinematic",
+    "kinematic_analysis": "runtime.runs.kinematic",
     "motion_range": "analysis.coordinate_range",
     "report": "runtime.drawing",
     "draw": "runtime.drawing",
@@ -88,7 +88,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
 FORMS = {
     "minimal": "runtime.minimal",
     "canonical": "runtime.canonical",
-    "dae": "simulation.dae_solution",
+    "dae": "runtime.runs.dae_solution",
 }
 
 
@@ -263,7 +263,7 @@ class Module(BoundModel):
 
         def __getattr__(self, name: str) -> Any:
             if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-                from .simulation.compiled import find_solver
+                from .runtime.runs.compiled import find_solver
 
                 return find_solver(self, name)
             if name in CALLS:  # an analysis of a user's own

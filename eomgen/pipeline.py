@@ -1,7 +1,7 @@
 """From a model to its compiled functions, in stages; the output of each is the input of the next.
 
 Every stage is a package whose functions take and return frozen values; this file alone knows their order, and none of
-the targets, which are rows of :data:`~.targets.TARGETS`.
+the targets, which are rows of :data:`~.base.targets.TARGETS`.
 
 Stages
 ------
@@ -23,15 +23,15 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from . import __version__
-from .alone import alone, timed
-from .derivation import Derivation, Derived, derive_mechanism
+from .base.targets import TARGETS, find_function, find_target
+from .base.without_gc import timed, without_gc
 from .errors import EomgenError, cannot
+from .reading.derivation import Derivation, Derived, derive_mechanism
 from .runtime.argument_checks import read_names
-from .targets import TARGETS, find_function, find_target
 
 if TYPE_CHECKING:
     from .codegen.program import Program
-    from .describe.model import Builder
+    from .model.model import Builder
     from .runtime.protocols import Core
 
 
@@ -77,17 +77,17 @@ def derive_as(
 ) -> Derived:
     """The same as a result of another type."""
     start = perf_counter()
-    with alone(), np.errstate(all="ignore"):
+    with without_gc(), np.errstate(all="ignore"):
         mechanism = model.mechanism()
     return derive_mechanism(kind, mechanism, method, independent, baumgarte, perf_counter() - start)
 
 
-@alone()
+@without_gc()
 @np.errstate(all="ignore")
 def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """Stage 4, Derivation -> Program: the functions to generate for a target."""
     from .codegen.build import program_of
-    from .describe.digest import model_digest
+    from .model.digest import model_digest
 
     row = find_target(target)
     kernels = read_names("kernels", kernels or ())

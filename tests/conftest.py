@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from outside_programs import PROGRAMS, missing
 
-from eomgen.compilation.native import find_native
+from eomgen.toolchain.native import find_native
 
 CACHE = pytest.StashKey[str]()
 #: Most builds in C in the shared cache by ``make test``, beside the 20 of tests that have caches of their own.
@@ -21,14 +21,14 @@ BUILDS = 155
 QUICK = pytest.StashKey[set[str]]()
 #: What ``--quick`` runs a folder of tests for: the packages of eomgen that it guards.
 ROOMS = {
-    "mechanics": "constraints derivation equations frames joints kinematics rotations solids",
-    "forces": "elements forces",
-    "runs": "analysis ensembles identification runtime simulation",
-    "model": "base describe importers loading",
-    "code": "base codegen compilation device generation layer targets",
-    "shown": "base cli explain printing reading show",
-    "core": "alone base graph numeric pipeline records simplify syntax_trees verification",
-    "attack": "base describe importers",
+    "mechanics": "elements mechanics",
+    "forces": "contact elements",
+    "runs": "analysis runtime",
+    "model": "api base importers model",
+    "code": "api base codegen toolchain",
+    "shown": "base cli explain reading show",
+    "core": "base expr pipeline verify",
+    "attack": "base importers model",
 }
 #: Scripts that made reference numbers with other programs, which need not be installed.
 collect_ignore_glob = ["reference/*.py"]

@@ -12,7 +12,7 @@ import numpy as np
 import sympy
 
 import eomgen as eg
-from eomgen.compilation.compiler import lane_width
+from eomgen.toolchain.compiler import lane_width
 
 TESTS = Path(__file__).parent
 EXAMPLES = TESTS.parent / "examples"

@@ -25,11 +25,11 @@ FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
 SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
-    "numeric/assembly.py": {1e-8},
+    "base/numeric/assembly.py": {1e-8},
     "codegen/loop_systems.py": {1e-100},
     "importers/robot.py": {1e-11},
-    "rotations/quaternions.py": {1e-4},
-    "verification/digits.py": {1e-6},
+    "elements/rotations/quaternions.py": {1e-4},
+    "verify/digits.py": {1e-6},
 }
 ROLE = re.compile(r":(?:class|meth|func|mod|attr|data|exc|obj):`([^`]+)`")
 #: Folders of tests that speak to the public face alone.
@@ -39,10 +39,10 @@ LONGEST = 800  #: lines of a file of tests
 
 #: What runs reach beyond the folders that packages carry: texts, pictures, analyses.
 BEYOND = {
-    "module": {"analysis", "identification", "verification"},
+    "module": {"analysis", "verify"},
     "runtime.drawing": {"show"},
-    "runtime.inputs": {"describe"},
-    "runtime.argument_checks": {"describe"},
+    "runtime.inputs": {"model"},
+    "runtime.argument_checks": {"model"},
     "runtime.trajectory": {"show"},
 }
 
@@ -110,8 +110,8 @@ def directions() -> Iterator[str]:
     graph = {name: imports_of(name) for name in FILES}
     calls = import_module("eomgen.module").CALLS  # named as text
     graph["eomgen.module"] |= {f"eomgen.{home}" for home in calls.values()}
-    groups = import_module("eomgen.verification.verify").GROUPS
-    graph["eomgen.verification.verify"] |= {f"eomgen.verification.check_{group}" for group in groups}
+    groups = import_module("eomgen.verify.verify").GROUPS
+    graph["eomgen.verify.verify"] |= {"eomgen.verify.check_" for group in groups}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -197,11 +197,11 @@ def keywords() -> Iterator[str]:
     bound, robot = set(types.BoundValues.__annotations__), set(types.RobotKeywords.__annotations__)
     shown = {"module", "file", "format"}
     for known, those in {
-        "BuildOptions": arguments("compilation.compiler", "Options"),
-        "StepOptions": bound | set(import_module("eomgen.ensembles.simulate_many").OPTIONS),
-        "ReducedOptions": bound | set(import_module("eomgen.simulation.sensitivities").OPTIONS),
+        "BuildOptions": arguments("toolchain.compiler", "Options"),
+        "StepOptions": bound | set(import_module("eomgen.runtime.ensembles.simulate_many").OPTIONS),
+        "ReducedOptions": bound | set(import_module("eomgen.runtime.runs.sensitivities").OPTIONS),
         "RobotKeywords": arguments("importers", "RobotOptions", "check_inertia"),
-        "LoadOptions": arguments("loading", "load", "path", "robot") | robot,
+        "LoadOptions": arguments("api.loading", "load", "path", "robot") | robot,
         "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},
         "FilmOptions": arguments("show.animate", "animate_mode", "x", "shape", *shown),
     }.items():

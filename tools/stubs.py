@@ -1,4 +1,4 @@
-"""The tables of types -> eomgen/describe/element_methods.pyi, for editors and type checkers.
+"""The tables of types -> eomgen/model/element_methods.pyi, for editors and type checkers.
 
 ``python tools/stubs.py`` writes it anew; ``make lint`` compares it with the tables.  It has the first sentence of each
 method; ``help(Model.spring)`` has the rest.
@@ -10,10 +10,10 @@ import textwrap
 from inspect import Parameter, cleandoc
 from pathlib import Path
 
-from eomgen.describe import element_methods
-from eomgen.describe.element_methods import ElementMethods, tables
-from eomgen.describe.methods import arguments_of, documentation_of
 from eomgen.elements.element_type import ElementType
+from eomgen.model import element_methods
+from eomgen.model.element_methods import ElementMethods, tables
+from eomgen.model.methods import arguments_of, documentation_of
 
 HOME = Path(element_methods.__file__).with_suffix(".pyi")
 _HEAD = '''# Written by python tools/stubs.py from the tables of types.

@@ -15,16 +15,16 @@ from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
 from eomgen.cli.command import VERBS, eomgen
-from eomgen.constraints import CONSTRAINTS
-from eomgen.describe import fields as table
-from eomgen.describe.fields import joint_type
 from eomgen.elements import kinds
+from eomgen.elements.constraints import CONSTRAINTS
+from eomgen.elements.forces import FORCES
+from eomgen.elements.joints import JOINTS
 from eomgen.elements.kinds import Field, Fields
-from eomgen.forces import FORCES
 from eomgen.importers.mjcf import MJCF
 from eomgen.importers.urdf import URDF
 from eomgen.importers.xml_file import ANY, INSIDE
-from eomgen.joints import JOINTS
+from eomgen.model import fields as table
+from eomgen.model.fields import joint_type
 from eomgen.runtime.refusals import EXCLUDED, KINDS
 
 

@@ -13,10 +13,10 @@ from sphinx.util.nodes import make_refnode
 
 import eomgen
 import eomgen.base.limits as eomgen_limits
-from eomgen.constraints import CONSTRAINTS
+from eomgen.elements.constraints import CONSTRAINTS
+from eomgen.elements.forces import FORCES
+from eomgen.elements.joints import JOINTS
 from eomgen.errors import CODES
-from eomgen.forces import FORCES
-from eomgen.joints import JOINTS
 
 ELEMENTS = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}
 #: Methods of Model that say or do something about the whole, in the order in which one meets them.
@@ -96,7 +96,7 @@ class Limits(SphinxDirective):
 MADE_BY_USERS = (
     "eomgen.Model",
     "eomgen.runtime.inputs.Signal",
-    "eomgen.compilation.compiler.Options",
+    "eomgen.toolchain.compiler.Options",
     "eomgen.importers.RobotOptions",
 )
 

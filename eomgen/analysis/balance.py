@@ -16,10 +16,10 @@ from ..base.algebra import Array, Indices
 from ..base.limits.analyses import DISPLACED
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
+from ..base.numeric.projection import tangent_projector
+from ..base.numeric.ranks import Partition, partition, rank
+from ..base.numeric.scales import Scales
 from ..errors import ill_chosen
-from ..numeric.projection import tangent_projector
-from ..numeric.ranks import Partition, partition, rank
-from ..numeric.scales import Scales
 from ..runtime.argument_checks import read_names, unknown
 
 if TYPE_CHECKING:

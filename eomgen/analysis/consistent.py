@@ -19,9 +19,9 @@ from ..base.limits.analyses import NEAREST
 from ..base.limits.constraints import ACCEPTED, EXACT, GENTLE
 from ..base.limits.constraints import STATE as RANK
 from ..base.names import hint, joined
+from ..base.numeric.projection import largest, least
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
-from ..numeric.projection import largest, least
 from ..runtime.argument_checks import read_names, read_number, read_numbers
 from ..runtime.layout import Layout
 

@@ -12,9 +12,9 @@ from ..base.texts import shown
 from ..errors import ill_typed, off_range
 from ..runtime.argument_checks import read_number, read_numbers, unknown
 from ..runtime.refusals import require_support
+from ..runtime.runs.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
+from ..runtime.runs.kinematic import complete, describe_gap, start_from
 from ..runtime.trajectory import Start
-from ..simulation.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
-from ..simulation.kinematic import complete, describe_gap, start_from
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

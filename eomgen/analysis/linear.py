@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
+from ..base.numeric.projection import minimum_norm
+from ..base.numeric.ranks import partition, rank
 from ..errors import cannot, ill_chosen, ill_shaped, no_choice
-from ..numeric.projection import minimum_norm
-from ..numeric.ranks import partition, rank
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_closed, require_support
 from .balance import TangentSpace, displacement_names, displacement_rates, find_tangent, projected_directions

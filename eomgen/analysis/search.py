@@ -11,8 +11,8 @@ from ..base import algebra
 from ..base.algebra import Array, Indices
 from ..base.limits.analyses import ARRIVED, CLOSE, DAMPING, DIFFERENCES, GAINED, LEAST_UNKNOWN, MOVING, SHORTEST
 from ..base.limits.numbers import EPS, TINY
+from ..base.numeric.projection import largest
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
-from ..numeric.projection import largest
 from ..runtime.argument_checks import unknown
 from ..runtime.initial import Initial
 from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..equations.positive import note_lost_digits, require_inertia
 from ..errors import AssemblyError, EomgenError, ModelError, UsageError
-from ..kinematics.report import MechanismReport, other_branches, report
+from ..mechanics.methods.positive import note_lost_digits, require_inertia
+from ..mechanics.report import MechanismReport, other_branches, report
 from ..pipeline import compile_core, derive
 from ..runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
-    from ..derivation import Derivation
-    from ..describe.model import Builder
+    from ..model.model import Builder
+    from ..reading.derivation import Derivation
 
 #: Functions that the assembly of a state calls, and those for values of outputs and markers.
 OF_STARTS = (

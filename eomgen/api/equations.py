@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..base.inline_pictures import picture_html, side_by_side
-from ..derivation import Derivation
 from ..module import Module
+from ..reading.derivation import Derivation
 from ..runtime.argument_checks import find_lacking
 
 if TYPE_CHECKING:
-    from ..describe.model import Builder
-    from ..device.cuda_device import Device
-    from ..device.device_module import DeviceModule
     from ..explain import Explanation
+    from ..model.model import Builder
+    from ..runtime.device.cuda_device import Device
+    from ..runtime.device.device_module import DeviceModule
     from ..runtime.option_types import BuildOptions
 
 
@@ -31,7 +31,7 @@ class Equations(Derivation):
     Attributes
     ----------
     method : str
-        How they were derived, one of ``eomgen.equations.METHODS``.
+        How they were derived, one of ``eomgen.mechanics.methods.METHODS``.
     choice : Choice or None
         What ``auto`` compared, of a tree.
     report : MechanismReport
@@ -107,7 +107,7 @@ class Equations(Derivation):
         kernels : names of kernels, optional
             Only these (see the README's table of calls); all by default, the rarer ones when they are first called.
         **options
-            Fields of :class:`eomgen.compilation.compiler.Options`, such as ``optimize`` or ``native``.
+            Fields of :class:`eomgen.toolchain.compiler.Options`, such as ``optimize`` or ``native``.
 
         Returns
         -------
@@ -151,13 +151,13 @@ class Equations(Derivation):
         Parameters
         ----------
         device : Device, optional
-            ``eomgen.device.cuda_device.CudaDevice(1)`` for the second GPU; the first by default.
+            ``eomgen.runtime.device.cuda_device.CudaDevice(1)`` for the second GPU; the first by default.
 
         Returns
         -------
         DeviceModule
             ``rhs(t, x, p=None, u=None)`` and others for states (n_x, k), ``simulate_many(span, x0)``; see
-            :class:`~eomgen.device.device_module.DeviceModule`.
+            :class:`~eomgen.runtime.device.device_module.DeviceModule`.
 
         Raises
         ------

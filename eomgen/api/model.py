@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..base.inline_pictures import picture_html, side_by_side
-from ..describe.model import Builder
 from ..errors import too_large
-from ..simulation.bound_run import waiting
+from ..model.model import Builder
+from ..runtime.runs.bound_run import waiting
 from .equations import Equations, derive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..kinematics.report import MechanismReport
+    from ..mechanics.report import MechanismReport
     from ..module import Module
     from ..runtime.option_types import BuildOptions
 

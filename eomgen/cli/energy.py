@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..graph import vectors as vec
-from ..graph.core import Expr, reachable, substitute
-from ..graph.evaluate import evaluate
-from ..graph.pairs import PairCall
+from ..expr import vectors as vec
+from ..expr.core import Expr, reachable, substitute
+from ..expr.evaluate import evaluate
+from ..expr.pairs import PairCall
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
-    from ..kinematics import Kinematics
+    from ..mechanics import Kinematics
     from ..runtime import Trajectory
     from ..runtime.bound_model import BoundModel
 

@@ -24,25 +24,14 @@ from ..base.files import example_files, find_example, shipped, write_whole
 from ..base.limits.constraints import UNMOVED
 from ..base.names import hint
 from ..base.results import ResultTable
+from ..base.syntax_trees import parse_module
 from ..base.texts import visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
-from ..syntax_trees import parse_module
 from .options import NumberRange, Verb, json_option, target_option
-from .output import (
-    MODEL,
-    TOOLCHAIN,
-    exit_code,
-    lines_of,
-    print_json,
-    readable_size,
-    reports_failures,
-    say,
-    show,
-    stage,
-)
+from .output import MODEL, TOOLCHAIN, exit_code, lines_of, print_json, readable_size, reports_failures, say, show, stage
 
 if TYPE_CHECKING:
-    from ..compilation.cache import Cache
+    from ..toolchain.cache import Cache
 
 # -- doctor ------------------------------------------------------------------------------------------------------------
 
@@ -139,7 +128,7 @@ def _import(name: str) -> tuple[bool, str]:
 
 
 def _compiler() -> Iterator[Check]:
-    from ..compilation.compiler import find_compiler
+    from ..toolchain.compiler import find_compiler
 
     try:
         found = find_compiler()
@@ -155,7 +144,7 @@ def _compiles() -> Check:
     from math import sin
     from time import perf_counter
 
-    from ..loading import load
+    from ..api.loading import load
 
     start = perf_counter()
     try:
@@ -185,7 +174,7 @@ def _fresh_cache() -> Iterator[None]:
 
 
 def _check_cache() -> Check:
-    from ..compilation.cache import Cache, cache_directory
+    from ..toolchain.cache import Cache, cache_directory
 
     try:
         cache = Cache(cache_directory())
@@ -218,7 +207,7 @@ def cache(ctx: click.Context) -> None:
 
 
 def _cache() -> Cache:
-    from ..compilation.cache import Cache, cache_directory
+    from ..toolchain.cache import Cache, cache_directory
 
     return Cache(cache_directory())
 
@@ -441,7 +430,7 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[str, Any]) -> None:
     """Derive, compile and simulate a part of the time that the file asks for."""
-    from ..loading import load
+    from ..api.loading import load
 
     with _timed(seconds, "derive"):
         equations = load(file).derive()

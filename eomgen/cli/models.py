@@ -10,7 +10,7 @@ import click
 
 from ..base.files import save_figure, write_whole
 from ..base.results import ResultTable
-from ..targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
+from ..base.targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
 from .options import Source, file_option, model_verb, require_document_folder, require_folder, target_option
 from .output import print_json, say, show, stage
 from .plot import require_plotting
@@ -22,7 +22,7 @@ DERIVED = ("allow_native", "method", "baumgarte", "independent", "robot")  #: op
 
 
 def _print_schema(context: click.Context) -> None:
-    from ..describe import model_schema
+    from ..model import model_schema
 
     print_json(model_schema())
     context.exit()
@@ -235,8 +235,8 @@ def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, a
 
     Target fmu is one file, DIR/<name>.fmu.
     """
-    from ..compilation.wheel import build_wheel, require_wheel
-    from ..generation import generate as write_out
+    from ..api.generation import generate as write_out
+    from ..toolchain.wheel import build_wheel, require_wheel
 
     target, independent = source.target, source.independent or None
     if wheel:

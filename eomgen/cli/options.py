@@ -15,9 +15,9 @@ import click
 from ..base.files import kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
+from ..base.targets import TARGETS
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
 from ..runtime.argument_checks import unknown
-from ..targets import TARGETS
 from .output import name_options, reports_failures, say, show, stage
 
 if TYPE_CHECKING:
@@ -143,9 +143,9 @@ def parse_number(text: str) -> float:
         return float(text)
     except ValueError:
         pass
-    from ..describe.expressions import parse
     from ..errors import ExpressionError
-    from ..graph.core import Graph
+    from ..expr.core import Graph
+    from ..model.expressions import parse
 
     def resolve(unknown: str) -> Any:
         raise ExpressionError(f"{unknown!r} is not a number", 1, "only numbers and pi are allowed here", text)
@@ -264,7 +264,7 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
     """The integrator of a name, in whatever letters, before the work begins."""
     if value is None:
         return None
-    from ..describe.fields import SOLVERS
+    from ..model.fields import SOLVERS
 
     for solver in SOLVERS:
         if solver.lower() == value.lower():
@@ -536,7 +536,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     if str(path) == "-":
         model = _read_stdin(options)
     elif path.is_file():
-        from ..loading import load
+        from ..api.loading import load
 
         model = load(path, **options)
     else:
@@ -549,7 +549,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
 def _read_stdin(options: dict[str, Any]) -> Model:
     """The model of a model file's text on the standard input."""
     from ..api.model import Model
-    from ..describe.yaml_file import describe_yaml
+    from ..model.yaml_file import describe_yaml
 
     if options:
         raise at_odds(f"- reads a model file from the standard input and takes no {', '.join(options)}; name a file")

@@ -16,7 +16,7 @@ from ..errors import MissingDependencyError, bad_file, incomplete
 from .options import split_names
 
 if TYPE_CHECKING:
-    from ..describe.mechanism import Mechanism
+    from ..model.mechanism import Mechanism
     from ..module import Module
     from ..runtime import Trajectory
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..module import Module
     from ..runtime import Trajectory
-    from ..simulation.kinematic import KinematicAnalysis
+    from ..runtime.runs.kinematic import KinematicAnalysis
     from .energy import EnergyBalance
 
 POINTS = 5  #: change points listed

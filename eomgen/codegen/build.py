@@ -16,14 +16,14 @@ import numpy as np
 
 from ..base.kernel_table import KERNELS, NAMED, Kernel
 from ..base.names import hint, joined
-from ..equations.positive import require_inertia
-from ..equations.tree_equations import TreeEquations
+from ..base.numeric.user_functions import Curve, Surface
 from ..errors import UsageError, ill_placed, no_such
-from ..graph.core import Expr, Graph, reachable, symbols_of
-from ..graph.functions import Function, NativeCode
-from ..kinematics import Kinematics
-from ..kinematics.mobility import Mobility
-from ..numeric.user_functions import Curve, Surface
+from ..expr.core import Expr, Graph, reachable, symbols_of
+from ..expr.functions import Function, NativeCode
+from ..mechanics import Kinematics
+from ..mechanics.methods.positive import require_inertia
+from ..mechanics.methods.tree_equations import TreeEquations
+from ..mechanics.mobility import Mobility
 from .contact_columns import COLUMNS
 from .kernels import BlockMaker
 from .metadata import collect_metadata

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..base.kernel_table import KERNELS
 from ..base.texts import comment_lines
-from ..layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
+from ..toolchain.layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files
 from .c_layout import describe_equations, is_straight, work_areas

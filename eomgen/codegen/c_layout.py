@@ -7,7 +7,7 @@ from collections.abc import Collection
 from itertools import accumulate
 from typing import Any
 
-from ..layer import SOLVER_HEADERS, read_header
+from ..toolchain.layer import SOLVER_HEADERS, read_header
 from .loop_slopes import BY_BODIES
 from .pair_sums import contact_areas, kept_of, sums_again
 from .program import SHIFTS, Block, Program

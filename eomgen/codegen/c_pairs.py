@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from ..graph.core import symbols_of
-from ..graph.pairs import PairFunction, PairKind, PairPart
-from ..numeric.outline_pieces import CHOSEN, PIECE
-from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
-from ..numeric.polygon_edges import OTHER, OWN
+from ..base.numeric.outline_pieces import CHOSEN, PIECE
+from ..base.numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
+from ..base.numeric.polygon_edges import OTHER, OWN
+from ..expr.core import symbols_of
+from ..expr.pairs import PairFunction, PairKind, PairPart
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..graph.core import Expr
+from ..expr.core import Expr
 from .c_layout import places_again
 from .c_text import BlockPrinter, Printed, direct_results, function_text, print_block
 from .program import Block, Program

@@ -1,6 +1,6 @@
 """A straight-line block -> C99 functions in static single assignment.
 
-Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.  The text is written over the type
+Every operation means what :mod:`eomgen.expr.evaluate` makes of it, NaN included.  The text is written over the type
 ``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).  A value that is used
 once stands in the expression that uses it.
 """
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..base.texts import comment_text
-from ..graph.core import Expr, Node, reachable
+from ..expr.core import Expr, Node, reachable
 from .c_functions import each_lane, each_name
 from .c_layout import places_again
 from .pair_sums import CopiedRun, PairLists, copied_runs

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from copy import copy
 from functools import cached_property
 
-from ..equations import METHODS, TreeEquations
-from ..graph.evaluate import compile_evaluator
-from ..graph.schedule import count
-from ..kinematics import Kinematics
-from ..kinematics.mobility import Mobility
-from ..kinematics.wrenches import cut_drives
+from ..expr.evaluate import compile_evaluator
+from ..expr.schedule import count
+from ..mechanics import Kinematics
+from ..mechanics.methods import METHODS, TreeEquations
+from ..mechanics.mobility import Mobility
+from ..mechanics.wrenches import cut_drives
 from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
 from .loop_systems import BodyLoops, EmbeddedLoops, LoopBlocks, estimate
 from .program import Limits

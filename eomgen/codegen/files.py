@@ -15,7 +15,7 @@ from ..base import algebra, texts
 from ..base.algebra import Array
 from ..base.files import Kept, shipped
 from ..errors import EomgenError
-from ..graph.evaluate import compile_evaluator
+from ..expr.evaluate import compile_evaluator
 from .program import Program
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from ..equations.embedding import ForceSlopes
-from ..graph.core import Expr, reachable, substitute
-from ..graph.differentiate import jacobian
-from ..graph.schedule import count
+from ..expr.core import Expr, reachable, substitute
+from ..expr.differentiate import jacobian
+from ..expr.schedule import count
+from ..mechanics.methods.embedding import ForceSlopes
 from .factor import Factor, factorize, path, positivity, solve
 from .program import Limits
 from .terms import SystemTerms

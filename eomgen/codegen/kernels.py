@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 from ..base.kernel_table import DAE, NAMED
-from ..graph.core import Expr, reachable, substitute, symbols_of
-from ..graph.differentiate import jacobian, jvp
-from ..graph.pairs import pairs_of_bodies, without_pairs
-from ..graph.schedule import count
-from ..kinematics.wrenches import inertial_terms
+from ..expr.core import Expr, reachable, substitute, symbols_of
+from ..expr.differentiate import jacobian, jvp
+from ..expr.pairs import pairs_of_bodies, without_pairs
+from ..expr.schedule import count
+from ..mechanics.wrenches import inertial_terms
 from .contact_columns import COLUMNS, ContactColumns, contact_columns
 from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
 from .jacobian_blocks import Entries, ResidualSlopes, unrolled_jacobian, unrolled_shift

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 from ..base.limits.systems import FIXED
 from ..base.operations import CONDITION, operations_with
-from ..graph.core import Expr, Graph, reachable, sqrt, substitute
-from ..graph.differentiate import jacobian
-from ..kinematics.motion import Matrix, combined, eliminate, total
+from ..expr.core import Expr, Graph, reachable, sqrt, substitute
+from ..expr.differentiate import jacobian
+from ..mechanics.motion import Matrix, combined, eliminate, total
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64

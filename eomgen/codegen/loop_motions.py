@@ -16,8 +16,8 @@ from functools import cached_property
 
 from ..base.limits.constraints import LOST
 from ..base.limits.crossings import NEAR_SQUARE
-from ..graph.core import Expr, substitute
-from ..graph.schedule import count
+from ..expr.core import Expr, substitute
+from ..expr.schedule import count
 from .linear_algebra import (
     OrthogonalFactor,
     Row,

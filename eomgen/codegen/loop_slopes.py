@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from ..base.limits.constraints import TIKHONOV
-from ..equations.recursions import ConstraintRow
-from ..graph.core import Expr, reachable, substitute
-from ..graph.differentiate import jacobian, jvp
-from ..graph.pairs import list_operands
-from ..kinematics.motion import dot, total
+from ..expr.core import Expr, reachable, substitute
+from ..expr.differentiate import jacobian, jvp
+from ..expr.pairs import list_operands
+from ..mechanics.methods.recursions import ConstraintRow
+from ..mechanics.motion import dot, total
 from .linear_algebra import times
 from .loop_systems import BodyLoops
 from .program import Block, Port

@@ -15,9 +15,9 @@ from ..base.algebra import DiagonalBlock, diagonal_blocks
 from ..base.limits.constraints import GENTLE, KEPT, LEFT, LOST, ROUNDED, TIKHONOV, UNMOVED, VANISHED
 from ..base.limits.crossings import NEAR_SQUARE, SMALL
 from ..base.limits.numbers import ROW, STILL
-from ..equations.recursions import ConstraintRow, TreeMotion
-from ..graph.core import Expr, substitute
-from ..kinematics.constraint_functions import ALL, UNIT
+from ..expr.core import Expr, substitute
+from ..mechanics.constraint_functions import ALL, UNIT
+from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
 from .factor import exceeding, outward
 from .linear_algebra import (
     Row,

@@ -12,22 +12,22 @@ from ..base.names import acceleration_name
 from ..base.notation import split_rate
 from ..base.operations import OPERATIONS
 from ..base.value_rules import RANGE
-from ..constraints import RollingDisc
-from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
-from ..describe.requirements import Requirement
-from ..equations.tree_equations import TreeEquations
+from ..elements.constraints import RollingDisc
+from ..elements.frames import GROUND, Marker
+from ..elements.joints.joint_types import Cylindrical, Free, Planar, Prismatic, Translational
 from ..errors import TO_BE_FINITE, ModelError, UsageError
-from ..frames import GROUND, Marker
-from ..graph.core import Expr, reachable, symbols_of
-from ..graph.differentiate import gradient
-from ..graph.evaluate import compile_evaluator, evaluate
-from ..graph.schedule import record_tape
-from ..joints.joint_types import Cylindrical, Free, Planar, Prismatic, Translational
-from ..kinematics import Kinematics
-from ..kinematics.constraint_functions import row_groups, row_scales, row_velocities
-from ..kinematics.mobility import Mobility, initial_values
-from ..kinematics.near_pairs import describe_contacts
-from ..kinematics.wrenches import find_wrenches
+from ..expr.core import Expr, reachable, symbols_of
+from ..expr.differentiate import gradient
+from ..expr.evaluate import compile_evaluator, evaluate
+from ..expr.schedule import record_tape
+from ..mechanics import Kinematics
+from ..mechanics.constraint_functions import row_groups, row_scales, row_velocities
+from ..mechanics.methods.tree_equations import TreeEquations
+from ..mechanics.mobility import Mobility, initial_values
+from ..mechanics.near_pairs import describe_contacts
+from ..mechanics.wrenches import find_wrenches
+from ..model.mechanism import FirstOrderState, Input, Output, Parameter
+from ..model.requirements import Requirement
 from .picture import describe_picture
 from .terms import flag_forces, independent_places, resets, resolved
 

@@ -14,11 +14,11 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 from ..base.files import open_plain, refuse_link
+from ..base.targets import PRECISIONS, find_target
 from ..base.texts import summary_text
 from ..errors import UsageError, bad_file, cannot, no_choice
-from ..layer import read_native
 from ..runtime.layout import Layout
-from ..targets import PRECISIONS, find_target
+from ..toolchain.layer import read_native
 from .c import emit_c
 from .c_lanes import DERIVATIVES
 from .files import SourceSet, describe_layouts, metadata_json, number_texts, render, trace_provenance
@@ -44,8 +44,8 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 ANALYSES = ("motion_range", "linearize", "modes", "equilibrium", "reactions", "undetermined_reactions",
             "driving_forces", "actuator_forces", "consistent")  # fmt: skip
 #: What packages in Python carry of eomgen, unchanged: whatever runs need, and the analyses if asked for.
-CARRIED = ("errors.py", "module.py", "base", "numeric", "runtime", "simulation", "ensembles")
-CARRIED_ANALYSES = ("analysis", "identification")
+CARRIED = ("errors.py", "module.py", "base", "runtime")
+CARRIED_ANALYSES = ("analysis",)
 
 #: Files of every package.
 ABOUT = ("LICENSE.txt", "PROVENANCE.md")

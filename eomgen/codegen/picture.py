@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..describe.mechanism import JointSpec, Mechanism
+from ..base.numeric.user_functions import Curve
+from ..elements.forces import Force
+from ..elements.frames import Frame, Marker, WrapCylinder
 from ..elements.looks import (
     ARROW,
     ROUND_ARROW,
@@ -26,12 +28,10 @@ from ..elements.looks import (
     Wheel,
 )
 from ..errors import UsageError
-from ..forces import Force
-from ..frames import Frame, Marker, WrapCylinder
-from ..graph.core import Expr, substitute, symbols_of
-from ..graph.evaluate import evaluate
-from ..graph.schedule import record_tape
-from ..numeric.user_functions import Curve
+from ..expr.core import Expr, substitute, symbols_of
+from ..expr.evaluate import evaluate
+from ..expr.schedule import record_tape
+from ..model.mechanism import JointSpec, Mechanism
 
 #: Symbols that stand for the parameters of a curve or a surface.
 RUNNING = ("$0", "$1")

@@ -13,10 +13,10 @@ from math import prod
 from typing import Any
 
 from ..base.kernel_table import Sizes
-from ..equations.tree_equations import LinearSystem
-from ..graph.core import LEAVES, Expr, Graph, reachable
-from ..graph.schedule import Operations, count
-from ..records import dataclass
+from ..base.records import dataclass
+from ..expr.core import LEAVES, Expr, Graph, reachable
+from ..expr.schedule import Operations, count
+from ..mechanics.methods.tree_equations import LinearSystem
 from .contact_columns import ContactColumns
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from

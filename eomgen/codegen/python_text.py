@@ -1,6 +1,6 @@
 """A straight-line block -> Python functions of NumPy operations, for one state or k states at once.
 
-Every operation means what :mod:`eomgen.graph.evaluate` makes of it on arrays.
+Every operation means what :mod:`eomgen.expr.evaluate` makes of it on arrays.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..base.operations import CONDITION, OPERATIONS
-from ..graph.core import symbols_of
-from ..graph.differentiate import square_under_root
-from ..graph.pairs import PairCall, PairFunction, PairPart, pair_call
+from ..expr.core import symbols_of
+from ..expr.differentiate import square_under_root
+from ..expr.pairs import PairCall, PairFunction, PairPart, pair_call
 from .program import Block, Program
 from .statements import Pieces, PrintedFunction, cut, references
 

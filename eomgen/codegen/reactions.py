@@ -14,24 +14,24 @@ from ..base.algebra import correlated
 from ..base.limits.constraints import STRUCTURE
 from ..base.limits.numbers import SINGULAR
 from ..base.limits.systems import UNTOUCHED
+from ..base.numeric.ranks import SparseRows
 from ..base.operations import CONDITION, OPERATIONS
-from ..describe.mechanism import Mechanism
-from ..equations import METHODS
-from ..equations.tree_equations import TreeEquations
+from ..elements.forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
+from ..elements.forces.friction import is_carried, multiplier_of, reaction_of
 from ..errors import ModelError, Problem
-from ..forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
-from ..forces.friction import is_carried, multiplier_of, reaction_of
-from ..graph.core import Expr, operands, reachable, substitute, symbols_of
-from ..graph.differentiate import jacobian
-from ..graph.evaluate import compile_evaluator
-from ..kinematics import Kinematics
-from ..kinematics.constraint_functions import ConstraintFunctions
-from ..kinematics.kinematics import ForceTerms
-from ..kinematics.mobility import Mobility
-from ..kinematics.motion import Matrix, combined, dot, eliminate, entries_of, force_and_moment, total, with_entries
-from ..kinematics.switched import SwitchedRow, switched_rows
-from ..kinematics.wrenches import JointWrenches, Row6, carried_reactions
-from ..numeric.ranks import SparseRows
+from ..expr.core import Expr, operands, reachable, substitute, symbols_of
+from ..expr.differentiate import jacobian
+from ..expr.evaluate import compile_evaluator
+from ..mechanics import Kinematics
+from ..mechanics.constraint_functions import ConstraintFunctions
+from ..mechanics.kinematics import ForceTerms
+from ..mechanics.methods import METHODS
+from ..mechanics.methods.tree_equations import TreeEquations
+from ..mechanics.mobility import Mobility
+from ..mechanics.motion import Matrix, combined, dot, eliminate, entries_of, force_and_moment, total, with_entries
+from ..mechanics.switched import SwitchedRow, switched_rows
+from ..mechanics.wrenches import JointWrenches, Row6, carried_reactions
+from ..model.mechanism import Mechanism
 from .factor import factorize, solve
 from .laws import MANY, laws_in, pieces_of, solve_laws
 from .switched_constraints import AfterEvents, LinearValues, solve_rows

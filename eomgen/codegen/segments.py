@@ -18,8 +18,8 @@ from itertools import chain, groupby
 
 import numpy as np
 
-from ..graph.core import LEAVES, Expr, Graph, parts, reachable
-from ..records import dataclass
+from ..base.records import dataclass
+from ..expr.core import LEAVES, Expr, Graph, parts, reachable
 from .pair_sums import PairLists
 from .statements import CIRCULAR
 

@@ -12,7 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, OPERATIONS
-from ..graph.core import Node, reachable
+from ..expr.core import Node, reachable
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.

@@ -17,7 +17,7 @@ from ..base.limits.in_c import KINDS
 from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..base.operations import FUNCTION, OPERATIONS
 from ..errors import cannot
-from ..graph.schedule import Operations
+from ..expr.schedule import Operations
 from .c_functions import used_calls
 from .factor import factoring_operations
 from .pair_sums import refuse_sums

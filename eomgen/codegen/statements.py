@@ -12,9 +12,9 @@ from math import prod
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, operations_with
-from ..graph.core import LEAVES, Expr, Graph
-from ..graph.schedule import chunk, order
-from ..records import dataclass
+from ..base.records import dataclass
+from ..expr.core import LEAVES, Expr, Graph
+from ..expr.schedule import chunk, order
 from .program import Program
 
 #: Operations on pairs; both signs of a sum are one, since signs may differ.

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 from ..base.limits.constraints import MEASURED
 from ..base.limits.numbers import SINGULAR
-from ..describe.mechanism import Event
-from ..forces.force import where
-from ..graph.core import Expr, substitute
-from ..kinematics import Kinematics
-from ..kinematics.motion import Matrix, combined, dot, total
-from ..kinematics.switched import SwitchedRow
+from ..elements.forces.force import where
+from ..expr.core import Expr, substitute
+from ..mechanics import Kinematics
+from ..mechanics.motion import Matrix, combined, dot, total
+from ..mechanics.switched import SwitchedRow
+from ..model.mechanism import Event
 
 
 class LinearValues(NamedTuple):

@@ -10,20 +10,20 @@ from ..base.kernel_table import Sizes
 from ..base.names import acceleration_name
 from ..base.notation import rate_of
 from ..base.operations import operations_with
-from ..equations.embedding import can_differentiate
-from ..equations.recursions import ConstraintRow, TreeMotion
-from ..equations.tree_equations import TreeEquations
+from ..elements.forces.force import where
+from ..elements.frames import Frame, Marker
 from ..errors import UsageError
-from ..forces.force import where
-from ..frames import Frame, Marker
-from ..graph.core import Expr, reachable, substitute
-from ..kinematics import Kinematics
-from ..kinematics.closing import shortest_gamma, shortest_rows
-from ..kinematics.constraint_functions import row_groups, row_scales
-from ..kinematics.kinematics import ForceTerms
-from ..kinematics.mobility import Mobility
-from ..kinematics.near_pairs import motion_axes, near_pairs
-from ..kinematics.wrenches import cut_drives, find_wrenches
+from ..expr.core import Expr, reachable, substitute
+from ..mechanics import Kinematics
+from ..mechanics.closing import shortest_gamma, shortest_rows
+from ..mechanics.constraint_functions import row_groups, row_scales
+from ..mechanics.kinematics import ForceTerms
+from ..mechanics.methods.embedding import can_differentiate
+from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
+from ..mechanics.methods.tree_equations import TreeEquations
+from ..mechanics.mobility import Mobility
+from ..mechanics.near_pairs import motion_axes, near_pairs
+from ..mechanics.wrenches import cut_drives, find_wrenches
 from .factor import has_long_paths
 from .reactions import multiplier_values
 

@@ -1,8 +1,8 @@
 """Elements: a type (its word in model files, its keys, its reader), and what a reader may ask of an entry.
 
-The tables of types (:data:`~eomgen.forces.FORCES` ...) drive the check of model files, their JSON Schema, the methods
+The tables of types (:data:`~.forces.FORCES` ...) drive the check of model files, their JSON Schema, the methods
 of Model and their documentation, so that a new type is one row, in the file of its class.  The keys of most are fields
-of their class, which :func:`key` marks.  The reader of entries is :class:`~eomgen.describe.element_entry.ElementEntry`.
+of their class, which :func:`key` marks.  The reader of entries is :class:`~eomgen.model.element_entry.ElementEntry`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ..base.value_rules import Allowed
-from ..frames import Marker
-from ..graph.core import Expr, Graph
+from ..expr.core import Expr, Graph
+from .frames import Marker
 from .kinds import Choice, Field, Fields
 
 

@@ -4,8 +4,8 @@ From a kind follow all uses of a key: how YAML and Python give it (:meth:`Field.
 JSON Schema, the documentation and annotation of an argument, where a dimension is looked up (:meth:`Field.part`), how
 the value in an instance of a component is made of that in the component (:meth:`Field.map`), and what a model file
 leaves out (:meth:`Field.is_default`).  A new kind is one class.  ``reader`` is the
-:class:`~eomgen.describe.values.Reader` of a model, ``visitor`` a :class:`~eomgen.describe.visit.Visitor`, ``refer`` the
-:class:`~eomgen.describe.handles.References` of a model in Python.
+:class:`~eomgen.model.values.Reader` of a model, ``visitor`` a :class:`~eomgen.model.visit.Visitor`, ``refer`` the
+:class:`~eomgen.model.handles.References` of a model in Python.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import Any, ClassVar
 
 from ..base.names import LONGEST
 from ..base.value_rules import CHECKS, NOT_NEGATIVE, POSITIVE, Allowed
-from ..frames import Marker, WrapCylinder
 from .dimensions import LENGTH, NONE, TIME, Dimension
+from .frames import Marker, WrapCylinder
 
 # What the expressions of a key may depend on; each level includes those before it.
 NUMBER = -1  #: numbers, pi

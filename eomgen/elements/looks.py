@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..frames import Marker, WrapCylinder
-from ..graph.core import Expr
+from ..expr.core import Expr
+from .frames import Marker, WrapCylinder
 
 Points = tuple[tuple[float, ...], ...]
 

@@ -10,8 +10,8 @@ import sympy
 
 from ..base.notation import dotted
 from ..errors import UnavailableError
-from ..graph.core import Expr
-from ..graph.differentiate import gradient
+from ..expr.core import Expr
+from ..expr.differentiate import gradient
 from ..reading import Quantities
 from ..reading.quantities import needed
 from .author import Author, Shown

@@ -11,8 +11,8 @@ import sympy
 from ..base.names import acceleration_name
 from ..base.notation import literal, with_instance
 from ..errors import UnavailableError
-from ..graph.core import Expr
-from ..kinematics.report import plane_axis
+from ..expr.core import Expr
+from ..mechanics.report import plane_axis
 from ..reading import Quantities, ReadingView
 from ..reading.quantities import Written, needed, write
 from .document import Folded, FormulaLine, Piece, Printer, PutIn, Sentence

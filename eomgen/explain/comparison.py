@@ -14,10 +14,10 @@ import sympy
 from ..base.limits.numbers import ALIKE, EPS, ROUNDED
 from ..base.names import acceleration_name
 from ..errors import EomgenError
-from ..graph.core import Expr, symbols_of
-from ..graph.evaluate import evaluate as of_graph
-from ..graph.rounding_bounds import with_bounds
-from ..verification.cases import Case, random_cases
+from ..expr.core import Expr, symbols_of
+from ..expr.evaluate import evaluate as of_graph
+from ..expr.rounding_bounds import with_bounds
+from ..verify.cases import Case, random_cases
 from .author import Author
 
 # -- formulas at numbers -----------------------------------------------------------------------------------------------

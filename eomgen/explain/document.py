@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+from ..base.records import dataclass
 from ..base.texts import visible
-from ..printing import Formulas, given_mathml, latex, latex_lines, mathml, mathml_lines, number, text
-from ..printing.formula import ROUNDED, Formula, MatrixOf
+from ..expr.printing import Formulas, given_mathml, latex, latex_lines, mathml, mathml_lines, number, text
+from ..expr.printing.formula import ROUNDED, Formula, MatrixOf
 from ..reading.printed import order_of
-from ..records import dataclass
 
 # -- parts of a document -----------------------------------------------------------------------------------------------
 

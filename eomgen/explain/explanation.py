@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.files import write_whole
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
-from ..graph.pairs import opaque_names
+from ..expr.pairs import opaque_names
 from .document import DrawnPicture, Folded, Piece, Printer, Section
 from .writers import write_html, write_markdown, write_tex
 

@@ -9,12 +9,12 @@ from typing import Any
 import sympy
 
 from ..base.inline_pictures import trimmed_png
-from ..describe.build_states import CLOSES, OPENS
-from ..describe.mechanism import JointSpec, Switched
-from ..describe.placement import axis_word
+from ..elements.frames import GROUND
 from ..errors import EomgenError, UnavailableError
-from ..frames import GROUND
-from ..graph.core import Expr
+from ..expr.core import Expr
+from ..model.build_states import CLOSES, OPENS
+from ..model.mechanism import JointSpec, Switched
+from ..model.placement import axis_word
 from .author import Author, in_numbers, nodes
 from .comparison import Difference, is_rounding, known_values, value_of
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ..base.inline_pictures import image_html
 from ..base.texts import html_text
-from ..printing import given_mathml
+from ..expr.printing import given_mathml
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Printer, Section, Sentence, Table, written
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from ..describe.description import Description
 from ..errors import ModelError
+from ..model.description import Description
 from .robot import CONVERTED, RobotOptions, make_options
 from .robot_description import describe_robot
 from .urdf import read_urdf

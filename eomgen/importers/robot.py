@@ -13,9 +13,9 @@ from ..base.algebra import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..base.files import as_name
 from ..base.limits.numbers import LARGEST
 from ..base.value_rules import CHECKS, word_of_check
-from ..describe.expressions import constant
-from ..describe.names import nearest
 from ..errors import Problem, ill_typed, no_choice, no_such
+from ..model.expressions import constant
+from ..model.names import nearest
 
 Place = tuple[str, int]  # file, line
 Range = tuple[float, float]  # lowest and highest value

@@ -12,13 +12,13 @@ import numpy as np
 from ..base.algebra import about
 from ..base.limits.numbers import FREEDOMS, LARGEST, LAWS, SINGULAR, TIES
 from ..base.value_rules import EXCESS, fault_of_inertia, inertia_scales, longest_within
-from ..describe.description import GROUND_NAME, Description, Values
-from ..describe.names import LONGEST, clean_name, fault_of_model_name, nearest, unique
-from ..describe.placement import TURNS
-from ..describe.scope import RATES
+from ..elements.joints import JOINTS
+from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from ..errors import ModelError, Problem
-from ..joints import JOINTS
-from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
+from ..model.description import GROUND_NAME, Description, Values
+from ..model.names import LONGEST, clean_name, fault_of_model_name, nearest, unique
+from ..model.placement import TURNS
+from ..model.scope import RATES
 from .robot import (
     IDENTITY,
     Drive,

@@ -12,11 +12,16 @@ from ..base import algebra
 from ..base.limits.constraints import GIVEN as SMALL
 from ..base.limits.numbers import ROUNDED
 from ..base.notation import rate_of
-from ..describe.description import Description
-from ..describe.names import nearest
-from ..describe.printed_names import give_latex
-from ..describe.scope import RATES
-from ..describe.sympy_face import (
+from ..errors import ExpressionError, ModelError, Problem, ill_typed, incomplete
+from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.differentiate import jacobian, jvp
+from ..expr.evaluate import evaluate
+from ..expr.rounding_bounds import with_bounds
+from ..model.description import Description
+from ..model.names import nearest
+from ..model.printed_names import give_latex
+from ..model.scope import RATES
+from ..model.sympy_face import (
     function_name,
     is_sympy,
     lower_sympy,
@@ -26,12 +31,7 @@ from ..describe.sympy_face import (
     one_or_several,
     sympy_name,
 )
-from ..describe.sympy_text import SympyNames
-from ..errors import ExpressionError, ModelError, Problem, ill_typed, incomplete
-from ..graph.core import Expr, Graph, substitute, symbols_of
-from ..graph.differentiate import jacobian, jvp
-from ..graph.evaluate import evaluate
-from ..graph.rounding_bounds import with_bounds
+from ..model.sympy_text import SympyNames
 
 KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..base.limits.numbers import LARGEST
 from ..base.value_rules import SWITCH
-from ..describe.build_joints import limits_nothing
 from ..errors import ModelError
+from ..model.build_joints import limits_nothing
 from .robot import (
     CONVERTED,
     IDENTITY,

@@ -22,7 +22,7 @@ static void form_rows(const eom_at *at, const double *restrict column, int width
     }
 }
 
-/* What entries of each row of J are compared with (eomgen/kinematics/constraint_functions.py); largest: M + 1 numbers of work. */
+/* What entries of each row of J are compared with (eomgen/mechanics/constraint_functions.py); largest: M + 1 numbers of work. */
 static void find_sizes(const eom_at *at, int width, double *restrict sizes, double *restrict largest)
 {
     const double *const a = AT(ROWS);

@@ -8,23 +8,23 @@ from typing import Any, NamedTuple
 
 from ..base.names import acceleration_name
 from ..base.notation import Notation
-from ..describe.expressions import parse
-from ..describe.printed_names import MULTIPLIERS, numbered
-from ..describe.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
-from ..describe.visit import rewritten
-from ..equations.free_bodies import FreeBodies
+from ..elements.frames import GROUND
 from ..errors import ExpressionError, UnavailableError, UsageError, at_odds, ill_typed
-from ..frames import GROUND
-from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, reachable, substitute, symbols_of
-from ..graph.differentiate import jacobian
-from ..graph.evaluate import evaluate
-from ..graph.shown import quoted
-from ..graph.spatial import Wrench
-from ..graph.tensors import solve_symmetric
-from ..graph.vectors import Vec3
-from ..kinematics import Kinematics
-from ..kinematics.wrenches import JointWrenches, cut_drives
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
+from ..expr.differentiate import jacobian
+from ..expr.evaluate import evaluate
+from ..expr.shown import quoted
+from ..expr.spatial import Wrench
+from ..expr.tensors import solve_symmetric
+from ..expr.vectors import Vec3
+from ..mechanics import Kinematics
+from ..mechanics.methods.free_bodies import FreeBodies
+from ..mechanics.wrenches import JointWrenches, cut_drives
+from ..model.expressions import parse
+from ..model.printed_names import MULTIPLIERS, numbered
+from ..model.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
+from ..model.visit import rewritten
 from ..runtime.argument_checks import unknown
 from .quantities import Quantities, Row, Rows, require_bodies
 

@@ -10,15 +10,15 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import correlated
 from ..base.limits.numbers import LEAST, SINGULAR
-from ..equations.reduction import eliminate
+from ..base.numeric.ranks import partition
 from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UnavailableError
-from ..graph import vectors as vec
-from ..graph.core import Expr, substitute, symbols_of
-from ..graph.differentiate import jacobian, jvp
-from ..graph.evaluate import evaluate
-from ..graph.tensors import solve_symmetric
-from ..kinematics.motion import dot
-from ..numeric.ranks import partition
+from ..expr import vectors as vec
+from ..expr.core import Expr, substitute, symbols_of
+from ..expr.differentiate import jacobian, jvp
+from ..expr.evaluate import evaluate
+from ..expr.tensors import solve_symmetric
+from ..mechanics.methods.reduction import eliminate
+from ..mechanics.motion import dot
 from .methods import put_in
 from .quantities import Quantities, Row, Rows
 

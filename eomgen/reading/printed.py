@@ -11,10 +11,10 @@ import sympy
 
 from ..base.names import acceleration_name
 from ..base.notation import Notation, dotted, raised
-from ..frames import GROUND
-from ..graph.core import Expr, symbols_of
-from ..printing import PAGE, Formulas, Order, number, text, width
-from ..printing.formula import (
+from ..elements.frames import GROUND
+from ..expr.core import Expr, symbols_of
+from ..expr.printing import PAGE, Formulas, Order, number, text, width
+from ..expr.printing.formula import (
     COORDINATE,
     DIGITS,
     GRAVITY,
@@ -33,7 +33,7 @@ from ..printing.formula import (
     SumOf,
     Words,
 )
-from ..printing.writers import TIGHT
+from ..expr.printing.writers import TIGHT
 from .named_parts import PartMeaning, find_blocks, grouped
 from .readable import BODIES, LOOPS, PARTS, Readable
 from .tree_system import MANY

@@ -7,20 +7,20 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..equations import METHODS
-from ..equations.analytical import form_energies
-from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
-from ..equations.tree_equations import TreeEquations
+from ..elements.frames import GROUND, Frame, Marker
 from ..errors import UnavailableError
-from ..frames import GROUND, Frame, Marker
-from ..graph import vectors as vec
-from ..graph.core import Expr, substitute, symbols_of
-from ..graph.differentiate import gradient, vjp
-from ..graph.schedule import count
-from ..graph.vectors import Vec3
-from ..kinematics import Kinematics
-from ..kinematics.mobility import Mobility
-from ..kinematics.wrenches import potential_energy, virtual_power
+from ..expr import vectors as vec
+from ..expr.core import Expr, substitute, symbols_of
+from ..expr.differentiate import gradient, vjp
+from ..expr.schedule import count
+from ..expr.vectors import Vec3
+from ..mechanics import Kinematics
+from ..mechanics.methods import METHODS
+from ..mechanics.methods.analytical import form_energies
+from ..mechanics.methods.reduction import LoopNames, VelocityTransformation, transform_velocities
+from ..mechanics.methods.tree_equations import TreeEquations
+from ..mechanics.mobility import Mobility
+from ..mechanics.wrenches import potential_energy, virtual_power
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -113,13 +113,13 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
         for j in range(3)
     ]
     values = [x for _, x in entries]
-    from ..simplify import joined_nodes  # nothing is simplified until equations are read
+    from ..expr.simplify import joined_nodes  # nothing is simplified until equations are read
 
     joined, _ = joined_nodes([*expressions, *values], (), kinematics.euler_parameters)
     whole, values = joined[: len(expressions)], joined[len(expressions) :]
     if not entries:
         return whole, []
-    from ..graph.sympy_bridge import inlined_size
+    from ..expr.sympy_bridge import inlined_size
 
     if inlined_size(whole) <= FEW:
         return whole, []
@@ -156,7 +156,7 @@ class Written(NamedTuple):
 
 def is_short(expressions: Sequence[Expr]) -> bool:
     """Whether expressions are written out whole."""
-    from ..graph.sympy_bridge import inlined_size
+    from ..expr.sympy_bridge import inlined_size
 
     several = {x.id: x for x in expressions if x.value is None}
     return inlined_size(expressions) <= min(READABLE * len(several), LONGEST)
@@ -209,7 +209,7 @@ def write(
     """
     if not expressions:
         return Written([], [])
-    from ..simplify import WHOLE, joined_nodes, simplify
+    from ..expr.simplify import WHOLE, joined_nodes, simplify
 
     expressions, given = joined_nodes(expressions, given, unit)
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
@@ -276,7 +276,7 @@ class Quantities:
     Parameters
     ----------
     kinematics, mobility, tree
-        What was derived, in a graph of their own (:meth:`~eomgen.derivation.Derivation.fresh`).
+        What was derived, in a graph of their own (:meth:`~eomgen.reading.derivation.Derivation.fresh`).
     """
 
     def __init__(self, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.names import acceleration_name, hint
 from ..base.notation import Notation, split_rate
-from ..describe.visit import Undotted
-from ..equations import TreeEquations
 from ..errors import NonFiniteError, at_odds, incomplete
-from ..graph.core import Expr, Graph, copied, symbols_of
-from ..graph.evaluate import evaluate
-from ..kinematics import Kinematics
-from ..kinematics.mobility import Mobility
+from ..expr.core import Expr, Graph, copied, symbols_of
+from ..expr.evaluate import evaluate
+from ..mechanics import Kinematics
+from ..mechanics.methods import TreeEquations
+from ..mechanics.mobility import Mobility
+from ..model.visit import Undotted
 from ..runtime.argument_checks import UnknownNameError
 from .methods import (
     BlockSystem,

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.operations import operations_with
-from ..graph.core import LEAVES, Expr, reachable, substitute, symbols_of
-from ..graph.rounding_bounds import is_rounding, with_bounds
-from ..graph.schedule import count
+from ..expr.core import LEAVES, Expr, reachable, substitute, symbols_of
+from ..expr.rounding_bounds import is_rounding, with_bounds
+from ..expr.schedule import count
 from .quantities import Quantities, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead

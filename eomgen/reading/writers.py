@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from ..base.latex import SUPERSCRIPTS, read_latex, text_form
 from ..base.notation import Notation
 from ..base.texts import fold, html_text, visible
-from ..printing import latex, latex_lines, mathml, mathml_lines, text
-from ..printing.formula import DIGITS, ROUNDED, MatrixOf, times
-from ..printing.writers import TIGHT, row
+from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
+from ..expr.printing.formula import DIGITS, ROUNDED, MatrixOf, times
+from ..expr.printing.writers import TIGHT, row
 from .printed import (
     FOLDED,
     SAMPLED,

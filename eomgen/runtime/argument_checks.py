@@ -201,7 +201,7 @@ def read_text(what: str, given: str) -> float:
         Texts are read where eomgen is: a generated package has no parser.
     """
     try:
-        from ..describe.expressions import constant
+        from ..model.expressions import constant
     except ImportError:
         raise no_number(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
     return constant(given, what)

@@ -107,7 +107,7 @@ class BoundModel:
 
     @cached_property
     def _settled(self) -> dict[tuple[Any, ...], Any]:
-        """What runs with the same arguments have in common; see :mod:`..simulation.compiled`."""
+        """What runs with the same arguments have in common; see :mod:`.runs.compiled`."""
         return {}
 
     @cached_property

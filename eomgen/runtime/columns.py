@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 import numpy as np
 
 from ..base.algebra import Array, Indices
+from ..base.numeric.projection import largest
 from ..errors import too_large
-from ..numeric.projection import largest
 from .argument_checks import unknown
 from .inputs import Forcing
 from .layout import Layout

@@ -27,9 +27,7 @@ from ..base.limits.constraints import (
     UNMOVED,
 )
 from ..base.names import place_of_marker
-from ..base.picture_data import read_picture
-from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
-from ..numeric.assembly import (
+from ..base.numeric.assembly import (
     RESTARTS,
     ClosureSystem,
     CutJoints,
@@ -39,9 +37,11 @@ from ..numeric.assembly import (
     closed,
     starts,
 )
-from ..numeric.continuation import follow
-from ..numeric.projection import largest
-from ..numeric.ranks import parts, rank
+from ..base.numeric.continuation import follow
+from ..base.numeric.projection import largest
+from ..base.numeric.ranks import parts, rank
+from ..base.picture_data import read_picture
+from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
 from .argument_checks import UnknownNameError, unknown, without_dots
 from .failure import place
 from .kernels import Kernels, constraint_system
@@ -602,7 +602,7 @@ class Initial:
         if set(guess) <= set(favoured):
             with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
-        from ..numeric.assembly import close_nearest
+        from ..base.numeric.assembly import close_nearest
 
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         declared = self.used({k: v for k, v in declared.items() if k not in guess})

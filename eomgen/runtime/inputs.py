@@ -20,6 +20,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE, LOCATED, MOMENT
+from ..base.numeric.splines import slopes
 from ..base.texts import shown
 from ..errors import (
     ExpressionError,
@@ -34,7 +35,6 @@ from ..errors import (
     off_range,
     untrue,
 )
-from ..numeric.splines import slopes
 from .argument_checks import (
     as_real,
     check_names,
@@ -248,7 +248,7 @@ def read_text(layout: Layout, text: str, what: str) -> Expression:
         It is no expression, or has a name that the model does not know.
     """
     try:
-        reader = import_module("..describe.input_texts", __package__)
+        reader = import_module("..model.input_texts", __package__)
     except ImportError:
         raise MissingDependencyError(
             f"{what}: an expression as text needs eomgen to read it: pip install eomgen, or give a function f(t, x)"

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
+from ..base.numeric.assembly import ConstraintSystem, CutJoints
 from ..errors import cannot, ill_shaped, no_choice, not_finite
-from ..numeric.assembly import ConstraintSystem, CutJoints
 from .argument_checks import fitting, read_numbers
 from .argument_names import both_names
 from .failure import Fail

@@ -13,9 +13,9 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
 from ..base.names import acceleration_name
+from ..base.numeric.scales import Scales, Space
 from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
 from ..errors import ParameterError, Problem, bad_data, cannot, ill_shaped
-from ..numeric.scales import Scales, Space
 from .argument_checks import check_names, plain_name, read_number, read_numbers, without_dots
 from .tapes import play_arrays
 

@@ -15,17 +15,9 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..base.limits.analyses import FOLLOWED
-from ..errors import (
-    EvaluationError,
-    PartitionError,
-    ProjectionError,
-    at_odds,
-    ill_shaped,
-    no_number,
-    too_large,
-)
-from ..numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
-from ..numeric.projection import largest
+from ..base.numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
+from ..base.numeric.projection import largest
+from ..errors import EvaluationError, PartitionError, ProjectionError, at_odds, ill_shaped, no_number, too_large
 from .argument_checks import read_number, read_numbers
 from .argument_names import both_names
 from .failure import place

@@ -72,7 +72,7 @@ class AnimationOptions(FilmOptions, total=False):
 
 
 class BuildOptions(TypedDict, total=False):
-    """Fields of :class:`eomgen.compilation.compiler.Options`."""
+    """Fields of :class:`eomgen.toolchain.compiler.Options`."""
 
     optimize: int | None
     native: bool

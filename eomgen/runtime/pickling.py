@@ -95,7 +95,7 @@ def _find_core(name: str, file: str) -> Any:
             f"the compiled code of the pickled module is {what}: {file}; compile the model again",
             code="EG-FILE-DAMAGED",
         ) from error
-    return import_module("eomgen.compilation.load").open_core(name, path)
+    return import_module("eomgen.toolchain.load").open_core(name, path)
 
 
 def _require_features(manifest: Mapping[str, Any], file: str) -> None:

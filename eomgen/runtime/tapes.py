@@ -23,7 +23,7 @@ class Expression:
     text : str
         As results and messages name it.
     tape : list
-        As :mod:`eomgen.graph.schedule` makes them.
+        As :mod:`eomgen.expr.schedule` makes them.
     slopes : callable
         Places of the derivatives that do not vanish, among those by t, x and p, and their tape.
     rate : callable, optional

@@ -22,7 +22,7 @@ from packages import built
 from sweeps import part_of
 
 import eomgen as eg
-from eomgen.generation import generate
+from eomgen.api.generation import generate
 
 #: Only NumPy: everything else that eomgen uses is refused.  Each call that the package lists has the shape it says.
 ALONE = """

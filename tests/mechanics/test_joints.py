@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from sweeps import METHODS, TARGETS
 
 import eomgen as eg
-from eomgen import rotations
+from eomgen.elements import rotations
 
 # -- MSC ADAMS, as stored with Project Chrono (data/testing/joints, BSD-3) ---------------------------------------------
 KINDS = {"rev": "revolute", "rev_spring": "revolute", "sph": "spherical", "pri": "prismatic", "cyl": "cylindrical"}

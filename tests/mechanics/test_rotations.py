@@ -12,7 +12,7 @@ import pytest
 import sympy
 from scipy.spatial.transform import Rotation
 
-from eomgen import rotations as rot
+from eomgen.elements import rotations as rot
 
 # -- Conversions and rates ---------------------------------------------------------------------------------------------
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2]]

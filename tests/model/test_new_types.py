@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.base.records import dataclass
 from eomgen.base.value_rules import POSITIVE
-from eomgen.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
-from eomgen.describe import model_schema
+from eomgen.elements.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
 from eomgen.elements.dimensions import LENGTH, STIFFNESS
 from eomgen.elements.element_type import element, key
+from eomgen.elements.forces import FORCES, View
+from eomgen.elements.forces.paths import LINE, PathForce
+from eomgen.elements.frames import Marker
+from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint
 from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
-from eomgen.forces import FORCES, View
-from eomgen.forces.paths import LINE, PathForce
-from eomgen.frames import Marker
-from eomgen.graph import vectors as vec
-from eomgen.graph.core import Expr, Graph
-from eomgen.graph.vectors import Mat3, Vec3
-from eomgen.joints import JOINTS, Closure, Coordinate, Joint
-from eomgen.records import dataclass
+from eomgen.expr import vectors as vec
+from eomgen.expr.core import Expr, Graph
+from eomgen.expr.vectors import Mat3, Vec3
+from eomgen.model import model_schema
 
 
 class Percent(Scalar):

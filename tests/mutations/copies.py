@@ -20,7 +20,7 @@ FILES = ("pyproject.toml", "README.md", "Makefile", "LICENSE")
 INSIDE = ("templates", "examples")
 LIMIT = 600.0  #: s, on a busy machine
 CHECK = (
-    "import eomgen, eomgen.templates, eomgen.examples, eomgen.layer, sys; root = sys.argv[1]; "
+    "import eomgen, eomgen.templates, eomgen.examples, eomgen.toolchain.layer, sys; root = sys.argv[1]; "
     "paths = [eomgen.__file__, eomgen.templates.__path__[0], eomgen.examples.__path__[0]]; "
     "sys.exit(any(not path.startswith(root) for path in paths) and str(paths))"
 )

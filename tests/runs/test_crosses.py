@@ -29,7 +29,7 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.interpolate import CubicSpline
 
 import eomgen as eg
-from eomgen.generation import generate
+from eomgen.api.generation import generate
 
 END = 0.29
 TIMES = np.array([0.003, 0.115, 0.19, END])  # no corner of an input and no sample among them

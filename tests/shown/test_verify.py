@@ -20,7 +20,7 @@ from refusals import refuses
 from sweeps import COVERING, METHODS, part_of
 
 import eomgen as eg
-from eomgen.generation import generate
+from eomgen.api.generation import generate
 
 EXAMPLES = models.EXAMPLES
 

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ...device.device_module import DeviceModule
+from ...base.targets import CUDA_REQUIREMENTS, DEVICE_KERNELS, TIMED_ON_DEVICE
 from ...errors import cannot
-from ...layer import read_layer, read_sources
-from ...simulation.events import GO_ON, RESET, crowd_of
-from ...targets import CUDA_REQUIREMENTS, DEVICE_KERNELS, TIMED_ON_DEVICE
+from ...runtime.device.device_module import DeviceModule
+from ...runtime.runs.events import GO_ON, RESET, crowd_of
+from ...toolchain.layer import read_layer, read_sources
 from ..c import count_constants, emit_c
 from ..c_functions import used_calls
 from ..c_text import print_precompute
@@ -27,7 +27,7 @@ from ..program import Block, KernelDriver, Program
 from ..statements import cut
 
 if TYPE_CHECKING:
-    from ...device.cuda_device import Device
+    from ...runtime.device.cuda_device import Device
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
@@ -41,11 +41,11 @@ _OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTI
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
 
 #: What a package carries of eomgen, unchanged.
-CARRIED = ("errors.py", "targets.py", "base", "numeric", "runtime", "simulation", "device")
+CARRIED = ("errors.py", "base", "runtime")
 
 
 def emit_device_text(program: Program) -> str:
-    """The text of ``<name>.cu``, with the kernels :data:`~eomgen.targets.DEVICE_KERNELS`.
+    """The text of ``<name>.cu``, with the kernels :data:`~eomgen.base.targets.DEVICE_KERNELS`.
 
     Raises
     ------

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...alone import alone, timed
-from ...compilation.build import compile_sources, note_of
-from ...compilation.cache import Cache, cache_directory
-from ...compilation.compiler import Options
-from ...compilation.load import load_core
+from ...base.without_gc import timed, without_gc
 from ...errors import ModelError, Problem, ToolchainError, no_such
-from ...graph.functions import Function
+from ...expr.functions import Function
+from ...toolchain.build import compile_sources, note_of
+from ...toolchain.cache import Cache, cache_directory
+from ...toolchain.compiler import Options
+from ...toolchain.load import load_core
 from ..build import fingerprint
 from ..program import Program
 
@@ -26,7 +26,7 @@ def load(
     if unknown:
         raise no_such(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     chosen, cache = Options(**options), Cache(cache_directory())
-    with alone(), timed(seconds, "emit"):
+    with without_gc(), timed(seconds, "emit"):
         note = note_of(fingerprint(program), chosen)
         entry = cache.find_noted(note)
         if entry is None:
@@ -42,7 +42,7 @@ def load(
             except ToolchainError as error:
                 raise _blame_source(error, functions.values()) or error from None
             cache.note(note, entry.key)
-    with alone(), timed(seconds, "load"):
+    with without_gc(), timed(seconds, "load"):
         return load_core(entry)
 
 

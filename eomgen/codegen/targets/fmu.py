@@ -25,16 +25,16 @@ from ...base.algebra import Array
 from ...base.files import as_path, refuse_link, write_whole
 from ...base.limits import runs
 from ...base.limits.in_c import definitions
+from ...base.targets import FMI_VERSIONS
 from ...base.texts import html_text, one_line
-from ...compilation.build import compile_sources
-from ...compilation.compiler import Options
-from ...describe.units import read_unit
 from ...errors import ModelError, Problem, bad_file, no_choice
-from ...layer import read_layer
+from ...model.units import read_unit
 from ...runtime.bound_model import BoundModel
 from ...runtime.inputs import Forcing
 from ...runtime.layout import bounds_of
-from ...targets import FMI_VERSIONS
+from ...toolchain.build import compile_sources
+from ...toolchain.compiler import Options
+from ...toolchain.layer import read_layer
 from ..c import emit_c
 from ..files import number_texts, read_template, render
 from ..program import Program
@@ -418,7 +418,7 @@ def write_fmu(
     Parameters
     ----------
     program : Program
-        With the kernels :data:`~eomgen.targets.FMU_KERNELS`.
+        With the kernels :data:`~eomgen.base.targets.FMU_KERNELS`.
     module : BoundModel
         The model, for its initial state.
     path : str or Path, optional

@@ -6,11 +6,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ...alone import alone, timed
-from ...compilation.load import load_numpy
+from ...base.numeric.user_functions import Curve, Surface, Twin
+from ...base.without_gc import timed, without_gc
 from ...errors import cannot
-from ...graph.functions import Function
-from ...numeric.user_functions import Curve, Surface, Twin
+from ...expr.functions import Function
+from ...toolchain.load import load_numpy
 from ..c import closed_at
 from ..c_functions import used_calls
 from ..c_layout import describe_equations, work_areas
@@ -33,16 +33,16 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
     """
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
-    imports = [f"from .numeric.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
+    imports = [f"from .base.numeric.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
     definitions = [_table_text(f) for f, _ in calls.values() if f.native is None]
     sums = used_sums(program)
     if sums:
-        imports.append("from .numeric.pair_sums import PairSum")
+        imports.append("from .base.numeric.pair_sums import PairSum")
         chosen = {len(kind.corners) for function, *_ in sums for kind in function.kinds}
         if 1 in chosen:
-            imports.append("from .numeric.outline_pieces import nearest")
+            imports.append("from .base.numeric.outline_pieces import nearest")
         if 2 in chosen:
-            imports.append("from .numeric.polygon_edges import facing")
+            imports.append("from .base.numeric.polygon_edges import facing")
         definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions
 
@@ -125,7 +125,7 @@ def load(
     """Emit and load."""
     if options:
         raise cannot(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
-    with alone(), timed(seconds, "emit"):
+    with without_gc(), timed(seconds, "emit"):
         sources = emit_numpy(program)
     with timed(seconds, "load"):
         return load_numpy(sources, program.name, twins(program))

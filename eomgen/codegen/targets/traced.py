@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 from ...base.files import find_module, load_source
 from ...base.kernel_table import NAMED
 from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
+from ...base.numeric.scales import Space
+from ...base.numeric.user_functions import Curve, Surface
+from ...base.targets import TRACED_KERNELS
 from ...errors import MissingDependencyError, cannot
-from ...graph.functions import Function
-from ...numeric.scales import Space
-from ...numeric.user_functions import Curve, Surface
-from ...targets import TRACED_KERNELS
+from ...expr.functions import Function
 from ..c_functions import used_calls
 from ..files import example_state, render
 from ..pair_sums import refuse_sums
@@ -50,7 +50,7 @@ def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 
 def emit_traced(program: Program, library: str) -> str:
-    """The text of the module ``<name>`` for 'casadi' or 'jax', of the kernels :data:`~eomgen.targets.TRACED_KERNELS`.
+    """The text of the module ``<name>`` for 'casadi' or 'jax', of the kernels :data:`~...base.targets.TRACED_KERNELS`.
 
     Raises
     ------

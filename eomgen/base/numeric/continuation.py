@@ -1,0 +1,336 @@
+"""A curve of closed positions -> its next points, through singular ones too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ...errors import AssemblyError
+from .. import algebra
+from ..algebra import Array
+from ..limits.analyses import BLOCKED, DRIFTED, LEAPS, NULL, UNJUDGED
+from .assembly import DAMPING, ClosureSystem, ConstraintSystem, close, closed
+from .projection import largest
+from .scales import Scales
+
+# -- curves ------------------------------------------------------------------------------------------------------------
+
+
+OFF = 0.1  #: largest part of a step by which a position may miss its prediction
+TURNED = 0.3  #: the same of a direction
+ASTRAY = 0.02  #: scaled distance of a position from its interpolation that may mean another branch
+
+
+class Tangent(NamedTuple):
+    """The direction of the motion at one point, and how well it is determined."""
+
+    rate: Array  #: (n_v,) dq/ds as velocities
+    quality: float = 1.0  #: smallest over largest singular value of K: 0 at a singular position
+    sign: float = 1.0  #: of the determinant of as many independent rows of K as there are columns
+    free: Array = np.empty(0)  #: (n_v,) scaled motion that K restrains least
+    rows: Array = np.empty(0)  #: (n_c + k,) rows of K that hold that motion least
+
+
+class Point(NamedTuple):
+    """One point of a continuation; s is the curve's parameter."""
+
+    s: float
+    q: Array
+    tangent: Tangent  #: along s
+
+
+class PositionCurve(Protocol):
+    """Positions that depend on one parameter s."""
+
+    @property
+    def scales(self) -> Scales:
+        """The scales of positions."""
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position."""
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess; None if Newton's iteration finds none."""
+
+
+def predict(scales: Scales, here: Point, bend: Array, h: float) -> Array:
+    """The position a step h ahead, from the direction and its change ``bend`` along s."""
+    return scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / scales.q)
+
+
+def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
+    """Positions (n_q, k) at parameters s (k,) between points of a curve, cubics through them and their directions."""
+    if len(points) == 1:
+        return np.repeat(points[0].q[:, None], len(s), axis=1)
+    nodes = np.array([p.s for p in points])
+    values = np.array([p.q for p in points]).T
+    slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in points]).T
+    k = np.clip(np.searchsorted(nodes, s), 1, len(points) - 1)
+    width = nodes[k] - nodes[k - 1]
+    x = np.clip((s - nodes[k - 1]) / width, 0.0, 1.0)
+    q0, q1 = values[:, k - 1], values[:, k]
+    d0, d1 = slopes[:, k - 1] * width, slopes[:, k] * width
+    result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
+    for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
+        result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+    return result
+
+
+# -- singular positions ------------------------------------------------------------------------------------------------
+
+
+def leap(curve: PositionCurve, points: Sequence[Point], here: Point) -> Point | None:
+    """A point behind a singular position that continues the motion smoothly; None if there is none."""
+    scales = curve.scales
+    for size in LEAPS:
+        near = _behind(curve, points, here, size)
+        if near is None:
+            continue
+        rate = largest(near.tangent.rate / scales.q)
+        gap = here.s - near.s
+        s = here.s + gap
+        other = _behind(curve, points, here, 2.0 * size)
+        bend = np.zeros_like(near.tangent.rate)
+        if other is not None and near.s > other.s:
+            bend = (near.tangent.rate - other.tangent.rate) / (near.s - other.s)
+        ahead = predict(scales, near, bend, 2.0 * gap)
+        found = curve.solve(s, ahead)
+        if found is None or rate == 0.0:
+            continue
+        move = largest(scales.distance(found.q, near.q))
+        off = largest(scales.distance(found.q, ahead))
+        turned = 2.0 * gap * largest((found.tangent.rate - near.tangent.rate - 2.0 * gap * bend) / scales.q)
+        if off <= OFF * move and turned <= TURNED * move and move <= 10.0 * size:
+            return found
+    return None
+
+
+def _behind(curve: PositionCurve, points: Sequence[Point], here: Point, size: float) -> Point | None:
+    """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
+    scales = curve.scales
+    for point in reversed(points):
+        distance = largest(scales.distance(here.q, point.q))
+        if distance >= size:
+            part = size / distance
+            s = here.s - part * (here.s - point.s)
+            guess = scales.move(here.q, part * scales.distance(point.q, here.q))
+            return curve.solve(s, guess) or point
+    return None
+
+
+# -- continuation ------------------------------------------------------------------------------------------------------
+
+# Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
+# and 6). A step counts only if position and direction come out near to what the points before foretold: near a singular
+# position another branch is near too, but runs in another direction. A singular position itself is leapt over, to the
+# point behind it that continues the motion smoothly, if there is one.
+
+
+FIRST = 0.1  #: scaled motion in the first step
+LONG = 0.35  #: scaled motion aimed at in one step
+JUMP = 0.5  #: largest scaled motion in one step
+FEWEST = 50  #: steps of a continuation over time
+STEPS = 200_000  #: of one continuation
+
+
+class Continuation:
+    """Follows one curve.
+
+    Parameters
+    ----------
+    curve : PositionCurve
+    start : (n_q,) array
+        Position at s = 0.
+    extent : float, optional
+        Length in s of the whole range that the curve is a piece of: the pieces of a range to and fro need no shorter
+        steps than one way over all of it.
+    fewest : int
+        Steps at least, however still it stands, so that short driver pulses are not skipped.
+    """
+
+    def __init__(self, curve: PositionCurve, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
+        self.curve, self.scales, self.extent, self.fewest = curve, curve.scales, extent, fewest
+        self.points = [Point(0.0, start, curve.tangent(0.0, start))]
+        self.leaps: list[tuple[Point, Point]] = []
+        self.blocked = False
+        rate = largest(self.points[0].tangent.rate / self.scales.q)
+        self.step = FIRST / rate if rate > 0.0 else 1.0
+
+    def to(self, end: float, known: float = 0.0, steps: int = STEPS) -> bool:
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
+
+        Up to s = ``known`` the way was followed before and is smooth, so that only the motion limits the steps.
+        """
+        for _ in range(steps):
+            here = self.points[-1]
+            left = end - here.s
+            if left <= 0.0:
+                return True
+            longest = max(end / self.fewest, self.extent / self.fewest, known - here.s)
+            rate = largest(here.tangent.rate / self.scales.q)
+            self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
+            h = left if self.step >= left else min(self.step, 0.5 * left)
+            found = self.forward(here, h, end if h == left else here.s + h)
+            if found is None:
+                self.step = 0.5 * h
+                if self.step > BLOCKED * max(1.0, abs(here.s)):
+                    continue
+                found = self._leap(here)
+                if found is None:
+                    self.blocked = True
+                    return False
+                self.leaps.append((here, found))
+                self.step = found.s - here.s
+            self.points.append(found)
+        return self.points[-1].s >= end
+
+    def reach(self, end: float, steps: int = STEPS) -> Point | None:
+        """The point at s = end, found between its ends where a leap goes on; None where the way is blocked before."""
+        if not self.to(end, steps=steps):
+            return None
+        last = self.points[-1]
+        if last.s == end:
+            return last
+        before = self.leaps[-1][0]
+        part = (end - before.s) / (last.s - before.s)
+        return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
+
+    def forward(self, here: Point, h: float, s: float) -> Point | None:
+        """One step, None if it fails or is not a smooth continuation."""
+        bend = self._bend(here)
+        ahead = predict(self.scales, here, bend, h)
+        if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
+            return None
+        found = self.curve.solve(s, ahead)
+        if found is None:
+            return None
+        off = largest(self.scales.distance(found.q, ahead))
+        move = largest(self.scales.distance(found.q, here.q))
+        turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
+        worst = largest(np.array([off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED)]))
+        if not (worst <= 1.0 and move <= JUMP):
+            return None
+        if h >= 0.999 * self.step:
+            self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
+        return found
+
+    def _leap(self, here: Point) -> Point | None:
+        """The point behind a singular position."""
+
+        return leap(self.curve, self.points, here)
+
+    def _bend(self, here: Point) -> Array:
+        """Second derivative along s, from the point before."""
+        before = self.points[max(len(self.points) - 2, 0)]
+        change, gap = here.tangent.rate - before.tangent.rate, here.s - before.s
+        return change / gap if gap > 0.0 else np.zeros_like(change)
+
+
+# -- paths with fixed coordinates --------------------------------------------------------------------------------------
+
+# there steadily, on the branch that the mechanism is on.
+
+
+LONGEST = 200.0  #: scaled distance too long to follow
+TRIALS = 5000  #: steps at most, those taken back included
+NEWTON = 15  #: Newton steps to one point
+
+
+class HeldPath:
+    """Closed positions while coordinates, and the time, go along straight lines to given values; s from 0 to 1.
+
+    What is not held moves as little as the constraints allow.
+
+    Parameters
+    ----------
+    system : ConstraintSystem
+        At the time of the start.
+    start : (n_q,) array
+        A closed position.
+    held : mapping of str to float
+        Values at the end, reached exactly, of coordinates of the tree (all four Euler parameters of a rotation or none)
+        and of cut joints.
+    end : float, optional
+        Time at the end, that of the start by default.
+    """
+
+    def __init__(
+        self, system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None
+    ) -> None:
+        self.system, self.start, self.scales = system, start, system.scales
+        self.end = system.t if end is None else end
+        self.held, target = system.indices(held), system.with_values(start, held)
+        closure = system.closure(held)
+        self.free, self.values = closure.free, target[self.held]
+        self.way = (1.0 - self.free) * self.scales.distance(target, start)  # (n,) scaled
+        self.equations = equations = closure.equations
+        self.gap = equations.difference(equations.evaluate(start)[0]) if equations else np.empty(0)
+        self.length = max(largest(self.way), largest(self.gap / equations.scales) if equations else 0.0)
+
+    def _at(self, s: float) -> ConstraintSystem:
+        """The constraints at the time there."""
+        return self.system.at(self.end if s == 1.0 else self.system.t + s * (self.end - self.system.t))
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess; None if Newton's iteration finds none."""
+        q = np.array(guess)
+        q[self.held] = self.values if s == 1.0 else self.scales.move(self.start, s * self.way)[self.held]
+        equations = self.equations and self.equations._replace(values=self.equations.values + (1.0 - s) * self.gap)
+        system = ClosureSystem(self._at(s).position, self.scales, self.free, equations)
+        for damping in (0.0, DAMPING):
+            found, residual = close(system, q, steps=NEWTON, damping=damping)
+            if closed(residual):
+                found[self.held] = q[self.held]  # Euler parameters are normalised at each step
+                return Point(s, found, self.tangent(s, found))
+        return None
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction of the least motion."""
+        system = ClosureSystem(self._at(s).position, self.scales, np.ones_like(self.free), self.equations)
+        _, J = system.evaluate(q)
+        right = -J @ self.way
+        if self.equations:
+            right[len(right) - len(self.gap) :] -= self.gap / self.equations.scales
+        if self.end != self.system.t:
+            right[: len(right) - len(self.gap)] -= self._drift(s, q)
+        if not len(J) or not np.isfinite(J).all() or not np.isfinite(right).all():
+            return Tangent(self.scales.q * self.way)
+        return Tangent(self.scales.q * (self.way + algebra.lstsq(J * self.free, right, rcond=NULL)))
+
+    def _drift(self, s: float, q: Array) -> Array:
+        """Change of the scaled residual (h,) with s at a position that stands still, by a central difference."""
+        sides = [self.scales.residual(self._at(s + h).position(q)[0]) for h in (DRIFTED, -DRIFTED)]
+        return np.asarray((sides[0] - sides[1]) / (2.0 * DRIFTED))
+
+
+def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None) -> Array:
+    """Move held values, and the time, from where they are to others; the rest follows.
+
+    See :class:`HeldPath` for the parameters.  Returns the position (n_q,) at the end.
+
+    Raises
+    ------
+    AssemblyError
+        The way is blocked (a dead centre of what is held), longer than 200 rad or length scales, or too winding for
+        the number of steps allowed, as the many turns of a fine thread are.
+    """
+    path = HeldPath(system, start, held, end)
+    if not path.length <= LONGEST:
+        raise AssemblyError(f"the path from the reference position is too long ({path.length:.3g} rad or lengths)")
+    timed = path.end != system.t
+    continuation = Continuation(path, start, fewest=FEWEST if timed else 1)
+    found = continuation.reach(1.0, TRIALS)
+    if found is not None:
+        return found.q
+    last = continuation.points[-1]
+    if timed:
+        t = system.t + last.s * (path.end - system.t)
+        raise AssemblyError(f"the path from t = {system.t:.6g} to t = {path.end:.6g} s is blocked at t = {t:.6g} s")
+    if not continuation.blocked:
+        raise AssemblyError(f"the path has too many bends: {TRIALS} steps cover {100 * last.s:.0f} % of it")
+    raise AssemblyError(
+        f"the path is blocked after {100 * last.s:.0f} % of it: the loops cannot close there, or the mechanism jumps, "
+        "as at a dead centre of the prescribed coordinate; prescribe another one, or give a position beyond it"
+    )

@@ -1,0 +1,490 @@
+"""Scaled constraint Jacobian -> rank, redundant rows, independent coordinates, in work that grows with the nonzeros."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from itertools import combinations
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import PartitionError
+from .. import algebra
+from ..algebra import Array, Indices
+from ..limits.constraints import CHOSEN as STRICT
+from ..limits.constraints import PREFERENCE, STRUCTURE, UNMOVED
+from ..limits.constraints import STATE as RANK
+from ..limits.constraints import STRUCTURE as TOLERANCE
+
+# -- ranks -------------------------------------------------------------------------------------------------------------
+
+
+class Rank(NamedTuple):
+    """Rank of a scaled Jacobian, and how clearly it is decided."""
+
+    rank: int
+    kept: float  #: smallest singular value counted, relative to the largest
+    dropped: float  #: largest singular value not counted, relative to the largest
+
+    @property
+    def clear(self) -> bool:
+        """Whether the decision is far from the tolerance on both sides (a factor of 100)."""
+        return self.kept > 100.0 * TOLERANCE and self.dropped < 0.01 * TOLERANCE
+
+
+def rank(J: Array, tolerance: float = TOLERANCE) -> Rank:
+    """Numerical rank of a scaled Jacobian J (m, n) by its singular values."""
+    values = algebra.singular_values(J) if J.size else np.empty(0)
+    if not values.size or values[0] == 0.0:
+        return Rank(0, 1.0, 0.0)
+    relative = values / values[0]
+    # rows may all be rounding of their terms: there is a least length, too
+    count = int(np.count_nonzero((relative > tolerance) & (values > UNMOVED)))
+    if not count:
+        return Rank(0, 1.0, 0.0)
+    return Rank(count, float(relative[count - 1]), float(relative[count]) if count < len(relative) else 0.0)
+
+
+def independent_rows(J: Array, rank: int) -> Indices:
+    """`rank` rows that span the row space, in ascending order.
+
+    Earlier rows are preferred: a row is skipped only when the best remaining one is a hundred times farther from the
+    span of the chosen ones.
+    """
+    if rank == len(J):
+        return np.arange(rank, dtype=np.intp)
+    work, distance = np.array(J), np.linalg.norm(J, axis=1)
+    chosen: list[int] = []
+    for _ in range(rank):
+        chosen.append(int(np.flatnonzero(distance >= PREFERENCE * distance.max())[0]))
+        direction = work[chosen[-1]] / distance[chosen[-1]]
+        moved = np.flatnonzero(along := work @ direction)  # few, where each loop has coordinates of its own
+        work[moved] -= np.outer(along[moved], direction)
+        distance[moved] = np.linalg.norm(work[moved], axis=1)
+        distance[chosen] = 0.0
+    return np.array(sorted(chosen), dtype=np.intp)
+
+
+def redundant_rows(J: Array, rank: int, labels: Sequence[str]) -> list[str]:
+    """Labels of the rows that follow from the others at this configuration."""
+    kept = set(independent_rows(J, rank).tolist())
+    return [label for row, label in enumerate(labels) if row not in kept]
+
+
+def conditioning(J: Array, independent: Sequence[int] | Indices, size: float | None = None) -> float:
+    """How well a set of independent coordinates moves the mechanism: 1 is perfect, 0 not at all.
+
+    The smallest singular value of J_d divided by the largest of J, where d are the other columns; ``size`` is that
+    largest one, where it is known already.
+    """
+    n = J.shape[1]
+    dependent = np.delete(np.arange(n), np.asarray(independent, dtype=np.intp))
+    if not dependent.size:
+        return 1.0
+    values = algebra.singular_values(J[:, dependent])
+    if len(values) < len(dependent):
+        return 0.0
+    size = algebra.norm2(J) if size is None else size
+    return float(values[len(dependent) - 1] / size) if size else 0.0
+
+
+# -- chains of rows ----------------------------------------------------------------------------------------------------
+
+# Rows that share no coordinate, nor are connected through others, make parts of their own, whose singular values are
+# together those of the whole.  The rows of a part are met breadth first from one of its ends: those of a level hold
+# coordinates of this level and of the next alone.  Along the levels the rows are turned into each other by orthogonal
+# matrices of the size of a level, which leave singular values as they are (C. L. Lawson and R. J. Hanson, Solving Least
+# Squares Problems, 1974, chapter 27).
+#
+# The rank found so is proven: what was kept has no singular value near the tolerance, because the inverse of the
+# triangle is bounded, and what was dropped has none, because its length is.  Where neither can be said, singular values
+# of the part decide, or of the whole where one of them may be on either side; of small matrices they decide at once.
+
+
+SMALL = 20_000  #: entries up to which all singular values of a matrix are found at once
+WIDTH = 16  #: rows of a level at least: smaller ones are joined
+CLEAR = 2.0  #: factor between the tolerance and the bounds of what is kept and what is dropped
+
+
+class Level(NamedTuple):
+    """Rows, and the coordinates that no level before has."""
+
+    rows: Indices
+    columns: Indices
+
+
+def parts(J: Array) -> list[list[Level]]:
+    """The connected parts of the pattern of J (m, n), each as levels; a coordinate that no row holds is a part."""
+    m, n = J.shape
+    rows, columns = np.nonzero(J)
+    of_rows = np.split(columns, np.searchsorted(rows, np.arange(1, m)))
+    order = np.argsort(columns, kind="stable")
+    of_columns = np.split(rows[order], np.searchsorted(columns[order], np.arange(1, n)))
+    held, found = [x.tolist() for x in of_rows], [x.tolist() for x in of_columns]
+    open_columns, result = np.ones(n, dtype=bool), list[list[Level]]()
+    for k in range(n):
+        if not open_columns[k]:
+            continue
+        levels = _levels(k, held, found)
+        if len(levels) > 1:  # from the coordinate of fewest rows among those farthest away
+            far = next(level for level in reversed(levels) if level[1])[1]
+            levels = _levels(min(far, key=lambda j: (len(found[j]), j)), held, found)
+        for _, own in levels:
+            open_columns[own] = False
+        result.append([Level(np.array(a, dtype=np.intp), np.array(b, dtype=np.intp)) for a, b in _joined(levels)])
+    return result
+
+
+def _levels(start: int, held: Sequence[list[int]], found: Sequence[list[int]]) -> list[tuple[list[int], list[int]]]:
+    """Rows and new columns of each level, from one column."""
+    level, seen, known, levels = [start], {start}, set[int](), []
+    while level:
+        rows = sorted({i for j in level for i in found[j]} - known)
+        known.update(rows)
+        levels.append((rows, level))
+        level = sorted({j for i in rows for j in held[i]} - seen)
+        seen.update(level)
+    return levels
+
+
+def _joined(levels: Sequence[tuple[list[int], list[int]]]) -> Iterator[tuple[list[int], list[int]]]:
+    rows: list[int] = []
+    columns: list[int] = []
+    for more, further in levels:
+        rows, columns = rows + more, columns + further
+        if len(rows) >= WIDTH:
+            yield rows, columns
+            rows, columns = [], []
+    if columns:
+        yield rows, columns
+
+
+class ChainStep(NamedTuple):
+    """One level turned: Q^T of the coordinates that are open and of those that are new."""
+
+    turn: Array  #: Q (c, c), its first columns what the rows of the level hold
+    sizes: Array  #: (r,) singular values kept
+    coupling: Array  #: (r, rows of the next level) what those have along the same directions
+    rest: Array  #: (c - r, c - r) orthogonal: its last columns are directions that no further row has
+    new: Indices
+
+
+class Chain:
+    """The levels of one part turned one after the other.
+
+    Parameters
+    ----------
+    J : (m, n) array
+    levels : sequence of Level
+    least : float
+        Singular values of a level that are not above it are dropped.
+    """
+
+    def __init__(self, J: Array, levels: Sequence[Level], least: float) -> None:
+        self.start, self.steps, self.rank, self.dropped = levels[0].columns, list[ChainStep](), 0, 0.0
+        self.size = sum(len(level.columns) for level in levels)
+        none = np.empty(0, dtype=np.intp)
+        front = J[np.ix_(levels[0].rows, levels[0].columns)].T
+        for (rows, _), (following, new) in zip(levels, [*levels[1:], Level(none, none)], strict=True):
+            turn, sizes, mixed = _svd(np.vstack([front, J[np.ix_(rows, new)].T]))
+            if self.steps:  # in the combinations of rows that the level is turned into
+                before = self.steps[-1]
+                self.steps[-1] = before._replace(coupling=before.coupling @ mixed[: np.count_nonzero(sizes > least)].T)
+            kept = int(np.count_nonzero(sizes > least))
+            self.rank, self.dropped = self.rank + kept, self.dropped + float((sizes[kept:] ** 2).sum())
+            more = turn[len(front) :].T @ J[np.ix_(following, new)].T
+            rest, front = _qr(more[kept:])
+            self.steps.append(ChainStep(turn, sizes[:kept], more[:kept], rest, new))
+            front = front[: len(following)]
+
+    @property
+    def inverse_square(self) -> float:
+        """Sum of the squares of the entries of the inverse of what was kept, at least 1 / s^2 of its least s."""
+        total, after = 0.0, np.empty((0, 0))
+        for _, sizes, coupling, _, _ in reversed(self.steps):
+            after = (np.eye(len(sizes)) + coupling @ after @ coupling.T) / np.outer(sizes, sizes)
+            total += float(np.trace(after))
+        return total
+
+    def motions(self, n: int) -> Array:
+        """Orthonormal directions (n - r, n) along which no row changes."""
+        found, open_ = np.zeros((n, self.size - self.rank)), np.empty((0, 0))
+        for turn, sizes, _, rest, new in reversed(self.steps):
+            width = open_.shape[1] + len(rest) - len(open_)
+            ahead = np.zeros((len(rest), width))
+            ahead[: len(open_), : open_.shape[1]] = open_
+            ahead[len(open_) :, open_.shape[1] :] = np.eye(len(rest) - len(open_))
+            open_ = turn[:, len(sizes) :] @ (rest @ ahead)
+            here = len(turn) - len(new)
+            found[new, :width], open_ = open_[here:], open_[:here]
+        found[self.start, : open_.shape[1]] = open_
+        return found.T
+
+
+class Decomposed:
+    """A part whose levels do not tell its rank, by its singular values."""
+
+    def __init__(self, J: Array, levels: Sequence[Level], most: float) -> None:
+        self.columns = np.concatenate([level.columns for level in levels])
+        rows = np.concatenate([level.rows for level in levels])
+        _, self.sizes, self._turned = algebra.svd(J[np.ix_(rows, self.columns)])
+        self.rank = int(np.count_nonzero(self.sizes > most))
+
+    def motions(self, n: int) -> Array:
+        """As of Chain."""
+        found = np.zeros((len(self.columns) - self.rank, n))
+        found[:, self.columns] = self._turned[self.rank :]
+        return found
+
+
+def _svd(A: Array) -> tuple[Array, Array, Array]:
+    return algebra.svd(A) if A.size else (np.eye(len(A)), np.empty(0), np.eye(A.shape[1]))
+
+
+def _qr(A: Array) -> tuple[Array, Array]:
+    """Q (c, c) and the triangle; none where all directions are in further rows."""
+    return algebra.qr(A, complete=True) if len(A) > A.shape[1] > 0 else (np.eye(len(A)), A)
+
+
+class SparseRows:
+    """A scaled Jacobian J (m, n) of finite entries, by parts."""
+
+    def __init__(self, J: Array, tolerance: float = STRUCTURE) -> None:
+        self.J, self.tolerance = J, tolerance
+
+    @cached_property
+    def _parts(self) -> list[list[Level]]:
+        m, n = self.J.shape
+        return (
+            parts(self.J)
+            if self.J.size > SMALL
+            else [[Level(np.arange(m, dtype=np.intp), np.arange(n, dtype=np.intp))]]
+        )
+
+    @cached_property
+    def _told(self) -> list[Chain | Decomposed]:
+        """Of each part its rank; none where some singular value may be on either side of the tolerance."""
+        if self.J.size <= SMALL:
+            return []
+        size = np.abs(self.J)
+        # the largest singular value is between these
+        most = float(np.sqrt(size.sum(axis=0).max(initial=0.0) * size.sum(axis=1).max(initial=0.0)))
+        some = float(np.sqrt((self.J * self.J).sum(axis=1).max(initial=0.0)))
+        most, least = (max(self.tolerance * x, UNMOVED) for x in (most, some))
+        told: list[Chain | Decomposed] = []
+        for levels in self._parts:
+            with np.errstate(all="ignore"):
+                chain = Chain(self.J, levels, least)
+                kept = chain.inverse_square * (CLEAR * most) ** 2 < 1.0
+            if kept and chain.dropped * CLEAR**2 < least**2:
+                told.append(chain)
+                continue
+            part = Decomposed(self.J, levels, most)
+            if ((part.sizes > least) & (part.sizes <= most)).any():
+                return []
+            told.append(part)
+        return told
+
+    @cached_property
+    def rank(self) -> int:
+        """As :func:`~.ranks.rank` counts it."""
+        return sum(part.rank for part in self._told) if self._told else rank(self.J, self.tolerance).rank
+
+    def motions(self, rank: int) -> Array:
+        """Orthonormal directions (n - rank, n) along which the rows change least: not at all, if it is their rank."""
+        if not self._told or rank != self.rank:
+            return algebra.svd(self.J)[2][rank:]
+        return np.vstack([part.motions(self.J.shape[1]) for part in self._told])
+
+    @cached_property
+    def _places(self) -> list[tuple[Indices, Indices]]:
+        """Rows and columns of each part."""
+        joined = [zip(*levels, strict=True) for levels in self._parts]
+        return [(np.sort(np.concatenate(rows)), np.sort(np.concatenate(columns))) for rows, columns in joined]
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest singular value."""
+        return max((algebra.norm2(self.J[np.ix_(*place)]) for place in self._places if len(place[0])), default=0.0)
+
+    def conditioning(self, independent: Sequence[int] | Indices) -> float:
+        """As :func:`~.ranks.conditioning` finds it."""
+        chosen, least = np.zeros(self.J.shape[1], dtype=bool), np.inf
+        chosen[np.asarray(independent, dtype=np.intp)] = True
+        if chosen.all():
+            return 1.0
+        for rows, columns in self._places:
+            dependent = columns[~chosen[columns]]
+            if len(dependent) > len(rows):
+                return 0.0
+            if len(dependent):
+                least = min(least, float(algebra.singular_values(self.J[np.ix_(rows, dependent)])[-1]))
+        return least / self.largest if self.largest else 0.0
+
+
+# -- independent columns -----------------------------------------------------------------------------------------------
+
+
+#: At most so many sets of coordinates are compared one by one, where that takes at most so many singular values.
+ENUMERATED, DECOMPOSED = 500, 20_000
+
+
+def choose_independent(jacobians: Sequence[SparseRows], rank: int, prefer: Sequence[int] = ()) -> Indices:
+    """The independent coordinates that stay best conditioned over several configurations.
+
+    Parameters
+    ----------
+    jacobians : sequence of SparseRows
+        Scaled Jacobians (m, n) at assembled configurations.
+    rank : int
+        Rank of the constraints.
+    prefer : sequence of int
+        Columns to choose first where the worst conditioning stays within a factor of 100 of the best possible.
+
+    Returns
+    -------
+    (n - rank,) array of int
+        Columns in ascending order.
+    """
+    n = jacobians[0].J.shape[1]
+    size = n - rank
+    order = list(dict.fromkeys([*prefer, *range(n)]))  # earlier wins among equals
+    if comb(n, size) <= min(ENUMERATED, DECOMPOSED // n):
+        sets: list[tuple[int, ...]] = list(combinations(order, size))
+    else:
+        sets = list(dict.fromkeys(_eliminate(x, rank, order) for x in jacobians))
+        if len(prefer) >= size:
+            sets.append(tuple(order[:size]))
+    if len(sets) == 1:
+        return np.array(sorted(sets[0]), dtype=np.intp)
+    scores = [min(x.conditioning(columns) for x in jacobians) for columns in sets]
+    limit = max(scores)
+    favoured = set(prefer)
+    good = [(s, c) for s, c in zip(scores, sets, strict=True) if s >= PREFERENCE * limit]
+    most = max(len(favoured.intersection(c)) for _, c in good)
+    best = max((s for s, c in good if len(favoured.intersection(c)) == most), default=limit)
+    for score, columns in good:
+        if len(favoured.intersection(columns)) == most and score >= 0.999999 * best:
+            return np.array(sorted(columns), dtype=np.intp)
+    return np.array(sorted(sets[int(np.argmax(scores))]), dtype=np.intp)
+
+
+def _eliminate(rows: SparseRows, rank: int, order: Sequence[int]) -> tuple[int, ...]:
+    """Independent columns by pivoting, so that the front of `order` stays independent.
+
+    Few dependent columns are found from the back of `order` by elimination in the rows; few independent ones from its
+    front, by elimination in the motions that the rows allow.
+    """
+    if len(order) - rank < rank:
+        found = _pivots(rows.motions(rank), len(order) - rank, list(order))
+        return tuple(c for c in order if c in found)
+    dependent = _pivots(rows.J, rank, list(reversed(order)))
+    return tuple(c for c in order if c not in dependent)
+
+
+def _pivots(rows: Array, count: int, order: Sequence[int]) -> set[int]:
+    """Columns that span the column space: each the first in `order` that is not much nearer to the span than others."""
+    work, chosen = np.array(rows), set[int]()
+    places = np.array(order, dtype=np.intp)
+    for _ in range(count):
+        length = np.linalg.norm(work, axis=0)
+        length[list(chosen)] = 0.0
+        column = int(places[np.flatnonzero(length[places] >= 0.3 * length.max())[0]])
+        if column in chosen:  # nothing is left to choose by
+            column = next(c for c in order if c not in chosen)
+        chosen.add(column)
+        direction = work[:, column] / (length[column] or 1.0)
+        moved = np.flatnonzero(along := direction @ work)  # few, where each loop has coordinates of its own
+        held = np.flatnonzero(direction)
+        work[np.ix_(held, moved)] -= np.outer(direction[held], along[moved])
+    return chosen
+
+
+# -- partitions --------------------------------------------------------------------------------------------------------
+
+# Gaussian elimination with complete pivoting: the columns of the pivots are the dependent coordinates, rows without
+# a pivot are redundant here.
+
+
+class Partition(NamedTuple):
+    """The coordinates of one configuration split in two; all quantities scaled."""
+
+    dependent: Indices  #: (r,) columns
+    independent: Indices  #: (n - r,) columns, the preferred ones first and in their order
+    rows: Indices  #: (r,) rows that determine the dependent coordinates; the others are redundant here
+    inverse: Array  #: (r, r) inverse of J[rows, dependent]
+    B: Array  #: (n, n - r) velocity transformation: v = B v_i (+ b_t), J B = 0
+
+    def particular(self, y: Array) -> Array:
+        """The x (n,) or (n, k) with J x = y on the pivot rows and x = 0 for the independent coordinates."""
+        x = np.zeros((len(self.B), *y.shape[1:]))
+        x[self.dependent] = self.inverse @ y[self.rows]
+        return x
+
+
+def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict: bool = False) -> Partition:
+    """Split the coordinates.
+
+    Parameters
+    ----------
+    J : (m, n) array
+        Scaled Jacobian.
+    rank : int
+        Number of dependent coordinates, fixed for a mechanism.
+    independent : sequence of int
+        Preferred independent columns; the other columns are preferred as dependent.
+    strict : bool
+        Take exactly this set or fail.
+
+    Returns
+    -------
+    Partition
+
+    Raises
+    ------
+    PartitionError
+        Fewer than `rank` good pivots: below STATE of the largest entry, or CHOSEN if `strict`.
+    """
+    n = J.shape[1]
+    preferred = np.ones(n, dtype=bool)
+    preferred[np.asarray(independent, dtype=np.intp)] = False
+    columns = np.flatnonzero(preferred)
+    work = J.take(columns, axis=1) if strict else np.array(J)
+    size = float(np.abs(J).max()) if J.size else 0.0
+    rows = np.empty(rank, dtype=np.intp)
+    dependent = np.empty(rank, dtype=np.intp)
+    for step in range(rank):
+        magnitude = np.abs(work)  # zero in the rows and columns of the pivots before
+        row, column, best = _best(magnitude if strict else magnitude.take(columns, axis=1))
+        if not strict:
+            column = int(columns[column]) if best > 0.0 else column
+            row_any, column_any, best_any = _best(magnitude)
+            if not best >= PREFERENCE * best_any or best == 0.0:
+                row, column, best = row_any, column_any, best_any
+        if not best > (STRICT if strict else RANK) * size:
+            raise PartitionError(
+                "the chosen independent coordinates cannot move the mechanism here (it is at a dead centre): "
+                f"{step} of {rank} others follow from them; choose other independent coordinates"
+                if strict
+                else f"the constraints have rank {step} here and {rank} elsewhere"
+            )
+        rows[step], dependent[step] = row, columns[column] if strict else column
+        work -= work[:, column, None] * (work[row] / work[row, column])
+        work[row] = 0.0
+    chosen = set(dependent.tolist())
+    order = [i for i in map(int, independent) if i not in chosen]
+    kept = np.array(order + sorted(set(range(n)) - chosen - set(order)), dtype=np.intp)
+    inverse: Array = np.asarray(algebra.inv(J[rows[:, None], dependent]), dtype=np.float64)
+    B = np.zeros((n, n - rank))
+    B[kept, np.arange(n - rank)] = 1.0
+    B[dependent] = -inverse @ J[rows[:, None], kept]
+    return Partition(dependent, kept, rows, inverse, B)
+
+
+def _best(magnitude: Array) -> tuple[int, int, float]:
+    if not magnitude.size:
+        return 0, 0, 0.0
+    row, column = divmod(int(magnitude.argmax()), magnitude.shape[1])
+    return row, column, float(magnitude[row, column])

@@ -1,0 +1,591 @@
+"""Contact in bulk: every shape of one group against every shape of another, by one law."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+from ..base.records import dataclass
+from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
+from ..elements.dimensions import LENGTH
+from ..elements.element_type import ElementType, Entry, table
+from ..elements.forces.force import Force, Load, MarkerLoad, MovingView, View
+from ..elements.forces.friction_laws import SUMS, UNIT, DryFriction, LuGre, has_bristles, read_friction
+from ..elements.forces.normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
+from ..elements.frames import Frame, Marker
+from ..elements.kinds import Law
+from ..elements.looks import Seen
+from ..expr.core import Expr, Graph
+from ..expr.pairs import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
+from ..expr.vectors import Vec3
+from .pair_laws import HOLLOWS, PairLaw, meet, pair_kind
+from .point import CURVED
+from .profiles import never_reached
+from .shapes import PIECED, ContactShape, Feature, by_edges
+from .soil_beds import COUNTS, STATES, bed_rates
+from .soil_laws import LATERAL, SOIL, SoilPressure, SoilShear, read_soil, states_of_soil
+from .states import (
+    BED,
+    FIELD,
+    FIELD_SHAPE,
+    GROUNDS,
+    MOST_PAIRS,
+    PLANAR,
+    POLYGON,
+    SHAPE_FIELDS,
+    ContactShapes,
+    ShapeParts,
+    alike,
+    cells_of,
+    class_of,
+    given_groups,
+    pair_states,
+    part_of,
+)
+
+# -- the element -------------------------------------------------------------------------------------------------------
+
+# The law of one kind of pair is derived once, in a graph of its own; the sum over all pairs is one operation of the
+# model's graph (:mod:`~eomgen.expr.pairs`), so that equations do not grow with the number of pairs.
+
+
+@dataclass(frozen=True)
+class ContactGroups(Force):
+    """Contact of two groups of shapes, or of the shapes of one group among themselves (``second`` is empty then).
+
+    The force of a pair is that of :class:`~.point.Contact`.  Shapes of one body do not meet.
+    """
+
+    sentence: ClassVar[str] = (
+        "Contact of every shape of one group with every shape of another: a force along the normal from the "
+        "penetration $d$ and its rate, and friction against the sliding."
+    )
+    by_power: ClassVar[bool] = True
+    first: tuple[ContactShape, ...]
+    second: tuple[ContactShape, ...]
+    normal_law: NormalLaw
+    friction: DryFriction | None
+    states: tuple[Expr, ...] = ()
+    axes: int = 0  #: how many states a pair has of friction
+    coefficient: Expr | None = None  #: of friction, where bodies are rigid
+    restitution: Expr | None = None  #: where bodies are rigid
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
+
+    def drawn(self) -> list[Seen]:
+        return [seen for shape in (*self.first, *self.second) for seen in shape.drawn()]
+
+    def loads(self, view: View) -> list[Load]:
+        return self._loads(view, "")
+
+    def potential(self, view: View) -> Expr | None:
+        if self.is_rigid:
+            return view.graph.zero
+        markers, results = self._results(view, "", still=True)
+        return results[6 * len(markers)]
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        if not self.states:
+            return ()
+        markers, results = self._results(view, "")
+        found = results[6 * len(markers) + 1 :]
+        if self.on_bed:
+            assert isinstance(self.friction, SoilShear)
+            return tuple(bed_rates(self.states, found, self.friction.recovery))
+        if isinstance(self.friction, LuGre) and self._pieces:
+            return self._bent(self.friction, found)
+        if self._pieces:
+            found = self._shared_out(found)
+        return tuple(map(Expr.__add__, self._rates_apart(), found))
+
+    def _shared_out(self, sums: list[Expr]) -> list[Expr]:
+        """What pieces add to the rates of the states that they share, which is its mean where several touch."""
+        found: list[Expr] = []
+        for k in range(0, len(sums), self._slots):
+            *added, touching = sums[k : k + self._slots]
+            found += [x / x.graph.apply("max", 1.0, touching) for x in added]
+        return found
+
+    def _bent(self, friction: LuGre, sums: list[Expr]) -> tuple[Expr, ...]:
+        """Rates of bristles from what all pieces add."""
+        found: list[Expr] = []
+        for k, start in enumerate(range(0, len(sums), self._slots)):
+            own = friction.holding(self.states[k * self._each : (k + 1) * self._each], None)
+            found += own.rates_of(sums[start : start + self._slots])
+        return tuple(found)
+
+    def _rates_apart(self) -> list[Expr]:
+        """Rates of all states where no shapes meet."""
+        found: list[Expr] = []
+        law = self._pair_law(False)
+        for k in range(0, len(self.states), self._each):
+            friction, normal = law.holding(self.normal_law, self.friction, self.states[k : k + self._each], None)
+            found += [*(() if friction is None else friction.rates_apart()), *normal.rates_apart()]
+        return found
+
+    @property
+    def _each(self) -> int:
+        """How many states a pair has."""
+        return self.axes + self.normal_law.count
+
+    def _pair_law(self, planar: bool) -> PairLaw:
+        rigid = (self.coefficient, self.restitution)
+        slots = self._slots if self.states else 0
+        return PairLaw(self.name, self.normal_law, self.friction, rigid, self.axes, slots, planar)
+
+    @property
+    def _slots(self) -> int:
+        """How many numbers a pair has in the sum: its states, and where shapes have pieces what their rates need too.
+
+        Soil needs how many pieces touch; see also :meth:`~..elements.forces.friction_laws.LuGre.sums`.
+        """
+        if self.on_bed:
+            return self._each + COUNTS
+        return self._each + (self._pieces and (SUMS if isinstance(self.friction, LuGre) else 1))
+
+    @property
+    def _pieces(self) -> bool:
+        """Whether shapes have pieces, which share states."""
+        return any(shape.kind in PIECED for shape in (*self.first, *self.second))
+
+    @property
+    def on_bed(self) -> bool:
+        """Whether the ground remembers by place."""
+        return any(shape.kind == BED for shape in (*self.first, *self.second))
+
+    def remainder(self, view: View) -> list[Load]:
+        return self._loads(view, LOSSES)
+
+    def _loads(self, view: View, part: str) -> list[Load]:
+        if self.is_rigid:
+            return []
+        markers, results = self._results(view, part)
+        return [
+            MarkerLoad(marker, _vector(results[6 * k : 6 * k + 3]), _vector(results[6 * k + 3 : 6 * k + 6]))
+            for k, marker in enumerate(markers)
+        ]
+
+    def _groups(self) -> list[dict[str, list[_Part]]]:
+        """Features of both groups, by class, of those classes that meet something."""
+        groups = [_features(group) for group in (self.first, self.second) if group]
+        met = set[tuple[int, str]]()
+        for g, own in enumerate(groups):
+            for h, other in enumerate(groups):
+                if g != h or len(groups) == 1:
+                    pairs = [(a, b) for a in own for b in other if self._meet((a, b), own[a], other[b])]
+                    met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
+        return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
+
+    def _meet(self, kinds: tuple[str, str], own: list[_Part], other: list[_Part]) -> bool:
+        """Whether parts of two classes meet, and act on each other."""
+        if not meet(kinds) or kinds[0] not in HOLLOWS:
+            return meet(kinds)
+        pairs = [(one.feature.sizes, two.feature.sizes[0]) for one in own for two in other]
+        never = all(never_reached(kinds[0], sizes, radius) for sizes, radius in pairs)
+        return not never and not self.normal_law.elastic(other[0].feature.sizes[0].graph.one).is_zero
+
+    def met_shapes(self) -> list[str]:
+        parts = [one.shape for group in self._groups() for features in group.values() for one in features]
+        return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
+
+    def meeting(self, view: MovingView) -> list[Expr]:
+        markers, function, operands = self._operands(view, "")
+        return pair_meeting(view.graph, function, operands, view.accelerations(markers))
+
+    def near(self, view: View) -> list[Expr]:
+        if isinstance(self.normal_law, SoilPressure):
+            return []  # soil yields
+        _, function, operands = self._operands(view, "", still=True)
+        return pair_spots(view.graph, function, operands)
+
+    @property
+    def met_bodies(self) -> list[int]:
+        return [one.shape.marker.body for group in self._groups() for features in group.values() for one in features]
+
+    @property
+    def is_rigid(self) -> bool:
+        return isinstance(self.normal_law, RigidLaw)
+
+    def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
+        """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
+        markers, function, operands = self._operands(view, part, still)
+        return markers, pair_sum(view.graph, function, operands)
+
+    @cached_property
+    def _made(self) -> dict[str, tuple[PairFunction, list[Expr]]]:
+        """Sums over pairs, by what of them is asked for, and what they are given beside the motion of bodies."""
+        return {}
+
+    def _operands(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], PairFunction, list[Expr]]:
+        """The bodies as markers at their origins, the sum over pairs and what it is given."""
+        graph = view.graph
+        bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
+        labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
+        frame = Frame.identity(graph)
+        markers = [Marker(body, frame, labels[body]) for body in bodies]
+        operands: list[Expr] = []
+        for marker in graph.marked(markers):
+            rotation = [x for row in view.rotation(marker) for x in row]
+            moving = (view.velocity(marker), view.angular_velocity(marker))
+            operands += [*view.position(marker), *rotation]
+            operands += [graph.zero if still else x for v in moving for x in v]
+        if part not in self._made:  # of bodies that move, at rest, for the energy: the sum is the same
+            data = _SharedData(len(operands), graph)
+            self._made[part] = self._function(f"{part}{self.name}", bodies, data, bool(part)), data.values
+        function, shared = self._made[part]
+        held = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
+        return markers, function, [*operands, *shared, *held]
+
+    def _held(self, graph: Graph) -> list[Expr]:
+        """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""
+        found: list[Expr] = []
+        for k in range(0, len(self.states), self._each or 1):
+            found += [*self.states[k : k + self._each], *[graph.zero] * (self._slots - self._each)]
+        return found
+
+    def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
+        shapes = [self.first, self.second] if self.second else [self.first]
+        groups = self._groups()
+        place = {body: k for k, body in enumerate(bodies)}
+        keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
+        tables = [tuple(data.row(place[one.shape.marker.body], one.feature) for one in groups[g][k]) for g, k in keys]
+        planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
+        blocks, _ = pair_states([[shape.parts() for shape in group] for group in shapes]) if self.states else ({}, 0)
+        law = self._pair_law(planar)
+        kinds = []
+        for i, (g, first) in enumerate(keys):
+            for j, (h, second) in enumerate(keys):
+                apart = g != h or len(groups) == 1
+                twice = alike(first, second) and i > j  # round beside round, once
+                own, other = groups[g][first], groups[h][second]
+                if apart and not twice and self._meet((first, second), own, other):
+                    sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
+                    height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
+                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
+                    if self.on_bed:
+                        places = tuple(self._slots * x.column for x in own)
+                        kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(own))
+                    elif self.states:
+                        block = blocks[g, h, class_of(first, second), part_of(second)]
+                        rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
+                        columns = tuple(self._slots * block.places * x.column for x in other)
+                        kind = replace(kind, held=(rows, columns))
+                    kinds.append(kind)
+        held = [x.value for x in self._held(data.graph)]
+        numbers = (*(x.value for x in data.values), *held)
+        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(held))
+
+
+class _SharedData:
+    """Different numbers and expressions that shapes and laws need, behind the poses of the bodies."""
+
+    def __init__(self, start: int, graph: Graph) -> None:
+        self.start, self.graph, self.values = start, graph, list[Expr]()
+        self._places: dict[Expr, int] = {}
+
+    def place(self, x: Expr) -> int:
+        if x not in self._places:
+            self._places[x] = self.start + len(self.values)
+            self.values.append(x)
+        return self._places[x]
+
+    def row(self, body: int, feature: Feature) -> tuple[int, ...]:
+        """A row of a table of shapes; see :class:`~eomgen.base.numeric.pair_sums.PairSum`."""
+        frame = feature.frame
+        entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
+        bound = -1 if feature.bound is None else self.place(feature.bound)
+        return (body, *(self.place(x) for x in entries), bound, self.place(feature.thickness))
+
+
+class _Part(NamedTuple):
+    """A feature, its shape and the number of that in its group, and its number among all of its class there."""
+
+    shape: ContactShape
+    feature: Feature
+    number: int
+    column: int
+
+
+def _lines(parts: Sequence[_Part]) -> tuple[tuple[int, int], ...]:
+    """Rows of cells that are of one bed: the first of each and how many."""
+    rows = [list(group) for _, group in itertools.groupby(parts, lambda part: part.number)]
+    starts = itertools.accumulate((len(group) for group in rows), initial=0)
+    return tuple((start, len(group)) for start, group in zip(starts, rows, strict=False))
+
+
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
+    """Features of shapes, by class; parts are numbered in this order."""
+    found: dict[str, list[_Part]] = {}
+    before: dict[str, int] = {}
+    heights: dict[Expr, str] = {}  # fields of one height are of one class
+    for number, shape in enumerate(shapes):
+        for feature in shape.features():
+            if feature.kind == FIELD:
+                kind = heights.setdefault(shape.sizes[0], f"{FIELD}{len(heights)}")
+                feature = feature._replace(kind=kind)
+            column = before.get(feature.kind, 0) + feature.slot
+            found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
+        for kind, count in shape.parts().parts.items():
+            before[kind] = before.get(kind, 0) + count
+    polygons = 0  # which are of one class, whatever the number of their corners
+    for kind, parts in found.items():
+        if part_of(kind) == POLYGON:
+            found[kind] = [part._replace(column=polygons + k) for k, part in enumerate(parts)]
+            polygons += len(parts)
+    return found
+
+
+def _vector(x: Sequence[Expr]) -> Vec3:
+    return x[0], x[1], x[2]
+
+
+# -- reading an entry --------------------------------------------------------------------------------------------------
+
+
+def _contact_groups(e: Entry) -> ContactGroups | None:
+    first = e["first"]
+    second = e["second"] if "second" in e.values else ()
+    soil = "soil" in e.values
+    laws = _laws(e)
+    lateral = e["lateral"]
+    if first is None or second is None or laws is None or e.at_fault():
+        return None
+    law, friction = laws
+    _refuse_pairs(e, first, second)
+    if not soil and not has_bristles(e.values):  # whose states are counted before shapes are known
+        first, second = by_edges(first, second)
+    if has_bristles(e.values):
+        _refuse_edges(e, first, second)
+    if soil:
+        _refuse_on_soil(e, first, second)
+    bed = _is_bed(e, first, second, soil)
+    if bed:
+        first, second = (tuple(shape.on_bed() for shape in shapes) for shapes in (first, second))
+    for key, shapes in (("first", first), ("second", second)):
+        if not soil and any(shape.is_wheel for shape in shapes):
+            e.fault(key, "has a circle with a width, which belongs to wheels on soil", "leave width out, or give soil")
+    if isinstance(law, HertzBodies):
+        for key, shapes in (("first", first), ("second", second)):
+            if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
+                e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
+    rigidly = e["friction"] if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
+    axes = 0
+    if soil or has_bristles(e.values):
+        groups = given_groups(e.values)
+        pairs = pair_states(groups)[1]
+        axes = len(_axes(e.values, groups, lateral)) if pairs else 0
+        axes = len(STATES) - 1 if bed else axes
+        if pairs > MOST_PAIRS:
+            told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
+            remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
+            e.fault("", told, remedy, "EG-TOO-LARGE")
+    return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e["restitution"])
+
+
+def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
+    """Whether the ground is a bed, of which there is one, with soil; what is wrong is noted."""
+    beds = [
+        (key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)
+    ]
+    for key, shapes in beds:
+        if len(shapes) > 1:
+            e.fault(key, "has a bed and more", "give one bed as all of a group, and contacts of their own to others")
+        if not soil:
+            e.fault(key, "has a bed, which belongs to soil", "give soil, or half_plane or a profile as the ground")
+    if beds:
+        for word in ("lateral", "peak_angle", "reversal"):
+            e.refuse(word, "has no meaning for a bed, whose cells are sheared along x")
+    return bool(beds)
+
+
+def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
+    """The law of the normal force and that of friction."""
+    if "soil" in e.values:
+        return read_soil(e)
+    for key in SOIL:
+        e.refuse(key, "belongs to contacts that have soil")
+    if e["normal_law"] == RIGID:
+        return _rigid_law(e), None
+    if not has_bristles(e.values):
+        e.refuse("lateral", "belongs to contacts that have soil, or friction_law: lugre")
+    return read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+
+
+def _rigid_law(e: Entry) -> RigidLaw:
+    """The law without a stiffness, whose friction and restitution are numbers."""
+    for key in (*CURVED, *LATERAL):
+        if key not in ("normal_law", "friction", "restitution"):
+            e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
+    for key in ("friction", "restitution"):
+        value = e[key]
+        if value is not None:
+            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
+    restitution = e["restitution"]
+    if restitution is not None:
+        e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
+    return RigidLaw()
+
+
+def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note groups that are not plates on ground."""
+    for shapes, others, key in ((first, second, "second"), (second, first, "first")):
+        if any(shape.kind in GROUNDS for shape in shapes):
+            wrong = sorted({shape.kind for shape in others if shape.kind != "plate" and not shape.is_wheel})
+            wheels = [shape for shape in others if shape.is_wheel]
+            if wrong:
+                remedy = "give plates: the undersides of links, soles, feet; or wheels: circles that have a width"
+                e.fault(key, f"a {wrong[0]} does not lie on soil", remedy)
+            elif 0 < len(wheels) < len(others) and not any(shape.kind == BED for shape in shapes):
+                e.fault(key, "has wheels and plates, which remember differently", "give each contacts of their own")
+            on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
+            if not on_bed:
+                for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
+                    e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
+                e.refuse("settling", "belongs to the cells of a bed")
+            return
+    message = "has soil, but no ground"
+    e.fault("", message, "give half_plane or a profile as one group, plates or wheels as the other", "EG-MISSING")
+
+
+def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lateral: bool) -> tuple[str, ...]:
+    """How states of friction are called, by their axes.
+
+    In the plane along the surface, and across the plane; in space along x and y of half-spaces, or x, y, z of others.
+    """
+    kinds = {shape.kind for group in groups for shape in group}
+    if kinds & set(PLANAR):
+        return ("_x", "_z") if lateral else ("",)
+    round_pairs = FIELD_SHAPE in kinds or any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
+    return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
+
+
+def _states(values: Mapping[str, Any]) -> dict[str, str]:
+    """States of all pairs and their units, pair after pair."""
+    soil = "soil" in values
+    if not soil and not has_bristles(values):
+        return {}
+    groups = given_groups(values)
+    if cells := cells_of(groups):
+        return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
+    axes = _axes(values, groups, values.get("lateral", True) is not False)
+    names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
+    unit = "m" if soil else UNIT
+    pairs = pair_states(groups)[1]
+    return {f"{name}_{k + 1}": unit for k in range(pairs) for name in names} if pairs <= MOST_PAIRS else {}
+
+
+def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note shapes that cannot meet, and a shape that is in both groups."""
+    kinds = sorted({shape.kind for shape in first}), sorted({shape.kind for shape in second or first})
+    for a in kinds[0]:
+        for b in kinds[1]:
+            if (a in PLANAR) != (b in PLANAR):
+                e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
+            elif a in GROUNDS and b in GROUNDS and (second or a != b or _differ(first, a)):
+                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
+                e.fault("second" if second else "first", told, _ALLOWED)
+    for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
+        if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
+            e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
+            break
+    for key, group, others in (("first", first, second or first), ("second", second, first)):
+        cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
+        if cornered and (second or _differ_in_body(first)):
+            told = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
+            for shape in group:
+                if shape.kind == "segment":
+                    e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", told)
+        if e.at_fault(key):
+            break
+    for key, shapes in (("first", first), ("second", second)):
+        if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:
+            e.fault(key, f"has the {twice[0].kind} on {twice[0].marker.label} twice", "give each shape once")
+    both = {shape.marker.label for shape in first if shape in second}
+    if both:
+        e.fault(
+            "second",
+            f"the shape on {sorted(both)[0]} is in both groups",
+            "give second only what is not in first; without second the shapes of first meet among themselves",
+        )
+    bodies = {shape.marker.body for shape in (*first, *second)}
+    if len(bodies) == 1:
+        e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
+
+
+def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note cuboids that meet cuboids or capsules, where every pair of their edges would have states."""
+    for one in first:
+        for other in second or first:
+            kinds = {one.kind, other.kind}
+            if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
+                told = f"{one.kind} and {other.kind} have no states where their edges meet"
+                e.fault("friction_law", told, "use friction_law: coulomb or brown_mcphee for cuboids among themselves")
+                return
+
+
+def _is_thin(shape: ContactShape) -> bool:
+    return shape.kind == "segment" and shape.sizes[1].is_zero
+
+
+def _differ_in_body(shapes: Sequence[ContactShape]) -> bool:
+    return len({shape.marker.body for shape in shapes}) > 1
+
+
+def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
+    """Whether shapes of a kind are on different bodies."""
+    return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
+
+
+_UNDER_PLATES = ("bed", "half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+_CORNERED = (
+    "box",
+    "polygon",
+    "profile",
+    "smooth_profile",
+    "outline",
+    "smooth_outline",
+    "sprocket",
+)  #: shapes whose corners meet segments
+_ALLOWED = (
+    "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
+    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere, capsule, ellipsoid and cuboid meet "
+    "half_space, height_field and each other"
+)
+
+_NORMAL_LAW = CURVED["normal_law"].replace(
+    choices=(*NORMAL_LAWS, RIGID),
+    doc=CURVED["normal_law"].doc + f"; {RIGID}, no penetration, for runs by the method moreau only",
+)
+_RESTITUTION = CURVED["restitution"].replace(
+    doc="coefficient of restitution, from which the dissipation is computed; in runs by the method moreau Newton's"
+)
+_SHAPES = "shapes {shape, on, ...} of the "
+
+TYPES = table(
+    ElementType(
+        "contacts",
+        "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
+        f"({', '.join(PLANAR)}; {', '.join(kind for kind in SHAPE_FIELDS if kind not in PLANAR)}), "
+        "on (a marker or a list of markers) and sizes.  Shapes of one body do not meet.",
+        {
+            "first": ContactShapes(_SHAPES + "first group", required=True, dimension=LENGTH),
+            "second": ContactShapes(
+                _SHAPES + "second group; without it those of the first meet among themselves",
+                dimension=LENGTH,
+            ),
+            "law": Law("the keys that follow as a mapping, instead of one by one"),
+            **CURVED,
+            "normal_law": _NORMAL_LAW,
+            "restitution": _RESTITUTION,
+            **SOIL,
+            **LATERAL,
+        },
+        _contact_groups,
+        states=_states,
+    )
+)

@@ -1,0 +1,116 @@
+"""Constraint elements: relations between coordinates that the user writes out."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ...base.records import dataclass
+from ...expr.core import Expr, symbols_of
+from ...expr.differentiate import gradient
+from ..element_type import ElementType, Entry, table
+from ..kinds import OUTPUT, Factors, Scalar
+from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
+
+#: What can stand in an equation, as a remedy.
+ALLOWED = "a constraint can contain t, inputs, coordinates and velocities"
+#: Kinds of names that cannot, with what is added to that.
+_UNUSABLE = {
+    "energy": "not energies",
+    "reaction": "not reactions",
+    "multiplier": "not multipliers",
+    "rate of a state": "not rates of states",
+}
+
+
+@dataclass(frozen=True)
+class Linear(Constraint):
+    """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
+
+    sentence: ClassVar[str] = "A linear relation between coordinates."
+    formula: ClassVar[str] = r"\Sigma_k c_k q_k = c_0"
+    type_name: ClassVar[str] = "linear"
+    written: ClassVar[bool] = True
+    terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
+    offset: Expr
+    kind: str
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        total = -self.offset
+        for coordinate, factor in self.terms:
+            total = total + factor * coordinate
+        return [Condition("relation", total, self.kind)]
+
+
+@dataclass(frozen=True)
+class Equation(Constraint):
+    """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
+
+    sentence: ClassVar[str] = "An equation that the model gives."
+    formula: ClassVar[str] = r"C = 0"
+    type_name: ClassVar[str] = "equation"
+    written: ClassVar[bool] = True
+    expression: Expr
+    kind: str
+    level: str
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        return [Condition("equation", self.expression, self.kind, self.level)]
+
+
+def _coupling(e: Entry) -> Linear | Equation | None:
+    if "equation" in e.values:
+        e.refuse("offset", "offset belongs to coordinates, not to an equation")
+        return _equation(e)
+    terms = e["coordinates"]
+    if terms is None:
+        return None
+    kind = "length" if any(found.kind == "length" for found, _ in terms) else "angle"
+    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e["offset"], kind)
+
+
+def _equation(e: Entry) -> Equation | None:
+    expression = e["equation"]
+    used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
+    for name, meant in used.items():
+        if meant.level == 2:
+            what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)
+            e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED, "EG-REFERENCE")
+        elif meant.kind in _UNUSABLE:
+            e.fault(
+                "equation",
+                f"the {meant.kind} {name!r} cannot be used here",
+                f"{ALLOWED}, {_UNUSABLE[meant.kind]}",
+                "EG-REFERENCE",
+            )
+    moving = [meant for meant in used.values() if meant.level is not None]
+    rates = [name for name, meant in used.items() if meant.level == 1]
+    if not moving and not e.at_fault("equation"):
+        remedy = f"coordinates are: {', '.join(e.known('coordinate'))}"
+        e.fault("equation", "the equation contains no coordinate", remedy, "EG-EXPRESSION")
+    if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
+        message = f"the equation is not linear in {', '.join(rates)}"
+        e.fault("equation", message, "a nonholonomic constraint must be linear in the velocities", "EG-EXPRESSION")
+    kind = "length" if any(meant.measure == "length" for meant in moving) else "angle"
+    return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
+
+
+TYPES = table(
+    ElementType(
+        "coupling",
+        "a relation between coordinates: a linear one, or any equation.",
+        {
+            "coordinates": Factors(
+                "mapping of coordinates to factors: the sum of factor times coordinate equals the offset"
+            ),
+            "offset": Scalar("value of that sum, an expression of parameters", default=0),
+            "equation": Scalar(
+                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, "
+                "places and velocities of markers; with velocities the constraint is nonholonomic and must be linear "
+                "in them",
+                level=OUTPUT,
+            ),
+        },
+        _coupling,
+        one_of=("coordinates", "equation"),
+    )
+)

@@ -1,0 +1,191 @@
+"""Force elements: each a frozen class of expressions and markers, asked for loads or a potential."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from ...base.records import dataclass
+from ...expr import vectors as vec
+from ...expr.core import Expr, Graph
+from ...expr.vectors import Mat3, Vec3
+from ..frames import Marker
+from ..looks import Seen
+
+# -- one-sided laws ----------------------------------------------------------------------------------------------------
+
+
+def where(condition: Expr, yes: Expr | float, no: Expr | float) -> Expr:
+    """``yes`` where the condition holds, else ``no``."""
+    return condition.graph.apply("select", condition, yes, no)
+
+
+def beyond_zero(x: Expr, law: Callable[[Expr], Expr]) -> Expr:
+    """law(x) for x > 0, else 0.
+
+    Where x <= 0 the law sees 1, so that neither it nor its derivative has to exist there (a root of a negative number).
+    """
+    inside = x.graph.apply("lt", 0.0, x)
+    return where(inside, law(where(inside, x, 1.0)), 0.0)
+
+
+# -- the class ---------------------------------------------------------------------------------------------------------
+
+# A force element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.
+
+
+class View(Protocol):
+    """Motion of markers in ground axes and of joint coordinates, as expressions."""
+
+    graph: Graph
+
+    def position(self, marker: Marker) -> Vec3: ...
+    def velocity(self, marker: Marker) -> Vec3: ...
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def angular_velocity(self, marker: Marker) -> Vec3: ...
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap."""
+        ...
+
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        """Value and rate of a coordinate of any joint, tree or cut."""
+        ...
+
+
+class MovingView(View, Protocol):
+    """Motion of markers up to accelerations."""
+
+    def accelerations(self, markers: Sequence[Marker]) -> list[Expr]:
+        """Acceleration and angular acceleration of each marker, ground axes."""
+        ...
+
+
+class MarkerLoad(NamedTuple):
+    """A wrench on the marker's body: force at the marker's origin and torque, in ground axes (N, N m)."""
+
+    marker: Marker
+    force: Vec3
+    torque: Vec3
+
+
+class CoordinateLoad(NamedTuple):
+    """A generalized force along a joint coordinate (N m or N)."""
+
+    coordinate: str
+    value: Expr
+
+
+Load = MarkerLoad | CoordinateLoad
+
+
+class Measured(NamedTuple):
+    """An element along its path: length or angle, its rate, and the generalized force that increases it.
+
+    Of a contact: penetration, its rate, and the normal force.
+    """
+
+    value: Expr
+    rate: Expr
+    force: Expr
+
+
+@dataclass(frozen=True)
+class Force(ABC):
+    """A force element.  ``name`` is the user's; a subclass adds its markers and laws.
+
+    ``sentence`` and ``formula`` (LaTeX) say its law, for readers.
+    """
+
+    sentence: ClassVar[str] = "A force element of the model."
+    formula: ClassVar[str] = ""
+    uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
+    by_reaction: ClassVar[bool] = False  #: whether its law speaks of the reactions of joints
+    by_power: ClassVar[bool] = False  #: whether its forces enter by virtual power, though it has a potential
+    not_finite_where: ClassVar[str] = ""  #: where its loads are not finite, and what to do, for messages
+    name: str
+
+    @abstractmethod
+    def loads(self, view: View) -> list[Load]:
+        """Everything this element exerts, its conservative part included."""
+
+    def potential(self, view: View) -> Expr | None:
+        """Potential energy (J) of the element's conservative part, None if it has none."""
+        return None
+
+    def drawn(self) -> list[Seen]:
+        """What is to be seen of it in a picture; nothing unless a type says so."""
+        return []
+
+    def push(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it, for pictures; None of a type that has no such law."""
+        return None
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        """Laws that it is made of, each with a ``formula`` and numbers of its own, instead of the type's formula."""
+        return ()
+
+    @property
+    def formulas(self) -> list[str]:
+        """Its law in LaTeX: that of its laws, or of its type."""
+        return [law.formula for law in self.laws] or [self.formula] * bool(self.formula)
+
+    @property
+    def acts_along(self) -> bool:
+        """Whether it acts along a path, so that :meth:`measured` is something."""
+        return hasattr(self, "path")
+
+    def along(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it; None of an element that has no path."""
+        return self.push(value, rate)
+
+    def measured(self, view: View) -> Measured | None:
+        """What it does along its path, for outputs and laws; None of an element that has no path."""
+        path: Any = getattr(self, "path", None)
+        if path is None:
+            return None
+        value, rate = path.measure(view)
+        force = self.along(value, rate)
+        return None if force is None else Measured(value, rate, force)
+
+    def power(self, view: View) -> Expr:
+        """Power of its loads (W): positive where it drives the mechanism."""
+        total = view.graph.zero
+        for load in self.loads(view):
+            if isinstance(load, MarkerLoad):
+                total = total + vec.dot(load.force, view.velocity(load.marker))
+                total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
+            else:
+                total = total + load.value * view.coordinate(load.coordinate)[1]
+        return total
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        """Rates of its states, in the order in which its type names them."""
+        return ()
+
+    def met_shapes(self) -> list[str]:
+        """What may meet, of a force that acts between many shapes."""
+        return []
+
+    def meeting(self, view: MovingView) -> list[Expr]:
+        """Of a force that acts between shapes: when they may meet, and which two are deepest in each other."""
+        return []
+
+    def near(self, view: View) -> list[Expr]:
+        """Of a force that acts between shapes: which are near each other, and where."""
+        return []
+
+    @property
+    def met_bodies(self) -> list[int]:
+        """The body of each of :meth:`met_shapes`."""
+        return []
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it is a contact without a law of force, which only a time-stepping method solves."""
+        return False
+
+    def remainder(self, view: View) -> list[Load]:
+        """What the loads are beyond the slope of the potential, where there is one: friction, damping."""
+        return []

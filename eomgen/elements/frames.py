@@ -1,0 +1,52 @@
+"""Frames fixed in bodies: what joints and force elements attach to."""
+
+from __future__ import annotations
+
+from ..base.records import dataclass
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph
+from ..expr.vectors import Mat3, Vec3
+
+GROUND = -1
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Placement in a body: ``rotation`` takes marker axes to body axes, ``position`` is in body axes (m)."""
+
+    rotation: Mat3
+    position: Vec3
+
+    def __matmul__(self, inner: Frame) -> Frame:
+        """A frame placed in the axes of this one, in the body."""
+        turned = vec.product(self.rotation, inner.rotation)
+        return Frame(turned, vec.add(self.position, vec.times(self.rotation, inner.position)))
+
+    @classmethod
+    def identity(cls, graph: Graph) -> Frame:
+        """The axes and the origin of the body itself."""
+        return cls(vec.identity(graph), vec.zero(graph))
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A frame fixed in a body (``body`` is an index, or GROUND); ``label`` is how messages call it."""
+
+    body: int
+    frame: Frame
+    label: str
+
+
+@dataclass(frozen=True)
+class WrapCylinder:
+    """A cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
+
+    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.  The surface
+    is smooth, or has a coefficient of ``friction`` that is reached well above the velocity ``smoothing`` (m/s) of slip.
+    """
+
+    marker: Marker
+    radius: Expr
+    sense: int
+    friction: Expr | None = None
+    smoothing: Expr | None = None

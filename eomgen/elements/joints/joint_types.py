@@ -1,0 +1,447 @@
+"""Joints of one degree of freedom and of several: revolute to free, universal, constant-velocity, weld."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar
+
+from ...base.records import dataclass
+from ...expr import vectors as vec
+from ...expr.core import Expr, Graph, atan2, cos, sin, sqrt
+from ...expr.vectors import Mat3, Vec3
+from ..dimensions import LENGTH
+from ..element_type import key
+from ..kinds import Choice, Scalar
+from ..looks import JointLook, SymbolPart
+from .joint import (
+    SEQUENCE,
+    Closure,
+    Coordinate,
+    Joint,
+    QuaternionSlot,
+    about,
+    along,
+    euler,
+    euler_angles,
+    euler_rates,
+    parallel_axes,
+    parameter_rotation,
+    parameters_of,
+    same_orientation,
+    unit,
+)
+
+# -- one degree of freedom ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Revolute(Joint):
+    """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
+
+    sentence: ClassVar[str] = "S turns about the axis {z} that it shares with P; the origins coincide."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
+    type_name: ClassVar[str] = "revolute"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[0]), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(unit(graph, 2), vec.zero(graph))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Continuous(Revolute):
+    """A revolute joint without limits, as URDF calls it.  Allows 1, removes 5."""
+
+    type_name: ClassVar[str] = "continuous"
+
+
+@dataclass(frozen=True)
+class Prismatic(Joint):
+    """S slides along the common z axis without turning.  Allows 1, removes 5."""
+
+    sentence: ClassVar[str] = "S slides along the axis {z} that it shares with P, without turning."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
+    type_name: ClassVar[str] = "prismatic"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), (graph.zero, graph.zero, q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, 2))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xy") + same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2]]
+
+
+@dataclass(frozen=True)
+class Screw(Joint):
+    """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
+
+    The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
+    """
+
+    sentence: ClassVar[str] = "S turns about the common axis {z} and advances by the pitch $p$ in each turn."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_{z}"
+    type_name: ClassVar[str] = "screw"
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True
+    )
+    counts_turns: ClassVar[bool] = True
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+    pitch: Expr = key(
+        Scalar(
+            "advance of S per turn (m), negative for a left-handed thread",
+            required=True,
+            not_zero="give a pitch other than 0; a screw without advance is a revolute joint",
+            dimension=LENGTH,
+        )
+    )
+
+    @property
+    def lead(self) -> Expr:
+        """Advance per radian (m)."""
+        return self.pitch / (2 * math.pi)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[0]), (graph.zero, graph.zero, self.lead * q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(unit(graph, 2), vec.scale(self.lead, unit(graph, 2)))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        """The angle from where the advance z wants x_S to where it is: an equation that knows no full turns."""
+        turn = position[2] / self.lead
+        c, s = cos(turn), sin(turn)
+        off = atan2(c * rotation[1][0] - s * rotation[0][0], c * rotation[0][0] + s * rotation[1][0])
+        return [*along(position, "xy"), *parallel_axes(rotation), Closure("thread", self.lead * off, "length")]
+
+    def closure_in_turns(self, graph: Graph, rotation: Mat3, position: Vec3, turn: Expr) -> list[Closure]:
+        thread = Closure("thread", position[2] - self.lead * turn, "length")
+        return [*along(position, "xy"), *parallel_axes(rotation), thread]
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2] / self.lead]
+
+
+# -- several degrees of freedom ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cylindrical(Joint):
+    """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
+
+    sentence: ClassVar[str] = "S slides along the common axis {z} and turns about it."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
+    type_name: ClassVar[str] = "cylindrical"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[1]), (graph.zero, graph.zero, q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, 2)), (unit(graph, 2), vec.zero(graph))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xy") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2], atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Planar(Joint):
+    """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
+
+    sentence: ClassVar[str] = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
+    )
+    type_name: ClassVar[str] = "planar"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("_x", "length"),
+        Coordinate("_y", "length"),
+        Coordinate("_3", "angle"),
+    )
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[2]), (q[0], q[1], graph.zero)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        turn = about(graph, 2, q[2])
+        o = vec.zero(graph)
+        return [(o, turn[0]), (o, turn[1]), (unit(graph, 2), o)]  # R^T e_k is row k of R
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "z") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[0], position[1], atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Translational(Joint):
+    """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
+
+    sentence: ClassVar[str] = "S slides along the three axes of P without turning."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
+    )
+    type_name: ClassVar[str] = "translational"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
+    has_axis: ClassVar[bool] = False
+    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), (q[0], q[1], q[2])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, k)) for k in range(3)]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return list(position)
+
+
+@dataclass(frozen=True)
+class Weld(Joint):
+    """S is fixed to P.  Allows 0, removes 6."""
+
+    sentence: ClassVar[str] = "S is fixed to P."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"
+    type_name: ClassVar[str] = "weld"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
+    has_axis: ClassVar[bool] = False
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return []
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz") + same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return []
+
+
+# -- two angles between shafts -----------------------------------------------------------------------------------------
+
+
+TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
+
+
+@dataclass(frozen=True)
+class Universal(Joint):
+    """A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular.  Allows 2, removes 4.
+
+    R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
+    """
+
+    sentence: ClassVar[str] = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
+    type_name: ClassVar[str] = "universal"
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
+    )
+    coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
+    has_axes: ClassVar[bool] = True
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return euler(graph, "xy", q), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(g, vec.zero(graph)) for g in euler_rates(graph, "xy", q)]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [*along(position, "xyz"), Closure("x.y", rotation[0][1], "angle")]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [atan2(rotation[2][1], rotation[1][1]), atan2(rotation[0][2], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class ConstantVelocity(Joint):
+    """The shaft bends in any direction, and S turns exactly as fast as P.  Allows 2, removes 4.
+
+    R = R_x(q1/2) R_y(q2) R_x(q1/2).  A palindrome of turns about x and y has no z part in its quaternion
+    (e3 = 0): S is turned about an axis in the x-y plane of P, so the relative angular velocity lies in the plane that
+    bisects the shafts, and shafts held in their bearings turn equally fast (Hunt, Kinematic Geometry of Mechanisms,
+    1978, sec. 13.2: constant-velocity connections).  The shafts are the z axes; a bend of half a turn is singular.
+    """
+
+    sentence: ClassVar[str] = (
+        "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
+    )
+    formula: ClassVar[str] = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
+    type_name: ClassVar[str] = "constant_velocity"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
+    coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
+
+    def _angles(self, q: Sequence[Expr]) -> tuple[Expr, Expr, Expr]:
+        return 0.5 * q[0], q[1], 0.5 * q[0]
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return euler(graph, "xyx", self._angles(q)), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        first, second, third = euler_rates(graph, "xyx", self._angles(q))
+        o = vec.zero(graph)
+        return [(vec.scale(graph.constant(0.5), vec.add(first, third)), o), (second, o)]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [*along(position, "xyz"), Closure("x.y", rotation[1][0] - rotation[0][1], "angle")]  # 4 e0 e3
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0] + rotation[1][1]]  # 2 (e0^2 - e3^2): it is e3 that vanishes, not e0
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        """From 4 e0 e1, 4 e0 e2 and 4 e0^2 with e = (cos q2/2 cos q1/2, cos q2/2 sin q1/2, sin q2/2, 0)."""
+        scalar = 1.0 + rotation[0][0] + rotation[1][1] + rotation[2][2]
+        about_x, about_y = rotation[2][1] - rotation[1][2], rotation[0][2] - rotation[2][0]
+        across = sqrt(scalar * scalar + about_x * about_x)
+        return [2.0 * atan2(about_x, scalar), 2.0 * atan2(about_y, across)]
+
+
+# -- all axes ----------------------------------------------------------------------------------------------------------
+
+
+ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
+PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
+ROTATION = Choice(
+    "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
+    default="euler_angles",
+    choices=("euler_angles", "euler_parameters"),
+)
+PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
+
+
+@dataclass(frozen=True)
+class RotatingJoint(Joint):
+    """What spherical and free joints share: how they describe a rotation.
+
+    ``rotation`` is ``euler_angles`` (intrinsic, x-y'-z'' unless ``sequence`` says otherwise; singular where the middle
+    angle brings the first and last axes in line) or ``euler_parameters`` (e0 the scalar part; never singular), whose
+    velocities are the components of the angular velocity of S relative to P in S axes.
+    """
+
+    has_axis: ClassVar[bool] = False
+    place: ClassVar[tuple[Coordinate, ...]] = ()
+    sequence: str = key(SEQUENCE)
+    rotation: str = key(ROTATION)
+
+    def __post_init__(self) -> None:
+        if self.in_parameters:
+            n = len(self.place)
+            object.__setattr__(self, "coordinates", (*self.place, *PARAMETERS))
+            object.__setattr__(self, "quaternion_slots", (QuaternionSlot(n, n),))
+
+    @property
+    def in_parameters(self) -> bool:
+        """Whether the rotation is described by Euler parameters."""
+        return self.rotation == "euler_parameters"
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> Mat3:
+        """The rotation of S in P; q without the place."""
+        return parameter_rotation(graph, q) if self.in_parameters else euler(graph, self.sequence, q)
+
+    def turns(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        """Columns of the angular velocity; constant for Euler parameters."""
+        if self.in_parameters:
+            return [(unit(graph, k), vec.zero(graph)) for k in range(3)]
+        return [(g, vec.zero(graph)) for g in euler_rates(graph, self.sequence, q)]
+
+    def turned(self, graph: Graph, rotation: Mat3) -> list[Expr]:
+        """The coordinates of a rotation."""
+        if self.in_parameters:
+            return parameters_of(graph, rotation)
+        return euler_angles(graph, self.sequence, rotation)
+
+
+@dataclass(frozen=True)
+class Spherical(RotatingJoint):
+    """S turns freely about the common origin.  Allows 3, removes 3."""
+
+    sentence: ClassVar[str] = "S turns about its origin, which stays at the origin of P."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
+    type_name: ClassVar[str] = "spherical"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
+    coordinates: ClassVar[tuple[Coordinate, ...]] = ANGLES
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return self.turns(graph, q)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return self.turned(graph, rotation)
+
+
+@dataclass(frozen=True)
+class Free(RotatingJoint):
+    """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
+
+    sentence: ClassVar[str] = "S moves without hindrance: three displacements in the axes of P, then three rotations."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{R}(q), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
+    )
+    type_name: ClassVar[str] = "free"
+    place: ClassVar[tuple[Coordinate, ...]] = PLACE
+    coordinates: ClassVar[tuple[Coordinate, ...]] = PLACE + ANGLES
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q[3:]), (q[0], q[1], q[2])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        o = vec.zero(graph)
+        return [(o, row) for row in self.turn(graph, q[3:])] + self.turns(graph, q[3:])
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return []
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [*position, *self.turned(graph, rotation)]

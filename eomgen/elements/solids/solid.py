@@ -1,0 +1,201 @@
+"""Solids of uniform density: what a type must answer, boxes, spheres, ellipsoids, and solids of revolution."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...base.records import dataclass
+from ...expr import vectors as vec
+from ...expr.core import Expr, Graph
+from ...expr.vectors import Vec3
+from ..dimensions import LENGTH
+from ..kinds import Fields, Scalar, Vector
+
+# -- the class ---------------------------------------------------------------------------------------------------------
+
+# Formulas after Bauchau, *Flexible Multibody Dynamics* (2011), app. A, and any table of mass moments of inertia; tests
+# integrate the density over each solid instead.
+
+
+@dataclass(frozen=True)
+class Solid(ABC):
+    """A solid of uniform density.
+
+    Attributes
+    ----------
+    lengths : mapping of str to Vec3
+        Dimensions (m); a single one is repeated three times.
+    """
+
+    lengths: Mapping[str, Vec3]
+
+    type_name: ClassVar[str]
+    dimensions: ClassVar[Fields]  #: its keys
+    has_axis: ClassVar[bool] = False  #: whether z of its own axes can be laid along an ``axis``
+    content_key: ClassVar[str] = "density"  #: the key that gives the mass through :meth:`content`
+
+    def length(self, name: str) -> Expr:
+        """A dimension that is one length."""
+        return self.lengths[name][0]
+
+    @property
+    def graph(self) -> Graph:
+        """The graph of the dimensions."""
+        return next(iter(self.lengths.values()))[0].graph
+
+    @abstractmethod
+    def content(self) -> Expr:
+        """What the density is multiplied with: the volume (m^3), of a rod its length (m)."""
+
+    @abstractmethod
+    def gyration(self) -> Vec3:
+        """Principal moments about the centre of mass in the solid's own axes, for each kg (m^2)."""
+
+    def centre(self) -> Vec3:
+        """Centre of mass from the solid's reference point, in its own axes (m)."""
+        return vec.zero(self.graph)
+
+
+# -- boxes, spheres, ellipsoids ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Box(Solid):
+    """A rectangular block; edges along its axes."""
+
+    type_name: ClassVar[str] = "box"
+    dimensions: ClassVar[Fields] = {"size": Vector("edges along x, y, z (m)", required=True, dimension=LENGTH)}
+
+    def content(self) -> Expr:
+        a, b, c = self.lengths["size"]
+        return a * b * c
+
+    def gyration(self) -> Vec3:
+        a, b, c = (x * x / 12.0 for x in self.lengths["size"])
+        return (b + c, a + c, a + b)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Solid):
+    """An ellipsoid; half axes along its axes."""
+
+    type_name: ClassVar[str] = "ellipsoid"
+    dimensions: ClassVar[Fields] = {"semi_axes": Vector("half axes along x, y, z (m)", required=True, dimension=LENGTH)}
+
+    def content(self) -> Expr:
+        a, b, c = self.lengths["semi_axes"]
+        return (4.0 / 3.0 * math.pi) * a * b * c
+
+    def gyration(self) -> Vec3:
+        a, b, c = (0.2 * x * x for x in self.lengths["semi_axes"])
+        return (b + c, a + c, a + b)
+
+
+@dataclass(frozen=True)
+class Sphere(Solid):
+    """A ball."""
+
+    type_name: ClassVar[str] = "sphere"
+    dimensions: ClassVar[Fields] = {"radius": Scalar("radius (m)", required=True, dimension=LENGTH)}
+
+    def content(self) -> Expr:
+        r = self.length("radius")
+        return (4.0 / 3.0 * math.pi) * r * r * r
+
+    def gyration(self) -> Vec3:
+        r = self.length("radius")
+        return (0.4 * r * r,) * 3
+
+
+# -- solids of revolution ----------------------------------------------------------------------------------------------
+
+
+_LENGTH = Scalar("length along the axis (m)", required=True, dimension=LENGTH)
+_RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
+
+
+@dataclass(frozen=True)
+class Cylinder(Solid):
+    """A full circular cylinder, placed by its centre; of length 0 a disc (which needs a mass)."""
+
+    type_name: ClassVar[str] = "cylinder"
+    dimensions: ClassVar[Fields] = {"radius": _RADIUS, "length": _LENGTH}
+    has_axis: ClassVar[bool] = True
+
+    def content(self) -> Expr:
+        r = self.length("radius")
+        return math.pi * r * r * self.length("length")
+
+    def gyration(self) -> Vec3:
+        r, l = self.length("radius"), self.length("length")
+        across = r * r / 4.0 + l * l / 12.0
+        return (across, across, 0.5 * r * r)
+
+
+@dataclass(frozen=True)
+class Tube(Solid):
+    """A hollow circular cylinder, placed by its centre."""
+
+    type_name: ClassVar[str] = "tube"
+    dimensions: ClassVar[Fields] = {
+        "outer_radius": Scalar("outer radius (m)", required=True, dimension=LENGTH),
+        "inner_radius": Scalar("inner radius (m)", required=True, dimension=LENGTH),
+        "length": _LENGTH,
+    }
+    has_axis: ClassVar[bool] = True
+
+    def content(self) -> Expr:
+        a, b = self.length("outer_radius"), self.length("inner_radius")
+        return math.pi * (a - b) * (a + b) * self.length("length")
+
+    def gyration(self) -> Vec3:
+        a, b, l = self.length("outer_radius"), self.length("inner_radius"), self.length("length")
+        square = a * a + b * b
+        across = square / 4.0 + l * l / 12.0
+        return (across, across, 0.5 * square)
+
+
+@dataclass(frozen=True)
+class Rod(Solid):
+    """A thin straight rod, placed by its middle; ``line_density`` is its mass for each metre."""
+
+    type_name: ClassVar[str] = "rod"
+    dimensions: ClassVar[Fields] = {"length": _LENGTH}
+    has_axis: ClassVar[bool] = True
+    content_key: ClassVar[str] = "line_density"
+
+    def content(self) -> Expr:
+        return self.length("length")
+
+    def gyration(self) -> Vec3:
+        l = self.length("length")
+        across = l * l / 12.0
+        return (across, across, self.graph.zero)
+
+
+@dataclass(frozen=True)
+class Cone(Solid):
+    """A full circular cone, placed by the centre of its base, its apex along the axis."""
+
+    type_name: ClassVar[str] = "cone"
+    dimensions: ClassVar[Fields] = {
+        "radius": Scalar("radius of the base (m)", required=True, dimension=LENGTH),
+        "length": Scalar("height along the axis (m)", required=True, dimension=LENGTH),
+    }
+    has_axis: ClassVar[bool] = True
+
+    def content(self) -> Expr:
+        r = self.length("radius")
+        return (math.pi / 3.0) * r * r * self.length("length")
+
+    def gyration(self) -> Vec3:
+        r, h = self.length("radius"), self.length("length")
+        across = 0.15 * r * r + 0.0375 * h * h
+        return (across, across, 0.3 * r * r)
+
+    def centre(self) -> Vec3:
+        zero = self.graph.zero
+        return (zero, zero, 0.25 * self.length("length"))

@@ -1,0 +1,531 @@
+"""A formula -> LaTeX, text or MathML, and how wide it is."""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Callable
+from functools import cache
+
+from ...base.latex import SUPERSCRIPTS, NotationError, mathml_form, read_latex, text_form
+from ...base.notation import Notation, literal
+from ...base.texts import html_text
+from . import formula as tree
+
+# -- LaTeX of users ----------------------------------------------------------------------------------------------------
+
+# The pieces between spaces outside braces are symbols and signs of :mod:`eomgen.base.notation`.
+
+
+@cache
+def given_mathml(latex: str) -> str:
+    """The elements of a formula, without ``<math>``.
+
+    Parameters
+    ----------
+    latex : str
+    """
+    return "".join(map(_piece, _pieces(latex))).replace("<mo>-</mo>", "<mo>\N{MINUS SIGN}</mo>")
+
+
+def _pieces(latex: str) -> list[str]:
+    found, depth = [""], 0
+    for letter in latex:
+        depth += (letter == "{") - (letter == "}")
+        if letter == " " and depth == 0:
+            found.append("")
+        else:
+            found[-1] += letter
+    return [piece for piece in found if piece]
+
+
+def _piece(latex: str) -> str:
+    if latex == r"\quad":
+        return "<mspace width='1em'/>"
+    try:
+        return mathml_form(read_latex(latex))
+    except NotationError:
+        return f"<mtext>{html_text(latex)}</mtext>"
+
+
+# -- the writer --------------------------------------------------------------------------------------------------------
+
+
+class FormulaWriter:
+    """Writes the parts of a formula, each kind by the method of ``WRITTEN_BY``.
+
+    Parameters
+    ----------
+    names : Notation
+        How names are printed.
+    """
+
+    minus, plus = " - ", " + "  #: between terms
+    negative = "-"  #: before a first term that is subtracted
+    grouped: Callable[[str], str]  #: in parentheses
+
+    def __init__(self, names: Notation) -> None:
+        self.names = names
+
+    def write(self, formula: tree.Formula) -> str:
+        """The text of a formula."""
+        return str(getattr(self, WRITTEN_BY[type(formula)])(formula))
+
+    def sum(self, formula: tree.SumOf) -> str:
+        """Terms with their signs."""
+        found = ""
+        for k, (subtracted, term) in enumerate(formula.terms):
+            between = self.minus if subtracted else self.plus
+            found += (self.negative * subtracted if k == 0 else between) + self.factor(term)
+        return found
+
+    def factor(self, formula: tree.Formula) -> str:
+        """A formula in a place where a sum needs parentheses."""
+        shown = self.write(formula)
+        return self.grouped(shown) if tree.is_group(formula) else shown
+
+
+WRITTEN_BY: dict[type, str] = {
+    tree.NumberPart: "number",
+    tree.Name: "name",
+    tree.Letter: "letter",
+    tree.Words: "words",
+    tree.SumOf: "sum",
+    tree.Product: "product",
+    tree.Quotient: "quotient",
+    tree.Power: "power",
+    tree.CallOf: "call",
+    tree.Relation: "relation",
+    tree.CasesOf: "cases",
+    tree.MatrixOf: "matrix",
+}
+
+
+# -- LaTeX -------------------------------------------------------------------------------------------------------------
+
+
+_LATEX = {
+    "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan",
+    "sinh": r"\sinh", "cosh": r"\cosh", "tanh": r"\tanh", "exp": r"\exp", "ln": r"\ln", "min": r"\min", "max": r"\max",
+    "delta": r"\delta",
+}  # fmt: skip
+_NEXT_ROW = r" \\ "
+_LATEX_RELATIONS = {"<=": r"\le", ">=": r"\ge", "and": r"\wedge", "or": r"\vee"}
+
+
+def latex(formula: tree.Formula, names: Notation) -> str:
+    """LaTeX of a formula.
+
+    Parameters
+    ----------
+    formula : Formula
+    names : Notation
+    """
+    return _LatexWriter(names).write(formula)
+
+
+def fenced(inside: str, left: str = "(", right: str = ")") -> str:
+    """In parentheses that grow with what they hold."""
+    tall = r"\frac" in inside or r"\begin" in inside
+    return rf"\left{left}{inside}\right{right}" if tall else f"{left}{inside}{right}"
+
+
+class _LatexWriter(FormulaWriter):
+    grouped = staticmethod(fenced)
+
+    def number(self, part: tree.NumberPart) -> str:
+        return rf"{part.digits} \cdot 10^{{{part.power}}}" if part.power else part.digits
+
+    def name(self, part: tree.Name) -> str:
+        return self.names.latex(part.name)
+
+    def letter(self, part: tree.Letter) -> str:
+        return part.latex
+
+    def words(self, part: tree.Words) -> str:
+        return part.latex
+
+    def product(self, formula: tree.Product) -> str:
+        found = ""
+        for shown in map(self.factor, formula.factors):
+            found += (r" \cdot " if found and shown[0].isdigit() else " " if found else "") + shown
+        return found
+
+    def quotient(self, formula: tree.Quotient) -> str:
+        return rf"\frac{{{self.write(formula.above)}}}{{{self.write(formula.below)}}}"
+
+    def power(self, formula: tree.Power) -> str:
+        exponent, base = self.write(formula.exponent), formula.base
+        raised = f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}"
+        if isinstance(base, tree.CallOf) and base.function in _LATEX:
+            return self._called(base, raised)
+        shown = self.write(base)
+        of_abs = isinstance(base, tree.CallOf) and base.function == "abs"
+        if not of_abs and (not tree.is_simple(base) or "^" in shown or "'" in shown):
+            shown = fenced(shown)
+        return f"{shown}{raised}"
+
+    def call(self, formula: tree.CallOf) -> str:
+        return self._called(formula)
+
+    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+        inside = ", ".join(map(self.write, formula.arguments))
+        if formula.function == "sqrt":
+            return rf"\sqrt{{{inside}}}"
+        if formula.function == "abs":
+            return rf"\left|{inside}\right|"
+        name = _LATEX.get(formula.function) or literal(formula.function, "operatorname")
+        if len(formula.arguments) == 1 and tree.is_simple(formula.arguments[0]) and formula.function in _LATEX:
+            return f"{name}{power} {inside}"
+        return f"{name}{power}{fenced(inside)}"
+
+    def relation(self, formula: tree.Relation) -> str:
+        return f" {_LATEX_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
+
+    def cases(self, formula: tree.CasesOf) -> str:
+        rows = (
+            rf"{self.write(value)} & " + (r"\text{otherwise}" if when is None else rf"\text{{if }} {self.write(when)}")
+            for value, when in formula.branches
+        )
+        return rf"\begin{{cases}}{_NEXT_ROW.join(rows)}\end{{cases}}"
+
+    def matrix(self, formula: tree.MatrixOf) -> str:
+        rows = (" & ".join(map(self.write, row)) for row in formula.rows)
+        return rf"\begin{{bmatrix}}{_NEXT_ROW.join(rows)}\end{{bmatrix}}"
+
+
+# -- text --------------------------------------------------------------------------------------------------------------
+
+
+#: Between factors and within arguments of functions: lines are broken between terms before they are broken there.
+TIGHT = "\u00a0"
+_TEXT_RELATIONS = {"<=": "≤", ">=": "≥"}
+
+
+def text(formula: tree.Formula, names: Notation) -> str:
+    """One line of text; factors, and whatever stands in arguments of functions, are ``TIGHT`` apart.
+
+    Parameters
+    ----------
+    formula : Formula
+    names : Notation
+    """
+    return _TextWriter(names).write(formula)
+
+
+class _TextWriter(FormulaWriter):
+    grouped = staticmethod("({})".format)
+
+    def number(self, part: tree.NumberPart) -> str:
+        return f"{part.digits}e{part.power}" if part.power else part.digits
+
+    def name(self, part: tree.Name) -> str:
+        return self.names.text(part.name)
+
+    def letter(self, part: tree.Letter) -> str:
+        return text_form(read_latex(part.latex))
+
+    def words(self, part: tree.Words) -> str:
+        return part.text
+
+    def product(self, formula: tree.Product) -> str:
+        """A fraction of numbers stands at the end: ``m l²/3``."""
+        first, others = formula.factors[0], formula.factors[1:]
+        if not (isinstance(first, tree.Quotient) and tree.is_number(first.above) and tree.is_number(first.below)):
+            return TIGHT.join(map(self._atom, formula.factors))
+        above = others if first.above == tree.NumberPart("1") else (first.above, *others)
+        return f"{self.product(tree.Product(above))}/{self.write(first.below)}"
+
+    def quotient(self, formula: tree.Quotient) -> str:
+        return f"{self.factor(formula.above)}/{self._atom(formula.below)}"
+
+    def _atom(self, formula: tree.Formula) -> str:
+        """A formula in a place where a product needs parentheses too."""
+        return f"({self.write(formula)})" if isinstance(formula, tree.Product) else self.factor(formula)
+
+    def power(self, formula: tree.Power) -> str:
+        exponent, base = self.write(formula.exponent), formula.base
+        high = exponent.translate(SUPERSCRIPTS) if exponent.isdecimal() else ""
+        of_call = isinstance(base, tree.CallOf)
+        if high and isinstance(base, tree.CallOf) and base.function not in ("abs", "sqrt"):
+            return f"{base.function}{high}({self._inside(base)})"
+        shown = self.write(base)
+        plain = isinstance(base, tree.Name | tree.Words) or (of_call and shown.startswith("|"))
+        shown = shown if plain and not any(c in shown for c in "^*") else f"({shown})"
+        if high:
+            return shown + high
+        return f"{shown}^{exponent}" if exponent.isalnum() else f"{shown}^({exponent})"
+
+    def call(self, formula: tree.CallOf) -> str:
+        inside, function = self._inside(formula), formula.function
+        if function == "abs":
+            return f"|{inside}|"
+        rooted = function == "sqrt" and isinstance(formula.arguments[0], tree.Name)
+        return f"√{inside}" if rooted else f"{function}({inside})"
+
+    def _inside(self, formula: tree.CallOf) -> str:
+        """Arguments, in which lines are broken last."""
+        return ", ".join(map(self.write, formula.arguments)).replace(" ", TIGHT)
+
+    def relation(self, formula: tree.Relation) -> str:
+        return f" {_TEXT_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
+
+    def cases(self, formula: tree.CasesOf) -> str:
+        parts = (
+            f"{self.write(value)} otherwise" if when is None else f"{self.write(value)} if {self.write(when)}"
+            for value, when in formula.branches
+        )
+        return f"{{{'; '.join(parts)}}}"
+
+    def matrix(self, formula: tree.MatrixOf) -> str:
+        return f"[{'; '.join(', '.join(map(self.write, row)) for row in formula.rows)}]"
+
+
+# -- MathML ------------------------------------------------------------------------------------------------------------
+
+
+_MATHML_FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ"}
+_MATHML_RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
+MINUS_SIGN = "\u2212"
+MINUS = f"<mo>{MINUS_SIGN}</mo>"
+TALL = ("<mfrac", "<mtable", "<msqrt")  #: what is higher than a line
+_THIN = "<mspace width='0.17em'/>"
+
+
+def mathml(formula: tree.Formula, names: Notation) -> str:
+    """Elements of MathML, without ``<math>``.
+
+    Parameters
+    ----------
+    formula : Formula
+    names : Notation
+    """
+    return _MathMLWriter(names).write(formula)
+
+
+def row(*parts: str) -> str:
+    """Elements side by side, as one."""
+    return f"<mrow>{''.join(parts)}</mrow>"
+
+
+def mathml_fenced(inside: str, left: str = "(", right: str = ")") -> str:
+    """In parentheses that grow with what they hold; in a line of text they are those of the font."""
+    grows = "" if any(tag in inside for tag in TALL) else " stretchy='false'"
+    return row(f"<mo{grows}>{left}</mo>", inside, f"<mo{grows}>{right}</mo>")
+
+
+def table(rows: list[list[str]], style: str = "") -> str:
+    """Cells in rows, each a formula in the size of the text."""
+    look = f" style='{style}'" if style else ""
+    cells = ("".join(f"<mtd style='padding:0.25em 0.6em'>{cell}</mtd>" for cell in one) for one in rows)
+    return f"<mtable displaystyle='true'{look}>{''.join(f'<mtr>{one}</mtr>' for one in cells)}</mtable>"
+
+
+class _MathMLWriter(FormulaWriter):
+    minus, plus, negative = MINUS, "<mo>+</mo>", MINUS
+
+    grouped = staticmethod(mathml_fenced)
+
+    def number(self, part: tree.NumberPart) -> str:
+        digits = f"<mn>{part.digits}</mn>"
+        if not part.power:
+            return digits
+        return row(digits, f"<mo>·</mo><msup><mn>10</mn><mn>{part.power.replace('-', MINUS_SIGN)}</mn></msup>")
+
+    def name(self, part: tree.Name) -> str:
+        return self.names.mathml(part.name)
+
+    def letter(self, part: tree.Letter) -> str:
+        return given_mathml(part.latex)
+
+    def words(self, part: tree.Words) -> str:
+        return f"<mtext>{html_text(part.text)}</mtext>"
+
+    def sum(self, formula: tree.SumOf) -> str:
+        return row(super().sum(formula))
+
+    def product(self, formula: tree.Product) -> str:
+        """Factors side by side; a point before one that begins with a digit."""
+        found: list[str] = []
+        for shown in map(self.factor, formula.factors):
+            begins = shown.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
+            found += [("<mo>·</mo>" if begins else _THIN) if found else "", shown]
+        return row(*found)
+
+    def quotient(self, formula: tree.Quotient) -> str:
+        return f"<mfrac>{row(self.write(formula.above))}{row(self.write(formula.below))}</mfrac>"
+
+    def power(self, formula: tree.Power) -> str:
+        exponent, base = self.write(formula.exponent), formula.base
+        if isinstance(base, tree.CallOf) and base.function not in ("sqrt", "abs"):
+            return self._called(base, exponent)
+        shown = self.write(base)
+        if not tree.is_simple(base):
+            shown = mathml_fenced(shown)
+        if shown.startswith("<msub>"):  # one element: the exponent stands above the subscript
+            return f"<msubsup>{shown.removeprefix('<msub>').removesuffix('</msub>')}{exponent}</msubsup>"
+        if shown.startswith(("<msup>", "<msubsup>")):
+            shown = mathml_fenced(shown)
+        return f"<msup>{shown}{exponent}</msup>"
+
+    def call(self, formula: tree.CallOf) -> str:
+        return self._called(formula)
+
+    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+        arguments = "<mo>,</mo>".join(map(self.write, formula.arguments))
+        if formula.function == "sqrt":
+            return f"<msqrt>{arguments}</msqrt>"
+        if formula.function == "abs":
+            return mathml_fenced(arguments, "|", "|")
+        name = f"<mi>{html_text(_MATHML_FUNCTIONS.get(formula.function, formula.function))}</mi>"
+        name = f"<msup>{name}{power}</msup>" if power else name
+        if len(formula.arguments) == 1 and tree.is_simple(formula.arguments[0]):
+            return row(name, _THIN, arguments)
+        return row(name, mathml_fenced(arguments))
+
+    def relation(self, formula: tree.Relation) -> str:
+        sign = html_text(_MATHML_RELATIONS.get(formula.sign, formula.sign))
+        return row(f"<mo>{sign}</mo>".join(map(self.write, formula.sides)))
+
+    def cases(self, formula: tree.CasesOf) -> str:
+        rows = []
+        for value, when in formula.branches:
+            held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if </mtext>", self.write(when))
+            rows.append([self.write(value), held])
+        return row("<mo>{</mo>", table(rows, "text-align:left"))
+
+    def matrix(self, formula: tree.MatrixOf) -> str:
+        body = table([list(map(self.write, one)) for one in formula.rows])
+        return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"
+
+
+# -- width -------------------------------------------------------------------------------------------------------------
+
+# Fractions are as wide as the wider of their parts, indices and exponents are small, dots stand above letters. The unit
+# is the width of a letter: about half the size of the font, so that 90 letters fill a page of 900 pixels.
+
+
+PAGE = 88.0  #: letters of a line
+LABEL = 4.0  #: of them before a sum in lines: "M_11 ="
+SIGN = 2.2  #: between terms
+SPACE = 0.4  #: between factors
+FENCES = 1.7  #: parentheses
+COLUMN = 1.8  #: between the columns of a matrix
+INDEX = 0.7  #: size of indices and exponents
+_HIGH = {*map(chr, SUPERSCRIPTS.values())}
+
+
+def width(formula: tree.Formula, names: Notation) -> float:
+    """About how many letters wide a formula is.
+
+    Parameters
+    ----------
+    formula : Formula
+    names : Notation
+    """
+
+    def of(part: tree.Formula) -> float:
+        return width(part, names)
+
+    def factor(part: tree.Formula) -> float:
+        return of(part) + FENCES * tree.is_group(part)
+
+    match formula:
+        case tree.NumberPart():
+            return len(formula.digits) + (SIGN + 2 + INDEX * len(formula.power) if formula.power else 0.0)
+        case tree.Name() | tree.Letter() | tree.Words():
+            return _of_text(text(formula, names))
+        case tree.SumOf():
+            first = SIGN * formula.terms[0][0]
+            return first + sum(factor(x) for _, x in formula.terms) + SIGN * (len(formula.terms) - 1)
+        case tree.Product():
+            return sum(map(factor, formula.factors)) + SPACE * (len(formula.factors) - 1)
+        case tree.Quotient():
+            return max(of(formula.above), of(formula.below)) + 2 * SPACE
+        case tree.Power():
+            simple = tree.is_simple(formula.base) or isinstance(formula.base, tree.CallOf)
+            return of(formula.base) + FENCES * (not simple) + INDEX * of(formula.exponent)
+        case tree.CallOf():
+            inside = sum(map(of, formula.arguments)) + SIGN * (len(formula.arguments) - 1)
+            if formula.function in ("sqrt", "abs"):
+                return inside + FENCES
+            fences = SPACE if all(map(tree.is_simple, formula.arguments)) else FENCES
+            return len(formula.function) + fences + inside
+        case tree.Relation():
+            return sum(map(of, formula.sides)) + SIGN * (len(formula.sides) - 1)
+        case tree.CasesOf():
+            return FENCES + max(of(x) + (of(when) if when else 9.0) + 2 * COLUMN for x, when in formula.branches)
+        case tree.MatrixOf():
+            return FENCES + sum(max(map(of, column)) + COLUMN for column in zip(*formula.rows, strict=True))
+
+
+def _of_text(shown: str) -> float:
+    """Letters of a name, without what stands above them."""
+    total = 0.0
+    for c in shown:
+        small = c in _HIGH or unicodedata.decomposition(c).startswith("<sub>")
+        total += 0.0 if c == "'" or unicodedata.combining(c) else INDEX if small else 1.0
+    return total
+
+
+def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE - LABEL) -> list[tree.Formula]:
+    """A sum as sums that are about as wide as a page at most; anything else alone.
+
+    A product with a sum that is wider than a line is multiplied out in as few parts as fit.
+    """
+    wide = isinstance(formula, tree.Product) and width(formula, names) > room
+    given = formula.terms if isinstance(formula, tree.SumOf) else ((False, formula),) if wide else ()
+    terms = [(subtracted, part) for subtracted, term in given for part in _in_parts(term, names, room)]
+    if len(terms) < 2:
+        return [formula]
+    lines: list[list[tuple[bool, tree.Formula]]] = [[]]
+    used = 0.0
+    for subtracted, term in terms:
+        size = width(term, names) + SIGN
+        if used and used + size > room:
+            lines.append([])
+            used = 0.0
+        lines[-1].append((subtracted, term))
+        used += size
+    return [tree.SumOf(tuple(line)) for line in lines]
+
+
+def latex_lines(formula: tree.Formula, names: Notation) -> list[str]:
+    """LaTeX of a formula; of a long sum in lines, each with its sign."""
+    lines = [latex(x, names) for x in sums_in_lines(formula, names)]
+    return [lines[0], *(x if x.startswith("-") else f"+ {x}" for x in lines[1:])]
+
+
+def mathml_lines(formula: tree.Formula, names: Notation) -> list[str]:
+    """The same in MathML; the sign with which a further line begins is spaced as it is between terms."""
+    first, *others = sums_in_lines(formula, names)
+    found = [mathml(first, names)]
+    for line in others:
+        subtracted = isinstance(line, tree.SumOf) and line.terms[0][0]
+        shown = mathml(line, names)
+        sign = MINUS_SIGN if subtracted else "+"
+        found.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
+    return found
+
+
+def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.Formula]:
+    """A product whose widest sum is cut where it is too wide: of a (b + c + d) a (b + c) and a d."""
+    if not isinstance(term, tree.Product) or width(term, names) + SIGN <= room:
+        return [term]
+    sums = [x for x in term.factors if isinstance(x, tree.SumOf)]
+    if not sums:
+        return [term]
+    widest = max(sums, key=lambda x: width(x, names))
+    others = width(term, names) - width(widest, names)
+    if others > room / 2:  # to cut one sum would write the others again and again
+        return [term]
+    sizes = [width(x, names) + SIGN for _, x in widest.terms]
+    each = sum(sizes) / math.ceil(sum(sizes) / (room - others))  # in parts of about the same width
+    groups: list[list[tuple[bool, tree.Formula]]] = [[]]
+    used = 0.0
+    for part, size in zip(widest.terms, sizes, strict=True):
+        if groups[-1] and used + size / 2 > each * len(groups):
+            groups.append([])
+        groups[-1].append(part)
+        used += size
+    return [tree.Product(tuple(tree.SumOf(tuple(g)) if x is widest else x for x in term.factors)) for g in groups]

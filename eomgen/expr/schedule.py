@@ -1,0 +1,357 @@
+"""Expressions -> their number of operations, an order of evaluation, a tape that a loop can play."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import field
+from itertools import pairwise
+from typing import Any
+
+from ..base.operations import ARITHMETIC, OPERATIONS, operations_with
+from ..base.records import dataclass
+from ..errors import cannot
+from .core import LEAVES, Expr, Graph, common_graph, reachable
+from .pairs import pair_call
+
+# -- numbers of operations ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Operations:
+    """How many operations evaluate some expressions, each shared node counted once.
+
+    Attributes
+    ----------
+    multiplications, additions, divisions, negations : int
+        Subtractions are additions.
+    functions : mapping of str to int
+        sqrt, sin, pow, ... by name; a sum over pairs of shapes, its derivatives along a direction, ... once each.
+    choices : mapping of str to int
+        abs, sign, min, max, comparisons, logic and select by name.
+    """
+
+    multiplications: int = 0
+    additions: int = 0
+    divisions: int = 0
+    negations: int = 0
+    functions: Mapping[str, int] = field(default_factory=dict)
+    choices: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def total(self) -> int:
+        """Multiplications, additions and divisions together."""
+        return self.multiplications + self.additions + self.divisions
+
+    def __add__(self, other: Operations) -> Operations:
+        return Operations(
+            self.multiplications + other.multiplications,
+            self.additions + other.additions,
+            self.divisions + other.divisions,
+            self.negations + other.negations,
+            _sum(self.functions, other.functions),
+            _sum(self.choices, other.choices),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The counts as plain numbers and dicts, for a metadata file."""
+        return {
+            "multiplications": self.multiplications,
+            "additions": self.additions,
+            "divisions": self.divisions,
+            "negations": self.negations,
+            "functions": dict(self.functions),
+            "choices": dict(self.choices),
+        }
+
+
+def _sum(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
+    return {name: a.get(name, 0) + b.get(name, 0) for name in sorted({*a, *b})}
+
+
+def count(outputs: Sequence[Expr]) -> Operations:
+    """Count the distinct operations that the outputs are made of."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return Operations()
+    nodes = graph.nodes
+    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
+    found = _with_pairs(graph, found)
+    bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
+    return Operations(
+        multiplications=found["mul"] + found["absorb"],
+        additions=found["add"] + found["sub"],
+        divisions=found["div"],
+        negations=found["neg"],
+        functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
+        choices={k: found[k] for k in sorted(found.keys() & bends)},
+    )
+
+
+def _with_pairs(graph: Graph, found: Counter[str]) -> Counter[str]:
+    """The same, with sums over pairs of shapes under their names; that results are read from lists is no operation."""
+    calls = {name: call for name in found.keys() & graph.calls.keys() if (call := pair_call(graph, name)) is not None}
+    if not calls:
+        return found
+    rest = Counter({name: n for name, n in found.items() if name not in calls})
+    for name, call in calls.items():
+        if call.part not in ("item", "given"):
+            rest[f"pairs {call.function.element}({call.part})"] += found[name]
+    return rest
+
+
+def critical_path(outputs: Sequence[Expr]) -> int:
+    """Operations on the longest chain from a leaf to an output; every operation counts 1, negation 0."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return 0
+    nodes = graph.nodes
+    depth: dict[int, int] = {}
+    for i in reachable(graph, (y.id for y in outputs)):
+        node = nodes[i]
+        if node[0] in LEAVES:
+            depth[i] = 0
+        else:
+            depth[i] = max(depth[k] for k in node[1:]) + (node[0] != "neg")
+    return max(depth[y.id] for y in outputs)
+
+
+# -- order of evaluation -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A run of statements that can stand in a function of its own.
+
+    Attributes
+    ----------
+    statements : tuple of int
+        Node ids in order of evaluation; constants and symbols are not statements.
+    imports : tuple of int
+        Ids made by earlier chunks and used here, ascending.
+    exports : tuple of int
+        Ids made here and used by later chunks, ascending.
+    results : tuple of int
+        Ids made here that are outputs, ascending (an output may also be an export).
+    """
+
+    statements: tuple[int, ...]
+    imports: tuple[int, ...]
+    exports: tuple[int, ...]
+    results: tuple[int, ...]
+
+
+def order(outputs: Sequence[Expr]) -> list[int]:
+    """Order in which to evaluate the outputs so that few values are live at a time.
+
+    Depth first, operands before their node, and of a node's operands first the one that needs more registers
+    (R. Sethi, J. D. Ullman, The generation of optimal code for arithmetic expressions, J. ACM 17 (1970), applied to
+    the graph as if it were a tree).  Where a graph is so shared that the order in which it was made needs fewer live
+    values, that order is taken.
+
+    Parameters
+    ----------
+    outputs : sequence of Expr
+        Expressions of one graph.
+
+    Returns
+    -------
+    list of int
+        Ids of all operations, each once, after its operands; constants and symbols are not among them.
+    """
+    graph = common_graph(outputs)
+    if graph is None:
+        return []
+    roots = [y.id for y in outputs]
+    need = _registers(graph, roots)
+    depth_first = _depth_first(graph, roots, need)
+    as_made = sorted(depth_first)
+    return min(depth_first, as_made, key=lambda statements: max(crossings(graph, statements)))
+
+
+def _depth_first(graph: Graph, roots: Sequence[int], need: Mapping[int, int]) -> list[int]:
+    nodes = graph.nodes
+    result: list[int] = []
+    done = {i for i in need if nodes[i][0] in LEAVES}
+    for root in roots:
+        stack = [root]
+        while stack:
+            i = stack[-1]
+            if i in done:
+                stack.pop()
+                continue
+            open_operands = [k for k in nodes[i][1:] if k not in done]
+            if open_operands:
+                if len(open_operands) > 1:  # the heaviest on top of the stack; ties by id, so that the order is fixed
+                    open_operands.sort(key=lambda k: (need[k], -k))
+                stack.extend(open_operands)
+            else:
+                stack.pop()
+                done.add(i)
+                result.append(i)
+    return result
+
+
+def _registers(graph: Graph, roots: Sequence[int]) -> dict[int, int]:
+    """Sethi-Ullman numbers: registers each node would need if it were a tree; leaves need none."""
+    nodes = graph.nodes
+    need: dict[int, int] = {}
+    for i in reachable(graph, roots):
+        node = nodes[i]
+        if node[0] in LEAVES:
+            need[i] = 0
+        elif len(node) == 2:
+            need[i] = need[node[1]] or 1
+        elif len(node) == 3:
+            a, b = need[node[1]], need[node[2]]
+            need[i] = (a if a > b else b if b > a else a + 1) or 1
+        else:
+            ranked = sorted((need[k] for k in node[1:]), reverse=True)
+            need[i] = max(1, *(n + held for held, n in enumerate(ranked)))
+    return need
+
+
+def _last_uses(graph: Graph, statements: Sequence[int]) -> dict[int, int]:
+    """Statement id -> index of the last statement that uses it (its own index if none does)."""
+    nodes = graph.nodes
+    last = {i: k for k, i in enumerate(statements)}
+    for k, i in enumerate(statements):
+        for j in nodes[i][1:]:
+            if j in last:
+                last[j] = k
+    return last
+
+
+def crossings(graph: Graph, statements: Sequence[int]) -> list[int]:
+    """How many values cross each place between statements.
+
+    Parameters
+    ----------
+    graph : Graph
+    statements : sequence of int
+        An order as :func:`order` gives it.
+
+    Returns
+    -------
+    list of int
+        Entry ``k`` counts the values made by ``statements[:k]`` and used in ``statements[k:]``; length n + 1.  The
+        largest entry is the number of live values the order needs.
+    """
+    steps = [0] * (len(statements) + 2)
+    last = _last_uses(graph, statements)
+    for k, i in enumerate(statements):
+        steps[k + 1] += 1
+        steps[last[i] + 1] -= 1
+    live = 0
+    result = []
+    for k in range(len(statements) + 1):
+        live += steps[k]
+        result.append(live)
+    return result
+
+
+def chunk(
+    statements: Sequence[int], outputs: Sequence[Expr], size: int = 2000, followed: Container[int] = ()
+) -> list[Chunk]:
+    """Cut an order into chunks at its narrow waists.
+
+    Each chunk has between half of ``size`` and ``size`` statements (the last one perhaps fewer) and ends where the
+    fewest values cross; of equal places the latest.
+
+    Parameters
+    ----------
+    statements : sequence of int
+        What :func:`order` gave for these outputs.
+    outputs : sequence of Expr
+        The outputs, to tell which statements are results.
+    size : int
+        Most statements in one chunk, and one more where the last is of ``followed``.
+    followed : container of int
+        Statements that stay in one chunk with the next.
+
+    Returns
+    -------
+    list of Chunk
+        In order; together they hold each statement once.
+
+    Raises
+    ------
+    ValueError
+        ``size`` is less than 1.
+    """
+    if size < 1:
+        raise ValueError(f"a chunk has at least 1 statement, not {size}")
+    graph = common_graph(outputs)
+    if graph is None or not statements:
+        return []
+    live = crossings(graph, statements)
+    cuts = [0]
+    while len(statements) - cuts[-1] > size:
+        window = range(cuts[-1] + size, cuts[-1] + max(1, size // 2) - 1, -1)
+        cut = min(window, key=live.__getitem__)
+        cuts.append(cut + (statements[cut - 1] in followed))
+    cuts.append(len(statements))
+
+    nodes = graph.nodes
+    last = _last_uses(graph, statements)
+    wanted = {y.id for y in outputs}
+    chunks = []
+    for start, end in pairwise(cuts):
+        mine = statements[start:end]
+        here = set(mine)
+        used = {j for i in mine for j in nodes[i][1:] if j in last}
+        chunks.append(
+            Chunk(
+                statements=tuple(mine),
+                imports=tuple(sorted(used - here)),
+                exports=tuple(sorted(i for i in mine if last[i] >= end)),
+                results=tuple(sorted(here & wanted)),
+            )
+        )
+    return chunks
+
+
+# -- tapes -------------------------------------------------------------------------------------------------------------
+
+
+Instruction = tuple[str, int, int, int]
+#: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
+Tape = tuple[list[Instruction], list[float], list[int]]
+
+
+def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, int]]) -> Tape:
+    """One tape for several expressions.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+        Each of a graph of its own, or of the same.
+    place : callable
+        Name of a symbol -> its kind (``t``, ``x``, ``u``, ``p``) and index.
+
+    Raises
+    ------
+    UsageError
+        An expression calls a function that the model declares: a tape knows operations only.
+    """
+    code: list[Instruction] = []
+    numbers: list[float] = []
+    out: list[int] = []
+    for expression in expressions:
+        graph = expression.graph
+        found: dict[int, int] = {}
+        for i in reachable(graph, [expression.id]):
+            kind, *given = graph.nodes[i]
+            if kind == "const":
+                code.append(("const", len(numbers), 0, 0))
+                numbers.append(float(given[0]))
+            elif kind == "sym":
+                code.append((*place(given[0]), 0, 0))
+            elif kind in OPERATIONS:
+                a, b, c = (*(found[k] for k in given), 0, 0)[:3]
+                code.append((kind, a, b, c))
+            else:
+                raise cannot("functions of the model cannot be used in an input over time")
+            found[i] = len(code) - 1
+        out.append(found[expression.id])
+    return code, numbers, out

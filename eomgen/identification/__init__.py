@@ -1,1 +1,0 @@
-"""Measured motions -> parameters of a module."""

@@ -1,0 +1,356 @@
+"""Mechanism -> Kinematics, everything about the motion that every method of derivation shares."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import field, fields, is_dataclass
+from functools import cached_property
+
+from ..base.names import acceleration_name
+from ..base.records import dataclass
+from ..elements.forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
+from ..elements.frames import Marker
+from ..elements.joints import QuaternionSlot
+from ..errors import ModelError
+from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.differentiate import jvp
+from ..expr.spatial import Twist
+from ..model.input_rates import clock
+from ..model.mechanism import Mechanism
+from .loops import (
+    Constraints,
+    close_loop,
+    couple,
+    differentiate_constraints,
+    find_undefined,
+    own_rows,
+    refuse_rows_of_time,
+    refuse_unusable,
+)
+from .motion import MarkerMotion, entries_of, with_entries
+from .topology import MotionSymbols, Topology, find_topology, lay_out, length_scale
+from .tree import Link, Poses, build_links, link_twists
+
+
+@dataclass(frozen=True)
+class LoopCoordinates:
+    """Coordinates y of cut joints, n_loop_coordinates, as functions of the tree: values, rates, accelerations, dy'/dv.
+
+    Kinds are 'length', 'angle' (equal up to full turns), 'turn' (an angle that counts full turns) and 'parameter'.
+    """
+
+    names: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    values: tuple[Expr, ...] = ()
+    rates: tuple[Expr, ...] = ()
+    accelerations: tuple[Expr, ...] = ()
+    jacobian: tuple[tuple[Expr, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class ForceTerms:
+    """One force element resolved: its loads, and its potential if it has one.
+
+    The last two hold those of its loads that the potential does not account for; all loads where there is none.
+    """
+
+    force: Force
+    marker_loads: tuple[MarkerLoad, ...]
+    coordinate_loads: tuple[CoordinateLoad, ...]
+    potential: Expr | None
+    marker_remainder: tuple[MarkerLoad, ...]
+    coordinate_remainder: tuple[CoordinateLoad, ...]
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters.
+
+    ``q`` are the coordinates of the spanning tree in the order of ``names``; ``v`` and ``a`` its generalized velocities
+    and their rates, in the order of ``velocity_names``.  ``rates`` is q' = N(q) v, which is v itself but for Euler
+    parameters.  ``parent[j]`` is the velocity next to velocity j towards ground, -1 for none.
+    """
+
+    mechanism: Mechanism
+    topology: Topology
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
+    velocity_names: tuple[str, ...]
+    velocity_kinds: tuple[str, ...]
+    quaternion_slots: tuple[QuaternionSlot, ...]  #: where Euler parameters stand in q, and their angular velocity in v
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    t: Expr
+    rates: tuple[Expr, ...]
+    parent: tuple[int, ...]
+    links: tuple[Link, ...]
+    poses: Poses
+    twists: tuple[Twist, ...]
+    motion: MarkerMotion
+    constraints: Constraints
+    loop_coordinates: LoopCoordinates
+    forces: tuple[ForceTerms, ...]
+    length_scale: Expr
+    coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
+    #: by event, while constraints are closed
+    velocities_after: Mapping[str, tuple[tuple[str, Expr], ...]] = field(default_factory=dict)
+    held_rows: tuple[tuple[str, str, str], ...] = ()  #: label, state, kind of constraints that close and open
+    held_errors: tuple[Expr, ...] = ()  #: of each, its error and the rate of it, while it is closed
+    reaction_laws: tuple[str, ...] = ()  #: force elements whose laws speak of reactions, which are solved for
+    hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
+
+    @property
+    def graph(self) -> Graph:
+        """The graph of all expressions."""
+        return self.mechanism.graph
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of p."""
+        return tuple(p.name for p in self.mechanism.parameters)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of u."""
+        return tuple(u.name for u in self.mechanism.inputs)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the first-order states."""
+        return tuple(s.name for s in self.mechanism.states)
+
+    @cached_property
+    def state_rates(self) -> tuple[Expr, ...]:
+        """s' of the first-order states, of (t, q, v, s, u)."""
+        return tuple(self.resolve([s.rate for s in self.mechanism.states]))
+
+    @cached_property
+    def sampled(self) -> tuple[tuple[str, Expr], ...]:
+        """Of each clock ``t``, the time of its next sample, then its states with their new values."""
+        given = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
+        found: list[tuple[str, Expr]] = []
+        for own in self.mechanism.clocks:
+            found.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
+            found += ((name, given[name]) for name in own.states)
+        return tuple(zip((name for name, _ in found), self.resolve([x for _, x in found]), strict=True))
+
+    @property
+    def euler_parameters(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the coordinates that are Euler parameters, four by four."""
+        return tuple(self.names[i : i + 4] for i, _ in self.quaternion_slots)
+
+    @property
+    def flow(self) -> dict[Expr, Expr]:
+        """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
+        return dict(zip(self.q, self.rates, strict=True))
+
+    @cached_property
+    def clock(self) -> dict[Expr, Expr]:
+        """The rates of all that is prescribed, t' = 1 and those of the inputs, as the direction of a derivative."""
+        return clock(self.graph, self.mechanism.inputs)
+
+    @cached_property
+    def velocity_labels(self) -> tuple[str, ...]:
+        """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
+        if self.mechanism.given is not None:
+            places = self.coordinate_of
+            return tuple(n if k < 0 else self.names[k] for n, k in zip(self.velocity_names, places, strict=True))
+        bases = set(self.names)
+        return tuple(n[:-4] if n.endswith("_dot") and n[:-4] in bases else n for n in self.velocity_names)
+
+    @property
+    def given_rates(self) -> bool:
+        """Whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v."""
+        return self.mechanism.given is not None and self.rates != self.v
+
+    @cached_property
+    def coordinate_of(self) -> tuple[int, ...]:
+        """Per velocity of given equations the coordinate whose rate it is, -1 for none."""
+        return tuple(self.rates.index(v) if v in self.rates else -1 for v in self.v)
+
+    def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
+        """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
+        along = self.flow | dict(zip(self.v, self.a, strict=True))
+        return jvp(list(expressions), along | self.clock)
+
+    def resolve(self, expressions: Sequence[Expr]) -> list[Expr]:
+        """Replace coordinates of cut joints and marker quantities by what they are in terms of the tree."""
+        mapping = self.motion.derived_symbols(self.mechanism, symbols_of(list(expressions)))
+        return substitute(list(expressions), mapping) if mapping else list(expressions)
+
+
+def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinematics:
+    """Form the kinematics of a mechanism; ``independent`` names coordinates whose joints stay in the tree."""
+    graph = mechanism.graph
+    topology = find_topology(mechanism, set(independent) or set(mechanism.independent))
+    layout = lay_out(mechanism, topology)
+    names, kinds = layout.names, layout.kinds
+    q, v = (tuple(map(graph.symbol, listed)) for listed in (names, layout.velocity_names))
+    a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
+    t = graph.symbol("t")
+    rates = layout.rates(graph, q, v)
+    state = MotionSymbols(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
+    links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
+    poses = Poses(mechanism, links)
+    twists = tuple(link_twists(graph, links, v))
+    rows = own_rows(mechanism)
+    aligned: list[tuple[str, Expr]] = []
+    loop_names: list[str] = []
+    loop_kinds: list[str] = []
+    loop_values: list[Expr] = []
+    wrapping: list[str] = []
+    for k in topology.cut:
+        spec = mechanism.joints[k]
+        loop_part = close_loop(spec, poses, q)
+        rows += loop_part.rows
+        wrapping += loop_part.wrapping
+        aligned += [(spec.name, condition) for condition in loop_part.aligned]
+        loop_names += spec.coordinates
+        loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
+        loop_values += loop_part.measured
+    loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
+    second = jvp(list(rates), state.along) if layout.quaternion_slots or layout.given else a
+    coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
+    coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
+    motion = MarkerMotion(poses, twists, state, coordinates, _turning(mechanism, topology))
+    coupled = couple(mechanism, motion)
+    refuse_unusable(mechanism, motion, coupled.rows)
+    length = length_scale(mechanism)
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
+    refuse_rows_of_time(mechanism, constraints)
+    _refuse_undefined_angles(mechanism, motion, wrapping)
+    return Kinematics(
+        mechanism=mechanism,
+        topology=topology,
+        names=names,
+        kinds=kinds,
+        velocity_names=layout.velocity_names,
+        velocity_kinds=layout.velocity_kinds,
+        quaternion_slots=layout.quaternion_slots,
+        q=q,
+        v=v,
+        a=a,
+        t=t,
+        rates=rates,
+        parent=layout.parent,
+        links=links,
+        poses=poses,
+        twists=twists,
+        motion=motion,
+        constraints=constraints,
+        coupled=tuple(row.label for row in coupled.rows),
+        hints=tuple(hint for hint in coupled.hints if hint[0] in names),
+        loop_coordinates=loop,
+        forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
+        length_scale=length,
+    )
+
+
+def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker, Marker, int]]:
+    """Angular velocities that cut joints in Euler parameters would have as velocities."""
+    found = {}
+    for spec in (mechanism.joints[k] for k in topology.cut):
+        for slot in spec.joint.quaternion_slots:
+            for axis, name in enumerate(spec.velocities[slot.velocity : slot.velocity + 3]):
+                found[name] = (spec.predecessor, spec.successor, axis)
+    return found
+
+
+def _loop_coordinates(
+    graph: Graph,
+    measured: tuple[list[str], list[str], list[Expr]],
+    state: MotionSymbols,
+) -> LoopCoordinates:
+    names, kinds, values = measured
+    along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.clock}
+    rates = jvp(values, along)
+    entries = state.slopes(values, rates)
+    zero = graph.zero
+    return LoopCoordinates(
+        names=tuple(names),
+        kinds=tuple(kinds),
+        values=tuple(values),
+        rates=tuple(rates),
+        accelerations=tuple(jvp(rates, along)),
+        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(values))),
+    )
+
+
+def _resolve_force(force: Force, motion: MarkerMotion, mechanism: Mechanism) -> ForceTerms:
+    """Evaluate a force element and write its loads in terms of the tree's own symbols."""
+    loads = force.loads(motion)
+    potential = force.potential(motion)
+    rest = force.remainder(motion) if potential is not None else []
+    flat = [e for load in [*loads, *rest] for e in entries_of(load)]
+    mapping = motion.derived_symbols(mechanism, symbols_of([*flat, *([potential] if potential is not None else [])]))
+    values = iter(substitute(flat, mapping) if mapping else flat)
+    loads, rest = ([with_entries(load, values) for load in part] for part in (loads, rest))
+    if potential is not None:
+        potential = substitute([potential], mapping)[0] if mapping else potential
+        allowed = {p.name for p in mechanism.parameters} | {n for n, _ in _coordinate_symbols(motion)}
+        if not symbols_of([potential]) <= allowed:
+            potential = None
+    return ForceTerms(force, *_sorted(loads), potential, *_sorted(loads if potential is None else rest))
+
+
+def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[CoordinateLoad, ...]]:
+    return (
+        tuple(load for load in loads if isinstance(load, MarkerLoad)),
+        tuple(load for load in loads if isinstance(load, CoordinateLoad)),
+    )
+
+
+def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrapping: Sequence[str]) -> None:
+    """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it.
+
+    Raises
+    ------
+    ModelError
+    """
+    problems = find_undefined(mechanism, motion)
+    for force in mechanism.forces:
+        used = symbols_of(_expressions(force))
+        path = getattr(force, "path", None)
+        if isinstance(path, Turn) and not path.is_exact(motion):
+            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+            remedy = "turn the markers (rpy) until z is the axis of the joint between them, or give joint="
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+        for name in sorted(used & mechanism.quantities.keys()):
+            if motion.may_wrap(mechanism.quantities[name]):
+                message = f"the z axes of the two markers of {name} do not stay in line, so the angle is not defined"
+                remedy = "turn the markers (rpy) until z is the axis of the joint between them, or use a coordinate"
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+        if force.uses_value and isinstance(path, JointCoordinate):
+            used.add(path.name)
+        for name in wrapping:
+            if name in used:
+                message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+                remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+    for constraint in mechanism.constraints:
+        if not constraint.is_defined(motion):
+            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+            remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
+        for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
+            message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+            remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
+    if problems:
+        raise ModelError(problems)
+
+
+def _expressions(value: object) -> list[Expr]:
+    """All expressions in a force element."""
+    if isinstance(value, Expr):
+        return [value]
+    if isinstance(value, tuple):
+        return [e for item in value for e in _expressions(item)]
+    if is_dataclass(value):
+        return [e for item in fields(value) for e in _expressions(getattr(value, item.name))]
+    return []
+
+
+def _coordinate_symbols(motion: MarkerMotion) -> list[tuple[str, Expr]]:
+    return [(name, triple[0]) for name, triple in motion.coordinates.items()]

@@ -1,0 +1,227 @@
+"""Kinematics -> TreeEquations, what every method of derivation must deliver for the spanning tree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from functools import partial
+from types import FunctionType
+
+from ...base.records import dataclass
+from ...expr.core import Expr, substitute
+from ...expr.differentiate import jacobian
+from .. import Kinematics
+from ..link_frames import Turned
+from ..motion import combined
+from .recursions import TreeMotion
+
+# -- what a method delivers --------------------------------------------------------------------------------------------
+
+
+Rows = tuple[tuple[Expr, ...], ...]
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """K z = r, whose solution holds the accelerations: what the forms solve that keep reactions as unknowns.
+
+    Attributes
+    ----------
+    unknowns : names of the symbols z
+    places : (row, column) of the entries of K that do not vanish identically
+    entries : those entries, of (t, q, v, u)
+    right : r
+    relaxed : (row, column) of constraint equations and their reactions.  Where constraints are redundant, K is
+        singular; solvers subtract a small number there and refine the result until K z = r holds.
+    sizes : of each equation, then of each unknown, its unit made of a length, a mass and 1 s, of parameters only: what
+        K is balanced from, so that results do not depend on units.  Entries of a redundant equation may be nothing but
+        rounding, so that those of constraints are not scaled by the size of their entries at all.
+    accelerations : (n_v,) a in terms of z and the state
+    """
+
+    unknowns: tuple[str, ...]
+    places: tuple[tuple[int, int], ...]
+    entries: tuple[Expr, ...]
+    right: tuple[Expr, ...]
+    relaxed: tuple[tuple[int, int], ...]
+    sizes: tuple[Expr, ...]
+    accelerations: tuple[Expr, ...]
+
+
+def linear_system(
+    residuals: Sequence[Expr],
+    unknowns: Sequence[Expr],
+    relaxed: Sequence[tuple[int, int]],
+    sizes: Sequence[Expr],
+    accelerations: Sequence[Expr],
+) -> LinearSystem:
+    """The system whose residuals K z - r are given, linear in the symbols z."""
+    entries = jacobian(list(residuals), list(unknowns))
+    places = tuple(sorted(place for place, entry in entries.items() if not entry.is_zero))
+    still = dict.fromkeys(unknowns, unknowns[0].graph.zero)
+    return LinearSystem(
+        unknowns=tuple(str(z.node[1]) for z in unknowns),
+        places=places,
+        entries=tuple(entries[place] for place in places),
+        right=tuple(-r for r in substitute(list(residuals), still)),
+        relaxed=tuple(relaxed),
+        sizes=tuple(sizes),
+        accelerations=tuple(accelerations),
+    )
+
+
+class TreeEquations:
+    """M(q) a + h(t, q, v, u) = generalized forces not in the model, on the coordinates of the spanning tree.
+
+    Loops enter later, by B^T (M a + h) = 0 with the constraints of the kinematics; their multipliers do no work.
+
+    Attributes
+    ----------
+    method : str
+    mass_matrix : (n_v, n_v) rows, symmetric; may be given as a function and is then formed when it is first asked for
+    bias : (n_v,) h, with gravity, force elements and inputs
+    inverse_dynamics : (n_v,) M a + h formed in one go, cheaper than the product
+    kinetic_energy, potential_energy : J; gravity and springs
+    accelerations : (n_v,) a with M a + h = 0, of a method that has them without M; else None
+    pivots : (n_v,) with ``accelerations``: all positive exactly where M is positive definite
+    system : the linear system that the method solves for its accelerations; None where M and h are enough
+    canonical : (2 n_v,) of a method in canonical variables: p = dT/dv, then -dH/dq + Q; else empty
+    turned : the same system in velocities in which it is shorter, where there are free joints; else None
+    constrained : (rows, term) -> what the constraints' multipliers leave of the accelerations, of a method that has it
+    """
+
+    def __init__(
+        self,
+        method: str,
+        mass_matrix: Rows | Callable[[], Rows],
+        bias: tuple[Expr, ...],
+        inverse_dynamics: tuple[Expr, ...],
+        kinetic_energy: Expr,
+        potential_energy: Expr,
+        accelerations: tuple[Expr, ...] | None = None,
+        pivots: tuple[Expr, ...] = (),
+        system: LinearSystem | None = None,
+        canonical: tuple[Expr, ...] = (),
+        turned: Turned | None = None,
+        constrained: Callable[..., TreeMotion] | None = None,
+    ) -> None:
+        if isinstance(mass_matrix, FunctionType) or isinstance(constrained, FunctionType):
+            raise TypeError("a function that holds expressions is not copied with them: give a functools.partial")
+        self.method = method
+        self._mass_matrix = mass_matrix
+        self.bias = bias
+        self.inverse_dynamics = inverse_dynamics
+        self.kinetic_energy = kinetic_energy
+        self.potential_energy = potential_energy
+        self.accelerations = accelerations
+        self.pivots = pivots
+        self.system = system
+        self.canonical = canonical
+        self.turned = turned
+        self.constrained = constrained
+
+    def without_accelerations(self) -> TreeEquations:
+        """The same equations, to be solved with M."""
+        same = copy(self)
+        same.accelerations, same.pivots = None, ()
+        return same
+
+    def take_mass_matrix(self, other: TreeEquations | Callable[[], Rows]) -> None:
+        """Have the mass matrix of the same system by another method, or as a function."""
+        self._mass_matrix = other._mass_matrix if isinstance(other, TreeEquations) else other
+
+    @property
+    def mass_matrix(self) -> Rows:
+        """M, row by row."""
+        if callable(self._mass_matrix):
+            self._mass_matrix = self._mass_matrix()
+        return self._mass_matrix
+
+
+Method = Callable[[Kinematics], TreeEquations]
+
+
+# -- inertia of drives -------------------------------------------------------------------------------------------------
+
+# A rotor geared to a coordinate y adds J y'^2 / 2 to the kinetic energy, hence J y_q^T y'' to the equations (its
+# gyroscopic effect is left out, as in MuJoCo and Pinocchio); for a coordinate of the tree that is J on the diagonal of
+# M.
+
+
+def with_armature(method: Method) -> Method:
+    """The method, with the inertia of drives added to what it derives."""
+
+    def derive(kinematics: Kinematics) -> TreeEquations:
+        return add_armature(kinematics, method(kinematics))
+
+    return derive
+
+
+def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
+    """Add J y_q^T y_q to M, and its part to bias, inverse dynamics and kinetic energy.
+
+    Accelerations that a method has without M, and a turned system, must hold the inertia of drives already.
+    """
+    drives = [(s.coordinates[0], s.armature) for s in kinematics.mechanism.joints if s.armature is not None]
+    if not drives:
+        return tree
+    graph, loop = kinematics.graph, kinematics.loop_coordinates
+    n = len(kinematics.v)
+    bias, inverse, kinetic = list(tree.bias), list(tree.inverse_dynamics), tree.kinetic_energy
+    still = dict.fromkeys(kinematics.a, graph.zero)
+    slopes: list[tuple[Expr, list[Expr]]] = []
+    for name, inertia in drives:
+        if name in kinematics.velocity_labels:
+            k = kinematics.velocity_labels.index(name)
+            slope: list[Expr] = [graph.one if j == k else graph.zero for j in range(n)]
+            rate, acceleration, rest = kinematics.v[k], kinematics.a[k], graph.zero
+        else:
+            k = loop.names.index(name)
+            slope, rate, acceleration = list(loop.jacobian[k]), loop.rates[k], loop.accelerations[k]
+            rest = substitute([acceleration], still)[0]
+        slopes.append((inertia, slope))
+        for i in range(n):
+            if not slope[i].is_zero:
+                bias[i] = bias[i] + inertia * (slope[i] * rest)
+                inverse[i] = inverse[i] + inertia * (slope[i] * acceleration)
+        kinetic = kinetic + 0.5 * inertia * (rate * rate)
+
+    same = copy(tree)
+    same.take_mass_matrix(partial(_mass_matrix, tree, slopes))
+    same.bias, same.inverse_dynamics, same.kinetic_energy = tuple(bias), tuple(inverse), kinetic
+    return same
+
+
+def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr]]]) -> Rows:
+    """M of the tree and J y_q^T y_q of each drive."""
+    mass = [list(row) for row in tree.mass_matrix]
+    for inertia, slope in slopes:
+        moving = [i for i, part in enumerate(slope) if not part.is_zero]
+        for i in moving:
+            for j in moving:
+                mass[i][j] = mass[i][j] + inertia * (slope[i] * slope[j])
+    return tuple(tuple(row) for row in mass)
+
+
+# -- equations of the user ---------------------------------------------------------------------------------------------
+
+
+GIVEN = "given"  #: what stands where the name of a method would
+
+
+def take_given(kinematics: Kinematics) -> TreeEquations:
+    """The equations of a mechanism that has them; only the lower triangle of M is read."""
+    given = kinematics.mechanism.given
+    assert given is not None
+    n = len(kinematics.v)
+    lower = given.mass_matrix
+    mass = tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
+    bias = tuple(-f for f in given.forcing)
+    return TreeEquations(
+        method=GIVEN,
+        mass_matrix=mass,
+        bias=bias,
+        inverse_dynamics=tuple(combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)),
+        kinetic_energy=given.kinetic_energy,
+        potential_energy=given.potential_energy,
+    )

@@ -1,0 +1,666 @@
+"""Kinematics and numbers -> Mobility: assembled reference, rank, degrees of freedom, partition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.limits.constraints import BESIDE, CHOSEN, CONTRADICTION, FLAT
+from ..base.names import hint, joined
+from ..base.numeric.assembly import Assembly, ConstraintSystem, differences
+from ..base.numeric.continuation import Continuation, HeldPath
+from ..base.numeric.ranks import SparseRows, choose_independent, conditioning, independent_rows, rank
+from ..base.records import dataclass
+from ..elements.constraints import Driver, RollingDisc
+from ..elements.constraints.rolling import LYING
+from ..errors import TO_BE_FINITE, AssemblyError, ModelError
+from ..expr.core import Expr, substitute, symbols_of
+from ..expr.evaluate import compile_evaluator
+from ..expr.rounding_bounds import vanishing
+from .constraint_functions import Array, ConstraintFunctions
+from .kinematics import Kinematics
+from .loops import place_of
+
+if TYPE_CHECKING:
+    from .constraint_functions import ConstraintFunctions
+
+# -- constraints that hold nothing -------------------------------------------------------------------------------------
+
+
+IDLE = "holds nothing"  #: what is said of rows without slopes
+TRIES = 12  #: directions in which a row is evaluated
+
+
+def require_finite(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none.
+
+    Raises
+    ------
+    AssemblyError
+        Names the rows.
+    """
+    if not functions.m:
+        return
+    C, J = functions.position(q)
+    with np.errstate(over="ignore", invalid="ignore"):  # rows whose squares overflow have no length, and no rank
+        finite = np.isfinite(np.column_stack([J**2, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
+    if finite.all():
+        return
+    k = functions.kinematics
+    bad = [k.constraints.labels[i] for i in np.flatnonzero(~finite)]
+    discs = {c.name for c in k.mechanism.constraints if isinstance(c, RollingDisc)}
+    place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
+    what = f"{', '.join(bad)}: the constraint is not finite at the initial configuration {place}"
+    if all(label.partition(".")[0] in discs for label in bad):
+        raise AssemblyError(f"{what}: {LYING}; tilt the disc in initial or guess", bad, code="EG-NOT-FINITE")
+    raise AssemblyError(f"{what}; give another configuration in initial or guess", bad, code="EG-NOT-FINITE")
+
+
+def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse written constraints that are least or greatest where they hold, as |r|^2 = 0 of two points is.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    if not functions.h:
+        return
+    k, scales = functions.kinematics, functions.system.scales
+    slopes = np.abs(functions.scaled_jacobian(q)[: functions.h]).max(axis=1, initial=0.0)
+    least = np.array(k.constraints.written[: functions.h], dtype=bool) & (slopes < FLAT)
+    if not least.any():
+        return
+    side = np.zeros(functions.h)
+    for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * BESIDE:
+        for away in (step, -step):
+            higher = np.sign(functions.position(scales.move(q, away))[0] - functions.position(q)[0])
+            side = np.where(side == 0, higher, side)
+            least &= (higher == side) & (side != 0)
+        if not least.any():
+            return
+    what = (
+        "is 0 only where it is least or greatest, as a sum of squares: its slopes vanish there, so it can hold nothing"
+    )
+    remedy = "write each component as a constraint: x1 - x2 and y1 - y2 for (x1 - x2)**2 + (y1 - y2)**2"
+    labels = (k.constraints.labels[i] for i in np.flatnonzero(least))
+    raise ModelError(
+        [k.mechanism.problem(place_of(k.mechanism, x), f"{x} {what}", remedy, "EG-REDUNDANT") for x in labels]
+    )
+
+
+def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
+    """Refuse constraints of which no slope is found at any position, where they are all there is.
+
+    Such are a relation whose factors cancel, and one that nothing proves to be an identity.  Rows of joints whose
+    slopes vanish identically with the given parameters are no fault: a body may be held twice.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    numbers : mapping of str to float
+        Values of the parameters.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints and the parameters whose values cancel.
+    """
+    c, graph = kinematics.constraints, kinematics.graph
+    known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
+    problems = []
+    for i, (label, row, written) in enumerate(zip(c.labels, c.jacobian, c.written, strict=True)):
+        slopes = [x for x in row if not x.is_zero]
+        if kinematics.given_rates and i < len(c.slopes) and not all(vanishing(substitute(c.slopes[i], known))):
+            continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
+        if (written and slopes) or not all(vanishing(substitute(slopes, known))):
+            used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
+            what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
+            remedy = "remove it"
+            if used:
+                what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
+                remedy = "declare values with which it acts (they determine the degrees of freedom), or remove it"
+            problems.append(
+                kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy, "EG-REDUNDANT")
+            )
+    if problems:
+        raise ModelError(problems)
+
+
+# -- candidates for independent coordinates ----------------------------------------------------------------------------
+
+
+LARGEST = 120  #: coordinates up to which every one is judged
+
+
+def rate_candidates(J: Array, chosen: Sequence[int]) -> dict[int, float]:
+    """How well each coordinate would do as independent: columns -> conditioning, the best first.
+
+    Parameters
+    ----------
+    J : (m, n) array
+        Scaled Jacobian at one configuration.
+    chosen : sequence of int
+        The independent columns there.
+
+    Returns
+    -------
+    dict of int to float
+        For a chosen column the conditioning of the chosen set, for any other that of the best set in which it takes
+        the place of a chosen one; columns that cannot are left out.  Empty where there is no choice.
+    """
+    n = J.shape[1]
+    if not len(J) or not chosen or n > LARGEST or (n - len(chosen)) * len(chosen) > LARGEST:
+        return {}
+    found = dict.fromkeys(chosen, conditioning(J, chosen))
+    for k in range(n):
+        if k not in found:
+            swaps = ([k if i == old else i for i in chosen] for old in chosen)
+            found[k] = max(conditioning(J, columns) for columns in swaps)
+    ordered = sorted(found.items(), key=lambda item: -round(item[1], 6))
+    return {k: value for k, value in ordered if value > CHOSEN}
+
+
+# -- drivers -----------------------------------------------------------------------------------------------------------
+
+# Drivers take their degrees of freedom in the order of the model; one that finds none left over-drives the mechanism.
+# It may stay where it asks for nothing that the others do not give, at all times tried.
+
+
+FIRST, STEPS = 1e-3, 16  #: part of the span in the first step of a motion over it; its steps at most
+
+
+def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
+    """Row -> name of its driver."""
+    labels = functions.kinematics.constraints.labels
+    names = {c.name for c in functions.kinematics.mechanism.constraints if isinstance(c, Driver)}
+    found = {i: label.partition(".")[0] for i, label in enumerate(labels)}
+    return {i: name for i, name in found.items() if name in names}
+
+
+def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    """Assemble at t = 0; where that fails for the drivers, say so.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or not with the values that the drivers ask for.
+    ModelError
+        There are more drivers than degrees of freedom, and they contradict each other.
+    """
+    drivers = driver_rows(functions)
+    try:
+        found = functions.close_nearest(given, guess)
+    except AssemblyError as error:
+        if not drivers:
+            raise
+        raise _explain(functions, drivers, given, guess, error) from None
+    if drivers:
+        _refuse_contradictions(functions, drivers, found.q)
+    return found
+
+
+def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
+    """Closed positions at later times, as further samples; none without drivers, or where they cannot be followed."""
+    drivers = driver_rows(functions)
+    jacobian = [e for row in functions.kinematics.constraints.jacobian for e in row]
+    if not drivers or "t" in symbols_of(jacobian):
+        return []
+    return [position for _, position in _follow(functions.system, q, functions)][1::4]
+
+
+def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) -> list[tuple[float, Array]]:
+    """Closed positions at times after 0, a small motion apart."""
+    end = functions.kinematics.mechanism.simulation.end
+    continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
+    continuation.step = FIRST
+    continuation.to(1.0, steps=STEPS)
+    return [(point.s * end, point.q) for point in continuation.points[1:]]
+
+
+def _guess(functions: ConstraintFunctions, q: Array) -> dict[str, float]:
+    """Coordinates of a position, but for those that have a better guess of their own."""
+    hinted = {name for name, _ in functions.kinematics.hints}
+    return {n: float(x) for n, x in zip(functions.kinematics.names, q, strict=True) if n not in hinted}
+
+
+def _others(functions: ConstraintFunctions, drivers: Sequence[int]) -> list[int]:
+    return [i for i in range(functions.m) if i not in drivers]
+
+
+def _needed(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array, t: float = 0.0
+) -> tuple[list[int], list[int]]:
+    """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
+    J = functions.scaled_jacobian(q, t)
+    kept = _others(functions, list(drivers))
+    spare = []
+    for row in drivers:
+        if rank(J[[*kept, row]]).rank > rank(J[kept]).rank:
+            kept.append(row)
+        else:
+            spare.append(row)
+    return sorted(kept), spare
+
+
+def _explain(
+    functions: ConstraintFunctions,
+    drivers: Mapping[int, str],
+    given: Mapping[str, float],
+    guess: Mapping[str, float],
+    error: AssemblyError,
+) -> AssemblyError | ModelError:
+    """Why the mechanism cannot be assembled with its drivers."""
+    free = functions.with_rows(_others(functions, list(drivers)))
+    try:
+        q = functions.close(given, guess, system=free).q
+    except AssemblyError as loops:
+        return loops  # not for the drivers' sake
+    with np.errstate(all="ignore"):
+        values = functions.position(q)[0]
+    lost = [i for i in drivers if not np.isfinite(values[i])]
+    if lost:
+        names, labels = [drivers[i] for i in lost], functions.kinematics.constraints.labels
+        return AssemblyError(
+            f"{', '.join(names)} has no finite value at t = 0: {TO_BE_FINITE}",
+            [labels[i] for i in lost],
+            code="EG-NOT-FINITE",
+        )
+    kept, spare = _needed(functions, drivers, q)
+    if spare:
+        try:
+            q = functions.close(given, guess, system=functions.with_rows(kept)).q
+        except AssemblyError:
+            pass
+        else:
+            return _contradiction(functions, drivers, spare, q, 0.0)
+    if given:
+        try:
+            functions.close({}, {**guess, **given})
+        except AssemblyError:
+            pass
+        else:
+            held = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
+            return AssemblyError(held, error.rows, code="EG-CONTRADICTION")
+    C = functions.position(q)[0]
+    gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
+    rows = [functions.kinematics.constraints.labels[i] for i in drivers]
+    text = str(error).partition("; check")[0]
+    words = (
+        f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
+        f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
+        "reach, or a guess nearer to them"
+    )
+    return AssemblyError(words, [*rows, *error.rows], code="EG-CONTRADICTION")
+
+
+def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
+    """Follow the drivers that count; those left over must agree with them."""
+    kept, spare = _needed(functions, drivers, q)
+    if not spare:
+        return
+    for t, here in _follow(functions.with_rows(kept), q, functions):
+        if len(_needed(functions, drivers, here, t)[0]) > len(kept):
+            break  # the first position was singular; elsewhere all of them count
+        C = functions.scales.residual(functions.position(here, t)[0])
+        if np.abs(C[spare]).max() > CONTRADICTION:
+            raise _contradiction(functions, drivers, spare, here, t)
+
+
+def _contradiction(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], spare: Sequence[int], q: Array, t: float
+) -> ModelError:
+    mechanism = functions.kinematics.mechanism
+    C = functions.position(q, t)[0]
+    deaf = [row for row in spare if not _felt(functions, drivers, row, q)]
+    others = [name for row, name in drivers.items() if row not in spare]
+    freedoms = len(others)
+    problems = []
+    for row in spare:
+        gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
+        verb = "moves" if freedoms == 1 else "move"
+        who = f"{' and '.join(others)} {verb} it already" if others else "the mechanism cannot move"
+        if row in deaf:
+            problems.append(
+                mechanism.problem(
+                    f"constraints.{drivers[row]}",
+                    "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
+                    f"and this is off by {gap}",
+                    "drive a coordinate, or two markers that move relative to each other",
+                    "EG-REDUNDANT",
+                )
+            )
+            continue
+        message = (
+            f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
+            f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
+        )
+        remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
+        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy, "EG-CONTRADICTION"))
+    return ModelError(problems)
+
+
+def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, q: Array) -> bool:
+    """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
+    loops = _others(functions, list(drivers))
+    free = functions.with_rows(loops)
+    random = np.random.default_rng(1)
+    for moved in (0.0, 0.1, 0.3, 0.3):
+        step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
+        try:
+            start = _guess(functions, functions.scales.move(q, step))
+            here = functions.close({}, start, restarts=0, system=free).q if moved else q
+        except AssemblyError:
+            continue
+        J = functions.scaled_jacobian(here)
+        if rank(J[[*loops, row]]).rank > rank(J[loops]).rank:
+            return True
+    return False
+
+
+def _unit(functions: ConstraintFunctions, row: int) -> str:
+    return "m" if functions.kinematics.constraints.kinds[row] == "length" else "rad"
+
+
+PROBES = 4  #: further assembled configurations at which the rank is judged
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """What the numbers say about a mechanism.
+
+    Attributes
+    ----------
+    q_reference : (n_q,) tuple
+        Assembled at the declared initial values.
+    rank : int
+        Largest rank of the constraint Jacobian found at ``configurations`` assembled configurations.
+    n_dof : int
+        Degrees of freedom, n_v - rank: of the velocities, nonholonomic rows included.
+    n_positions : int
+        Degrees of freedom of the configuration, n_v less the rank of the holonomic rows.
+    independent, dependent : tuple of str
+        The partition of the velocities, each called by the coordinate whose rate it is, if there is one.
+    independent_rows : tuple of int
+        Constraint rows that carry the rank at the reference; the others are ``redundant`` there.
+    conditioning : float
+        How well the independent coordinates move the mechanism at the reference: 1 perfect, 0 not at all.
+    assumed : bool
+        True when parameters had no value, so that the rank was judged with made-up ones.
+    """
+
+    q_reference: tuple[float, ...]
+    rank: int
+    n_dof: int
+    independent: tuple[str, ...]
+    dependent: tuple[str, ...]
+    independent_rows: tuple[int, ...]
+    redundant: tuple[str, ...]
+    conditioning: float
+    length_scale: float
+    row_scales: tuple[float, ...] = ()  #: typical size of each constraint row
+    configurations: int = 1
+    ranks: tuple[int, ...] = ()
+    assumed: bool = False
+    residual: float = 0.0  #: largest scaled residual of the loops at the reference
+    restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
+    guessed: tuple[tuple[str, float, float], ...] = ()  #: coordinate, its guess, its value; largest difference first
+    guess_distance: float = 0.0  #: largest scaled difference of a guessed coordinate
+    samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
+    n_positions: int = 0
+    instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
+    candidates: tuple[
+        tuple[str, float], ...
+    ] = ()  #: coordinates that can be independent there, with their conditioning
+    driven: bool = False  #: whether a constraint depends on time
+    places: tuple[str, ...] = ()  #: coordinates named as independent, where their rates are given
+
+
+def initial_values(
+    kinematics: Kinematics, values: Mapping[str, float | None], which: str = "initial"
+) -> dict[str, float]:
+    """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
+    given: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
+    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
+    return {name: float(x) for name, x in zip(given, numbers, strict=True)}
+
+
+def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
+    """Assemble the mechanism at its declared initial values and find its mobility.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    independent : names of coordinates that should be independent ones; the model's own by default.  Where they are
+        fewer than the degrees of freedom, the best conditioned others join them.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close.
+    ModelError
+        The chosen independent coordinates are too many, unknown or cannot move the mechanism.
+    """
+    mechanism = kinematics.mechanism
+    wanted, places = _wanted(kinematics, tuple(independent) or mechanism.independent)
+    _check_names(kinematics, wanted)
+    values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
+    missing = [n for n, x in values.items() if x is None]
+    numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
+    functions = ConstraintFunctions(kinematics, numbers)
+    if missing:
+        return replace(_find_mobility_assumed(functions, wanted), assumed=True, places=places)
+    given = initial_values(kinematics, numbers)
+    guess = initial_values(kinematics, numbers, "guess")
+    known = {*kinematics.names, *kinematics.loop_coordinates.names}
+    positions = {n: x for n, x in given.items() if n in known}
+    found = close_driven(functions, positions, guess)
+    require_finite(functions, found.q)
+    later = follow_drivers(functions, found.q)
+    judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
+    _check_places(functions, found.q, places)
+    rough = {name: value for name, value in guess.items() if name in known and name not in positions}
+    return replace(
+        judged,
+        places=places,
+        residual=found.residual,
+        restarts=found.restarts,
+        guessed=differences(functions.system, found.q, rough),
+        guess_distance=found.distance if rough else 0.0,
+    )
+
+
+def _wanted(kinematics: Kinematics, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The labels of the velocities that are named, and the coordinates, where these do not move as velocities say."""
+    labels = dict(zip(kinematics.velocity_names, kinematics.velocity_labels, strict=True))
+    if not kinematics.given_rates:
+        labels |= {f"{name}_dot": name for name in kinematics.loop_coordinates.names}
+        return tuple(labels.get(name, name) for name in names), ()
+    places = tuple(name for name in names if name in kinematics.names)
+    speeds = tuple(labels.get(name, name) for name in names if name not in places)
+    return speeds or tuple(name for name in places if name in kinematics.velocity_labels), places
+
+
+def _check_places(functions: ConstraintFunctions, q: Array, places: Sequence[str]) -> None:
+    """Refuse coordinates of given rates that cannot be independent of each other."""
+    if not places:
+        return
+    mechanism, names, J = functions.kinematics.mechanism, functions.kinematics.names, functions.place_jacobian(q)
+    rank, held = SparseRows(J).rank, np.eye(len(names))[[names.index(name) for name in places]]
+    if len(places) > (n := len(names) - rank) or len({*places}) < len(places):
+        message = f"{', '.join(places)}: the positions have {n} degree{'s' * (n != 1)} of freedom"
+        raise ModelError(
+            [
+                mechanism.problem(
+                    "independent", message, f"choose {n} different ones of {', '.join(names)}", "EG-PARTITION"
+                )
+            ]
+        )
+    if SparseRows(np.vstack([J, held])).rank < rank + len(places):
+        message = f"{', '.join(places)} cannot vary independently of each other at the initial configuration"
+        raise ModelError(
+            [mechanism.problem("independent", message, f"choose others of {', '.join(names)}", "EG-PARTITION")]
+        )
+
+
+def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
+    problems = []
+    if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
+        problems.append(
+            kinematics.mechanism.problem(
+                "independent", f"{', '.join(twice)}: named twice", "name it once", "EG-PARTITION"
+            )
+        )
+    coordinates = kinematics.names if kinematics.given_rates else kinematics.loop_coordinates.names
+    known = (*dict.fromkeys((*kinematics.velocity_labels, *coordinates)),)
+    for name in wanted:
+        if name in kinematics.velocity_labels:
+            continue
+        if name in kinematics.names:
+            message = f"{name!r} is an Euler parameter, which cannot vary on its own"
+            remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
+            problems.append(kinematics.mechanism.problem("independent", message, remedy, "EG-PARTITION"))
+            continue
+        if name in known:
+            message = f"{name!r} follows from the other chosen coordinates, which belong to the same loop"
+            problems.append(
+                kinematics.mechanism.problem(
+                    "independent", message, "choose fewer coordinates of one loop", "EG-PARTITION"
+                )
+            )
+        else:
+            what, remedy = f"no coordinate {name!r}", joined(hint(name, known), f"allowed: {', '.join(known)}", by=" ")
+            problems.append(kinematics.mechanism.problem("independent", what, remedy, "EG-NAME-UNKNOWN"))
+    if problems:
+        raise ModelError(problems)
+
+
+def _find_mobility_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
+    """Without parameter values: made-up ones, assembled if that works, else judged off the manifold."""
+    zero = functions.neutral
+    if not functions.m:
+        return _partition(functions, [zero], wanted)
+    for k in range(5):  # some sizes close a loop and some do not
+        trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
+        attempt = ConstraintFunctions(functions.kinematics, trial)
+        try:
+            bent = functions.system.scales.move(
+                functions.neutral, 0.3 + 0.1 * np.arange(float(len(functions.system.scales.q)))
+            )
+            q = attempt.close({}, dict(zip(functions.kinematics.names, bent, strict=True))).q
+        except AssemblyError:
+            continue
+        return _partition(attempt, [q, *_probe(attempt, q)], wanted)
+    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, len(functions.system.scales.q)))
+    return _partition(functions, [functions.system.scales.move(zero, step) for step in generic.astype(float)], wanted)
+
+
+def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
+    """More assembled configurations, reached along the null space from q."""
+    found, scales = [], functions.system.scales
+    random = np.random.default_rng(1)
+    if not functions.h:
+        return [scales.move(q, random.uniform(0.2, 0.9, len(scales.q))) for _ in range(PROBES)]
+    rows = SparseRows(functions.place_jacobian(q))
+    basis = rows.motions(rows.rank)
+    for k in range(PROBES):
+        step = random.normal(size=len(basis)) @ basis
+        length = float(np.linalg.norm(step))
+        if length == 0.0:
+            break
+        start = scales.move(q, (0.1 + 0.1 * k) / length * step)
+        try:
+            closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
+        except AssemblyError:
+            continue
+        found.append(closed)
+    return found
+
+
+def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], wanted: Sequence[str]) -> Mobility:
+    kinematics = functions.kinematics
+    names, labels = kinematics.velocity_labels, kinematics.constraints.labels
+    n = len(names)
+    q = configurations[0]
+    jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
+    require_finite(functions, q)
+    judged = [SparseRows(J) for J in jacobians if np.isfinite(J).all()]
+    ranks = tuple(rows.rank for rows in judged)
+    r = max(ranks)
+    refuse_squares(functions, q)
+    if functions.m and not r:
+        refuse_idle_rows(kinematics, functions.values)
+    n_dof = n - r
+    if len(wanted) > n_dof and kinematics.given_rates and set(wanted) <= set(kinematics.names):
+        wanted = ()  # coordinates, of which there may be more than velocities
+    if len(wanted) > n_dof:
+        has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
+        message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
+        raise ModelError(
+            [
+                kinematics.mechanism.problem(
+                    "independent", message, f"choose {n_dof} of {', '.join(names)}", "EG-PARTITION"
+                )
+            ]
+        )
+    chosen = _choose(kinematics, judged, r, wanted)
+    quality = judged[0].conditioning(chosen)
+    at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
+    others = [rows.conditioning(chosen) for rows in judged[1:]] if wanted and not at_change_point else []
+    if wanted and not at_change_point and max(quality, *others, 0.0) < CHOSEN:
+        means = "move the mechanism on their own" if len(wanted) == n_dof else "vary independently of each other"
+        message = f"{', '.join(wanted)} cannot {means} at the initial configuration"
+        better = [names[j] for j in choose_independent(judged, r)]
+        raise ModelError(
+            [kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can", "EG-PARTITION")]
+        )
+    rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
+    kept = tuple(int(i) for i in rows)
+    return Mobility(
+        q_reference=tuple(float(x) for x in q),
+        rank=r,
+        n_dof=n_dof,
+        independent=tuple(names[j] for j in chosen),
+        dependent=tuple(name for j, name in enumerate(names) if j not in chosen),
+        independent_rows=kept,
+        redundant=tuple(label for i, label in enumerate(labels) if i not in kept),
+        conditioning=quality,
+        length_scale=functions.length_scale,
+        row_scales=tuple(float(x) for x in functions.scales.c),
+        configurations=len(configurations),
+        ranks=ranks,
+        samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
+        n_positions=len(functions.system.scales.q) - max(_position_ranks(functions, configurations, judged)),
+        instantaneous=n - ranks[0],
+        candidates=tuple((names[k], value) for k, value in rate_candidates(judged[0].J, chosen).items()),
+        driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
+    )
+
+
+def _position_ranks(
+    functions: ConstraintFunctions, configurations: Sequence[Array], judged: Sequence[SparseRows]
+) -> list[int]:
+    """Ranks of the constraints of positions; those known already of the same matrices are not found again."""
+    known = {rows.J.tobytes(): rows.rank for rows in judged}
+    found = map(functions.place_jacobian, configurations)
+    return [known[key] if (key := J.tobytes()) in known else SparseRows(J).rank for J in found]
+
+
+def _choose(kinematics: Kinematics, judged: Sequence[SparseRows], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
+    names = kinematics.velocity_labels
+    n_dof = len(names) - r
+    picked = [names.index(name) for name in wanted]
+    if len(picked) == n_dof:
+        return tuple(picked)
+    if r == 0:
+        return tuple(range(n_dof))
+    named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
+    if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
+        named = set(names) - {name for name, _ in kinematics.hints}
+    prefer = [j for j, name in enumerate(names) if name in named and j not in picked]
+    if picked:  # they stay, and the others are chosen where these stand still
+        judged = [SparseRows(np.vstack([rows.J, np.eye(len(names))[picked]])) for rows in judged]
+    return tuple(sorted([*picked, *map(int, choose_independent(judged, r + len(picked), prefer))]))

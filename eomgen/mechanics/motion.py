@@ -1,0 +1,548 @@
+"""Motion of markers and joint coordinates in ground axes, momentum, what force elements and outputs look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Protocol, TypeVar, cast
+
+from ..elements.forces import CoordinateLoad
+from ..elements.forces.force import Force, MarkerLoad, View, beyond_zero
+from ..elements.forces.friction import reaction_symbol
+from ..elements.frames import GROUND, Frame, Marker
+from ..errors import ModelError
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph, atan2, sqrt, substitute, symbols_of
+from ..expr.differentiate import jvp
+from ..expr.spatial import Twist
+from ..expr.tensors import add_matrices, rotate_symmetric, shift_tensor
+from ..expr.vectors import Mat3, Vec3
+from ..model.mechanism import STATE_RATE, JointSpec, Mechanism
+from ..model.quantities import (
+    ANGULAR_MOMENTUM,
+    INERTIA,
+    MASS,
+    MOMENTUM,
+    TURNING,
+    CarriedQuantity,
+    Quantity,
+    WrenchQuantity,
+)
+from .topology import MotionSymbols
+from .tree import Link, Poses
+
+# -- elimination -------------------------------------------------------------------------------------------------------
+
+
+Matrix = list[list[Expr]]
+
+
+def eliminate(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
+    """x with A x = right, without exchange of rows: A is positive definite, or I less a contraction."""
+    A, x, n = [list(row) for row in matrix], list(right), len(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            if A[i][k].is_zero:
+                continue
+            ratio = A[i][k] / A[k][k]
+            for j in range(k + 1, n):
+                A[i][j] = A[i][j] - ratio * A[k][j]
+            x[i] = x[i] - ratio * x[k]
+    for k in reversed(range(n)):
+        x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))]) / A[k][k]
+    return x
+
+
+def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    """The product of two rows that are not empty."""
+    return combined(a[0].graph.zero, a, b)
+
+
+def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
+    """A value with multiples of others."""
+    for k, x in zip(factors, values, strict=True):
+        base = base + k * x
+    return base
+
+
+def total(terms: Sequence[Expr]) -> Expr:
+    """The sum of terms, of which there is one at least."""
+    found = terms[0]
+    for term in terms[1:]:
+        found = found + term
+    return found
+
+
+# -- reaction parts ----------------------------------------------------------------------------------------------------
+
+# The wrench that passes through a joint holds what acts along its coordinates too (a drive, friction).  The reaction is
+# the rest, which does no work in the motions that the joint allows, as in :mod:`~eomgen.analysis.reactions`: what acts
+# along a coordinate is a torque where that turns, a force where it slides.
+
+
+class Placed(Protocol):
+    """What the parts need to know of the motion."""
+
+    graph: Graph
+
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def coordinate(self, name: str) -> tuple[Expr, Expr]: ...
+
+
+def part_of_reaction(motion: Placed, spec: JointSpec, quantity: CarriedQuantity) -> Expr:
+    """The part, in symbols of the joint's wrench along the axes of S."""
+    wrench = [reaction_symbol(motion.graph, spec.name, k) for k in range(6)]
+    force, moment = force_and_moment(motion, spec, wrench)
+    if quantity.part == "size":
+        return beyond_zero(vec.dot(force, force), sqrt)
+    if quantity.part == "normal":  # across the z axis of the joint
+        return beyond_zero(force[0] * force[0] + force[1] * force[1], sqrt)
+    found = vec.times(motion.rotation(spec.successor), moment if quantity.part.startswith("m") else force)
+    if quantity.axes is not None:
+        found = vec.transpose_times(motion.rotation(quantity.axes), found)
+    return found["xyz".index(quantity.part[-1])]
+
+
+def force_and_moment(motion: Placed, spec: JointSpec, wrench: Sequence[Expr]) -> tuple[Vec3, Vec3]:
+    """Force and moment that do no work in the motions that the joint allows, of the wrench that passes through it."""
+    graph, x = motion.graph, wrench
+    force, moment = (x[0], x[1], x[2]), (x[3], x[4], x[5])
+    if spec.joint.role == "loop":
+        return force, moment
+    columns = spec.joint.subspace(graph, [motion.coordinate(name)[0] for name in spec.coordinates])
+    turns = [(angular, linear) for angular, linear in columns if not all(part.is_zero for part in angular)]
+    slides = [linear for angular, linear in columns if all(part.is_zero for part in angular)]
+    pushed = _spanned(graph, slides, [vec.dot(s, force) for s in slides])
+    wanted = [vec.dot(w, moment) + vec.dot(s, force) - vec.dot(s, pushed) for w, s in turns]
+    turned = _spanned(graph, [w for w, _ in turns], wanted)
+    return vec.sub(force, pushed), vec.sub(moment, turned)
+
+
+def _spanned(graph: Graph, directions: Sequence[Vec3], work: Sequence[Expr]) -> Vec3:
+    """The shortest vector that does the given work along directions."""
+    found = vec.zero(graph)
+    if directions:
+        gram = [[vec.dot(a, b) for b in directions] for a in directions]
+        for factor, direction in zip(eliminate(gram, work), directions, strict=True):
+            found = vec.add(found, vec.scale(factor, direction))
+    return found
+
+
+# -- loads of force elements on bodies ---------------------------------------------------------------------------------
+
+
+def part_exerted(view: View, force: Force, quantity: WrenchQuantity) -> Expr | str:
+    """The part: forces add up, moments are taken about the origin of the marker; or why there is none."""
+    total, moment, acts = vec.zero(view.graph), vec.zero(view.graph), False
+    here = view.position(quantity.on)
+    for load in force.loads(view):
+        if not isinstance(load, MarkerLoad):
+            return f"acts along the coordinate {load.coordinate!r}"
+        if load.marker.body == quantity.on.body:
+            acts = True
+            arm = vec.sub(view.position(load.marker), here)
+            total = vec.add(total, load.force)
+            moment = vec.add(moment, vec.add(load.torque, vec.cross(arm, load.force)))
+    if not acts:
+        return f"exerts nothing on {quantity.on.label.partition('.')[0]}"
+    if quantity.part == "size":
+        return beyond_zero(vec.dot(total, total), sqrt)
+    found = moment if quantity.part.startswith("m") else total
+    if quantity.axes is not None:
+        found = vec.transpose_times(view.rotation(quantity.axes), found)
+    return found["xyz".index(quantity.part[-1])]
+
+
+# -- entries of loads --------------------------------------------------------------------------------------------------
+
+
+AnyLoad = TypeVar("AnyLoad", bound=MarkerLoad | CoordinateLoad)
+
+
+def with_entries(load: AnyLoad, values: Iterator[Expr]) -> AnyLoad:
+    """A load with its entries replaced by the next values."""
+    made: MarkerLoad | CoordinateLoad
+    if isinstance(load, CoordinateLoad):
+        made = CoordinateLoad(load.coordinate, next(values))
+    else:
+        x = [next(values) for _ in range(6)]
+        made = MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    return cast("AnyLoad", made)
+
+
+def entries_of(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
+    """Force and torque of a load on a marker, or the one value of a load along a coordinate."""
+    return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]
+
+
+# -- momentum ----------------------------------------------------------------------------------------------------------
+
+# All vectors are in ground axes.  Sums over the bodies of m r x v + I w and its like (Goldstein, *Classical Mechanics*,
+# sec. 1.2; Orin, Goswami, Lee, *Autonomous Robots* 35, 2013, for the centroidal quantities).
+
+
+class Momentum:
+    """The sums over all bodies of a tree, each made once when asked for."""
+
+    def __init__(self, poses: Poses, twists: Sequence[Twist]) -> None:
+        self.graph, self.poses, self.links, self.twists = poses.graph, poses, poses.links, twists
+
+    @cached_property
+    def mass(self) -> Expr:
+        """Total mass (kg)."""
+        total = self.graph.zero
+        for link in self.links:
+            total = total + link.mass
+        return total
+
+    @cached_property
+    def _share(self) -> Expr:
+        """One over the total mass, which depends on parameters only."""
+        return 1.0 / self.mass
+
+    def _centre(self, k: int) -> Vec3:
+        """Centre of mass of a link."""
+        pose = self.poses.link(k)
+        return vec.add(pose.position, vec.times(pose.rotation, self.links[k].com))
+
+    @cached_property
+    def centre(self) -> Vec3:
+        """Centre of mass (m)."""
+        total = vec.zero(self.graph)
+        for k, link in enumerate(self.links):
+            total = vec.add(total, vec.scale(link.mass, self._centre(k)))
+        return vec.scale(self._share, total)
+
+    def _momentum_of(self, k: int) -> Vec3:
+        """Linear momentum of a link."""
+        link, (angular, linear) = self.links[k], self.twists[k]
+        velocity = vec.add(linear, vec.cross(angular, link.com))
+        return vec.times(self.poses.link(k).rotation, vec.scale(link.mass, velocity))
+
+    @cached_property
+    def linear(self) -> Vec3:
+        """Linear momentum (kg m/s)."""
+        total = vec.zero(self.graph)
+        for k in range(len(self.links)):
+            total = vec.add(total, self._momentum_of(k))
+        return total
+
+    @cached_property
+    def velocity(self) -> Vec3:
+        """Velocity of the centre of mass (m/s)."""
+        return vec.scale(self._share, self.linear)
+
+    @cached_property
+    def angular(self) -> Vec3:
+        """Angular momentum about the centre of mass (kg m^2/s)."""
+        total = vec.zero(self.graph)
+        for k, link in enumerate(self.links):
+            spin = vec.times(self.poses.link(k).rotation, vec.times(link.inertia, self.twists[k][0]))
+            arm = vec.sub(self._centre(k), self.centre)
+            total = vec.add(total, vec.add(spin, vec.cross(arm, self._momentum_of(k))))
+        return total
+
+    def angular_about(self, point: Vec3) -> Vec3:
+        """Angular momentum about a point of ground (kg m^2/s)."""
+        return vec.add(self.angular, vec.cross(vec.sub(self.centre, point), self.linear))
+
+    @cached_property
+    def inertia(self) -> Mat3:
+        """Inertia about the centre of mass (kg m^2)."""
+        o = vec.zero(self.graph)
+        total: Mat3 = (o, o, o)
+        for k, link in enumerate(self.links):
+            own = rotate_symmetric(self.poses.link(k).rotation, link.inertia)
+            arm = vec.sub(self._centre(k), self.centre)
+            total = add_matrices(total, add_matrices(own, shift_tensor(link.mass, arm)))
+        return total
+
+    def inertia_about(self, point: Vec3) -> Mat3:
+        """Inertia about a point (kg m^2)."""
+        return add_matrices(self.inertia, shift_tensor(self.mass, vec.sub(self.centre, point)))
+
+    def jacobian(self, n: int) -> tuple[tuple[Expr, ...], ...]:
+        """Velocity of the centre of mass for each generalized velocity, (3, n).
+
+        What moves with a joint is the part of the tree beyond it: its mass and first moment are summed inwards.
+        """
+        masses = [link.mass for link in self.links]
+        moments = [vec.scale(link.mass, link.com) for link in self.links]  # about the link's origin, link axes
+        columns = [vec.zero(self.graph)] * n
+        for k in reversed(range(len(self.links))):
+            link: Link = self.links[k]
+            rotation = self.poses.link(k).rotation
+            for c, (angular, linear) in enumerate(link.columns):
+                push = vec.add(vec.scale(masses[k], linear), vec.cross(angular, moments[k]))
+                columns[link.first + c] = vec.scale(self._share, vec.times(rotation, push))
+            if link.parent != GROUND:
+                masses[link.parent] = masses[link.parent] + masses[k]
+                carried = vec.add(link.up(moments[k]), vec.scale(masses[k], link.position))
+                moments[link.parent] = vec.add(moments[link.parent], carried)
+        return tuple(tuple(column[i] for column in columns) for i in range(3))
+
+
+COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
+
+
+class MarkerMotion:
+    """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
+
+    Parameters
+    ----------
+    coordinates : mapping
+        ``name -> (value, rate, acceleration)`` of every joint coordinate, tree and cut.
+    turning : mapping, optional
+        ``name -> (predecessor, successor, axis)`` of the angular velocities that are velocities of cut joints.
+    """
+
+    def __init__(
+        self,
+        poses: Poses,
+        twists: Sequence[Twist],
+        state: MotionSymbols,
+        coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
+        turning: Mapping[str, tuple[Marker, Marker, int]] | None = None,
+    ) -> None:
+        self.graph = poses.graph
+        self.poses = poses
+        self.twists = twists
+        self.coordinates = coordinates
+        self.state = state
+        self.turning = turning or {}
+        self.carried: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
+        self._state_rates: dict[str, tuple[Expr, ...]] = {}
+        self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        return self.poses.relative(start, end)
+
+    def position(self, marker: Marker) -> Vec3:
+        """Origin of the marker, ground axes (m)."""
+        return self.poses.marker(marker).position
+
+    def rotation(self, marker: Marker) -> Mat3:
+        """Rotation that takes marker axes to ground axes."""
+        return self.poses.marker(marker).rotation
+
+    def angular_velocity(self, marker: Marker) -> Vec3:
+        """Angular velocity of the marker's body, ground axes (rad/s)."""
+        return self.turning_of(marker, own_axes=False, rate=False)
+
+    def velocity(self, marker: Marker) -> Vec3:
+        """Velocity of the marker's origin, ground axes (m/s)."""
+        if marker.body == GROUND:
+            return vec.zero(self.graph)
+        link = self.poses.link_of[marker.body]
+        angular, linear = self.twists[link]
+        arm = self.poses.marker_in_link(marker).position
+        return vec.times(self.poses.link(link).rotation, vec.add(linear, vec.cross(angular, arm)))
+
+    def acceleration(self, marker: Marker) -> Vec3:
+        """Acceleration of the marker's origin, ground axes (m/s^2)."""
+        x, y, z = jvp(list(self.velocity(marker)), self.state.along)
+        return (x, y, z)
+
+    def accelerations(self, markers: Sequence[Marker]) -> list[Expr]:
+        """Acceleration and angular acceleration of each marker, ground axes: six for each, differentiated together."""
+        moving = [marker for marker in markers if marker.body != GROUND]
+        links = [self.poses.link_of[marker.body] for marker in moving]
+        rates = jvp(
+            [x for m, link in zip(moving, links, strict=True) for x in (*self.velocity(m), *self.twists[link][0])],
+            self.state.along,
+        )
+        found: dict[int, list[Expr]] = {}
+        for k, (marker, link) in enumerate(zip(moving, links, strict=True)):
+            x, y, z = rates[6 * k + 3 : 6 * k + 6]
+            found[id(marker)] = [*rates[6 * k : 6 * k + 3], *vec.times(self.poses.link(link).rotation, (x, y, z))]
+        return [x for marker in markers for x in found.get(id(marker), [self.graph.zero] * 6)]
+
+    def turning_of(self, marker: Marker, own_axes: bool, rate: bool) -> Vec3:
+        """Angular velocity (rad/s) of the marker's body or, with ``rate``, its angular acceleration (rad/s^2).
+
+        The rate of the components is the same vector in either axes, since the axes turn with it or not at all.
+        """
+        if marker.body == GROUND:
+            return vec.zero(self.graph)
+        link = self.poses.link_of[marker.body]
+        x, y, z = self.twists[link][0]
+        if rate:
+            x, y, z = jvp([x, y, z], self.state.along)
+        if own_axes:
+            return vec.transpose_times(self.poses.marker_in_link(marker).rotation, (x, y, z))
+        return vec.times(self.poses.link(link).rotation, (x, y, z))
+
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap.
+
+        It is where the relative rotation is about that axis at every configuration.
+        """
+        rotation = self.poses.relative(start, end).rotation
+        found = self.poses.turns(rotation, self.state.q)
+        if found is not None:
+            angle, terms = found
+            rate = self.graph.zero
+            for j, factor in terms:
+                rate = rate + factor * self.state.rates[j]
+            return angle, rate, True
+        axis = vec.transpose(self.rotation(start))[2]
+        relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
+        return atan2(rotation[1][0], rotation[0][0]), vec.dot(axis, relative), False
+
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        """Value and rate of a joint coordinate."""
+        value, rate, _ = self.coordinates[name]
+        return value, rate
+
+    @cached_property
+    def _ground(self) -> Marker:
+        return Marker(GROUND, Frame.identity(self.graph), "ground")
+
+    @cached_property
+    def momentum(self) -> Momentum:
+        """Mass, centre of mass and momentum of all bodies."""
+        return Momentum(self.poses, self.twists)
+
+    def _sum(self, quantity: Quantity) -> Expr:
+        """A sum over all bodies, or the motion of their centre of mass."""
+        total, k, marker = self.momentum, quantity.axis, quantity.marker
+        if quantity.level == MASS:
+            return total.mass
+        if quantity.level == MOMENTUM:
+            return total.linear[k]
+        if quantity.level == ANGULAR_MOMENTUM:
+            return (total.angular if marker is None else total.angular_about(self.position(marker)))[k]
+        if quantity.level == INERTIA:
+            tensor = total.inertia if marker is None else total.inertia_about(self.position(marker))
+            i, j = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))[k]
+            return tensor[i][j]
+        if quantity.level == 2:
+            return jvp(list(total.velocity), self.state.along)[k]
+        return (total.velocity if quantity.level == 1 else total.centre)[k]
+
+    def derived_symbols(self, mechanism: Mechanism, used: set[str]) -> dict[Expr, Expr]:
+        """What cut joints' coordinates and marker quantities stand for, as a substitution, for the symbols ``used``."""
+        mapping: dict[Expr, Expr] = {}
+        for name, triple in self.coordinates.items():
+            for suffix, value in zip(COORDINATE_SUFFIXES, triple, strict=True):
+                symbol = self.graph.symbol(name + suffix)
+                if name + suffix in used and symbol != value:
+                    mapping[symbol] = value
+        for name, (start, end, axis) in self.turning.items():
+            if name in used or f"{name}_dot" in used:
+                relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
+                value = vec.transpose_times(self.rotation(end), relative)[axis]
+                mapping[self.graph.symbol(name)] = value
+                mapping[self.graph.symbol(f"{name}_dot")] = jvp([value], self.state.along)[0]
+        for name, quantity in mechanism.quantities.items():
+            if name in used:
+                mapping[self.graph.symbol(name)] = self._quantity(quantity)
+        for name in mechanism.reaction_quantities.keys() & used:
+            found = self._carried(mechanism, mechanism.reaction_quantities[name])
+            if found != self.graph.symbol(name):
+                mapping[self.graph.symbol(name)] = found
+        for name in self.carried.keys() & used:
+            mapping[self.graph.symbol(name)] = self.carried[name]
+        for name in (mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()) & used:
+            mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
+        return mapping
+
+    def _carried(self, mechanism: Mechanism, quantity: CarriedQuantity) -> Expr:
+        """A part of a reaction in symbols of the joint's wrench, or a multiplier; their values once they are known."""
+        if quantity.part:
+            spec = next(spec for spec in mechanism.joints if spec.name == quantity.of)
+            found = part_of_reaction(self, spec, quantity)
+            mapping = self.derived_symbols(mechanism, symbols_of([found]))
+        else:
+            found, mapping = self.graph.symbol(f"multiplier({quantity.of})"), {}
+        known = mapping | {self.graph.symbol(name): value for name, value in self.carried.items()}
+        return substitute([found], known)[0]
+
+    def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
+        """What a force element does, in terms of the tree.
+
+        Raises
+        ------
+        ModelError
+            It depends on itself, or it exerts nothing on a body.
+        """
+        exerted = mechanism.wrench_quantities.get(name)
+        quantity, element = mechanism.element_quantities[name] if exerted is None else ("", exerted.element)
+        if name in self._open:
+            way = " -> ".join([*self._open[self._open.index(name) :], name])
+            remedy = "let one of the laws depend on positions and velocities instead"
+            raise ModelError(
+                [mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy, "EG-CIRCLE")]
+            )
+        force = next(force for force in mechanism.forces if force.name == element)
+        if exerted is not None:
+            found = self._exerted(mechanism, force, exerted)
+        elif quantity.startswith(STATE_RATE):
+            if element not in self._state_rates:  # of all at once: one sum over pairs gives many
+                self._state_rates[element] = force.state_rates(self)
+            found = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
+        elif quantity == "power" or (measured := force.measured(self)) is None:
+            found = force.power(self)
+        else:
+            found = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
+        self._open.append(name)
+        mapping = self.derived_symbols(mechanism, symbols_of([found]))
+        self._open.pop()
+        return substitute([found], mapping)[0] if mapping else found
+
+    def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
+        found = part_exerted(self, force, quantity)
+        if force.is_rigid:
+            told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
+            remedy = (
+                "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
+                "or give a normal law with a stiffness"
+            )
+            raise ModelError([mechanism.problem(quantity.path, told, remedy, "EG-UNSUPPORTED")])
+        if isinstance(found, str):
+            remedy = f"give a body on which it acts; power({force.name}) is known of every element"
+            raise ModelError(
+                [mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy, "EG-UNSUPPORTED")]
+            )
+        return found
+
+    def _quantity(self, quantity: Quantity) -> Expr:
+        """Motion of a marker, or a sum over all bodies."""
+        if quantity.level not in (0, 1, 2, *TURNING):
+            return self._sum(quantity)
+        if quantity.axis == 4:
+            return self._distance(quantity)
+        if quantity.axis == 3 and quantity.marker is not None:
+            # it wraps only where the motion is not plane
+            angle, rate, _ = self.turn(quantity.origin or self._ground, quantity.marker)
+            return rate if quantity.level else angle
+        found = self._vector(quantity.level, quantity.marker)
+        if quantity.origin is not None:
+            found = vec.sub(found, self._vector(quantity.level, quantity.origin))
+        if quantity.axes is not None:
+            found = vec.transpose_times(self.rotation(quantity.axes), found)
+        return found[quantity.axis]
+
+    def may_wrap(self, quantity: Quantity) -> bool:
+        """Whether it is an angle between axes that do not stay in line, which is not defined everywhere."""
+        if quantity.axis != 3 or quantity.level > 0 or quantity.marker is None:
+            return False
+        return not self.turn(quantity.origin or self._ground, quantity.marker)[2]
+
+    def _vector(self, level: int, marker: Marker | None) -> Vec3:
+        """The motion of a marker's origin, its angular motion, or the motion of the centre of mass of all bodies."""
+        if marker is None:
+            x, y, z = (self._sum(Quantity(None, level, k)) for k in range(3))
+            return (x, y, z)
+        if level in TURNING:
+            return self.turning_of(marker, level in TURNING[1::2], level in TURNING[2:])
+        return (self.position, self.velocity, self.acceleration)[level](marker)
+
+    def _distance(self, quantity: Quantity) -> Expr:
+        """The distance of two markers, or its rate."""
+        start = quantity.origin or self._ground
+        place, velocity = (self._vector(level, quantity.marker) for level in (0, 1))
+        reach = vec.sub(place, self.position(start))
+        length = sqrt(vec.dot(reach, reach))
+        return vec.dot(reach, vec.sub(velocity, self.velocity(start))) / length if quantity.level else length

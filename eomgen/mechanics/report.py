@@ -1,0 +1,704 @@
+"""Kinematics and Mobility -> MechanismReport, what a person wants to know before trusting a model."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, fields, is_dataclass
+from importlib import import_module
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..base.files import as_path, save_figure
+from ..base.inline_pictures import picture_html, side_by_side
+from ..base.limits.analyses import BESIDE, MOST_ANGLE, SLACK
+from ..base.limits.constraints import MEASURED
+from ..base.limits.numbers import ACROSS
+from ..base.numeric.assembly import close, closed, starts
+from ..base.numeric.projection import largest
+from ..base.operations import CHOICE, OPERATIONS
+from ..base.records import dataclass
+from ..base.texts import angle_in_degrees, fold, html_text, terminal_width
+from ..elements.constraints import Driver
+from ..elements.frames import Frame, Marker
+from ..errors import MissingDependencyError, bad_file
+from ..expr import vectors as vec
+from ..expr.core import Expr, reachable, symbols_of
+from ..expr.evaluate import compile_evaluator
+from .constraint_functions import Array, ConstraintFunctions
+from .kinematics import Kinematics
+from .mobility import Mobility, initial_values
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# -- other assembly modes ----------------------------------------------------------------------------------------------
+
+
+TRIES = 36  #: starts of the search, of which the farther half is taken
+MANY = 3  #: branches to tell of
+
+
+@np.errstate(all="ignore")
+def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str, float]]:
+    """One coordinate of each such position, with its value there.
+
+    The independent coordinates and those of the guess are held where they are.  Of a rotation by several angles, which
+    describe it twice, nothing is told: only joints of one degree of freedom count.
+    """
+    mechanism = kinematics.mechanism
+    joints = sorted((j for j in mechanism.joints if len(j.coordinates) == 1), key=lambda j: not j.named)
+    single = [j.coordinates[0] for j in joints]  # those that the user named first, as words for a branch
+    if mobility.assumed or not kinematics.constraints.labels or not single:
+        return []
+    numbers = {p.name: float(p.value or 0.0) for p in mechanism.parameters}
+    numbers |= {u.name: float(u.value or 0.0) for u in mechanism.inputs}
+    functions = ConstraintFunctions(kinematics, numbers)
+    system, here = functions.system, np.array(mobility.q_reference)
+    known = {*kinematics.names, *kinematics.loop_coordinates.names}
+    given = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
+    kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
+    guessed = [name for name in mechanism.guess if name in known and kinds.get(name) != "parameter"]
+    held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
+    at = dict(zip(kinematics.names, mobility.q_reference, strict=True))
+    held |= {name: at[name] for name in mobility.independent if name in at}
+    equations, names = system.closure(system.settle({**held, **given})), [n for n in single if n in known]
+    values, _ = system.measure(names, here)
+    sizes, angles = _sizes(functions, names)
+    found: list[Array] = []
+    told: list[dict[str, float]] = []
+    for start in islice(starts(here, equations.free, system.scales, TRIES), TRIES // 2 + 1, None):  # those far away
+        q, residual = close(equations, start)
+        if not closed(residual) or not system.aligned(q):
+            continue
+        turned = system.measure(names, q)[0] - values
+        gaps = np.where(angles, np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi, turned)
+        if largest(gaps / sizes) > BESIDE and all(largest((gaps - other) / sizes) > BESIDE for other in found):
+            k = int((np.abs(gaps / sizes) > BESIDE).argmax())
+            found.append(gaps)
+            told.append({names[k]: float(values[k] + gaps[k])})
+        if len(found) == MANY:
+            break
+    return told
+
+
+def _sizes(functions: ConstraintFunctions, names: list[str]) -> tuple[Array, Array]:
+    """Typical size of each coordinate, and whether it is an angle."""
+    kinematics, loop = functions.kinematics, functions.kinematics.loop_coordinates
+    kinds = dict(zip((*kinematics.names, *loop.names), (*kinematics.kinds, *loop.kinds), strict=True))
+    lengths = np.array([kinds[name] == "length" for name in names])
+    return np.where(lengths, functions.length_scale, 1.0), ~lengths
+
+
+# -- notes -------------------------------------------------------------------------------------------------------------
+
+
+POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
+SHOWN = 6
+TRIED = 3  #: states at which a body's angular velocity is looked at
+
+
+def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Locked and overconstrained mechanisms, change points, badly chosen independent coordinates."""
+    m = kinematics.mechanism
+    notes = list(m.notes)
+    moved = mobility.driven or m.forces or m.inputs or m.switched
+    if m.default_gravity and not moved and any(not body.mass.is_zero for body in m.bodies):
+        notes.append(
+            "no gravity is given and no force acts, so that nothing speeds up or slows down but by inertia; if it "
+            "should fall, give gravity; gravity (0, 0, 0) says that it should not"
+        )
+    if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
+        held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
+        notes.append(
+            f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {held}); "
+            "if it should move, remove a constraint, or replace a joint by one with more freedom"
+        )
+    follow = f"{_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from"
+    if mobility.redundant and kinematics.given_rates and not mobility.assumed:
+        notes.append(
+            f"{follow} the rates or from other constraints; the motion is not affected, and states are projected onto "
+            "all of them"
+        )
+    elif mobility.redundant and not mobility.assumed:
+        redundant = Counter(label.partition(".")[0] for label in mobility.redundant)
+        rows = Counter(label.partition(".")[0] for label in kinematics.constraints.labels)
+        remedies = []
+        if needed := [name for name, count in redundant.items() if count < rows[name]]:
+            remedies.append(f"release only these rows of {_few(needed)}, whose other rows are needed")
+        if spare := [name for name in redundant if name not in needed]:
+            remedies.append(f"leave {_few(spare)} out")
+        notes.append(
+            f"overconstrained: {follow} the other constraints; the motion is not affected, but the reactions there are "
+            f"not unique; if you need them, {' and '.join(remedies)}"
+        )
+    if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
+        notes.append(
+            f"change point: {mobility.instantaneous} degrees of freedom at the initial configuration, {mobility.n_dof} "
+            "elsewhere, so the motion can continue on several branches; start a little away from this configuration"
+        )
+    elif mobility.n_dof and mobility.conditioning < POOR and mobility.candidates:
+        better = [(name, x) for name, x in mobility.candidates if name not in mobility.independent]
+        if better and better[0][1] > 10.0 * mobility.conditioning:
+            name, value = better[0]
+            notes.append(
+                f"{', '.join(mobility.independent)} hardly moves the mechanism at the initial configuration "
+                f"(conditioning {mobility.conditioning:.1g}); {name} would do better there ({value:.1g})"
+            )
+    notes += [
+        f"{name}: {', '.join(corners)} in a driver's value can make a corner, where its rate jumps; a driver does not "
+        "compute the impact there; use a smooth motion, or events with restitution for a real impact"
+        for name, corners in _drivers_with_corners(kinematics)
+    ]
+    notes += [
+        f"{name} turns about axes without a given moment of inertia, and these moments count as 0; give xx, yy and zz, "
+        "or a joint that turns the body about the axis of its only moment"
+        for name in _turned_out_of_plane(kinematics)
+    ]
+    return notes + _in_degrees(kinematics, mobility) + _beyond_limits(kinematics, mobility)
+
+
+def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Angles that start after more than two turns, as degrees would."""
+    m = kinematics.mechanism
+    numbers = {p.name: p.value for p in m.parameters} | {u.name: u.value for u in m.inputs}
+    if mobility.assumed:
+        return []
+    given = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
+    names = (*kinematics.names, *kinematics.loop_coordinates.names)
+    kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))
+    return [
+        angle_in_degrees(name, x)
+        for name, x in given.items()
+        if kinds.get(name) in ("angle", "turn") and abs(x) > MOST_ANGLE
+    ]
+
+
+def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Coordinates that start beyond a declared limit of their joint."""
+    m, at = kinematics.mechanism, dict(zip(kinematics.names, mobility.q_reference, strict=True))
+    declared = [pair for j in m.joints for pair in zip(j.coordinates, j.limits, strict=False)]
+    found = []
+    for name, limits in declared if m.limits_told and not mobility.assumed else ():
+        for key, limit in limits:
+            beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
+            if beyond > SLACK * (1.0 + abs(limit)):
+                found.append(
+                    f"{name} starts at {at[name]:.6g}, beyond its {key} limit {limit:g}; limits alone stop nothing: "
+                    "give another initial value, or add a force of type stop"
+                )
+    return found
+
+
+def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
+    """Bodies with one moment of inertia, as in a plane, whose joints turn them about other axes too."""
+    mechanism, graph = kinematics.mechanism, kinematics.graph
+    bodies = [(k, body) for k, body in enumerate(mechanism.bodies) if body.plane is not None]
+    across: list[Expr] = []
+    for k, body in bodies:
+        marker = Marker(k, Frame.identity(graph), body.name)
+        spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
+        across += vec.cross(spin, body.plane or spin)
+    symbols = sorted(symbols_of(across))
+    if not symbols:
+        return []
+    values = np.random.default_rng(1).uniform(0.5, 1.5, (TRIED, len(symbols)))
+    with np.errstate(all="ignore"):
+        evaluate = compile_evaluator(across, symbols)
+        sizes = np.abs([evaluate(row.tolist()) for row in values]).max(axis=0).reshape(-1, 3).max(axis=1)
+    return [body.name for (_, body), size in zip(bodies, sizes, strict=True) if size > ACROSS]
+
+
+def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]:
+    """Names of drivers whose value takes one of several branches, and by which functions."""
+    found = []
+    for constraint in kinematics.mechanism.constraints:
+        if isinstance(constraint, Driver):
+            graph = constraint.value.graph
+            operations = {graph.nodes[i][0] for i in reachable(graph, [constraint.value.id])}
+            corners = [row.word for row in OPERATIONS.values() if row.kind == CHOICE and row.name in operations]
+            found += [(constraint.name, corners)] if corners else []
+    return found
+
+
+def _few(names: tuple[str, ...] | list[str]) -> str:
+    shown = ", ".join(names[:SHOWN])
+    return shown if len(names) <= SHOWN else f"{shown}, ... ({len(names) - SHOWN} more)"
+
+
+# -- the mechanism as a graph ------------------------------------------------------------------------------------------
+
+
+TREE, CUT, ELEMENT, BODY = "#1f4e79", "#c0392b", "#7d5ba6", "#eaf1f8"
+WIDE, HIGH = 1.5, 1.35  #: inches for a body beside and above another
+SMALLEST, LARGEST = 5.0, 10.0  #: font size
+ARC = 0.9  #: twice the height of an arc between bodies of one layer, at most
+
+
+class Places(NamedTuple):
+    """Where bodies are drawn: name -> (column, layer); ground spans all columns in layer 0."""
+
+    bodies: dict[str, tuple[float, float]]
+    columns: int
+    layers: int
+
+
+class Counted(Protocol):
+    """What a :class:`~.report.MechanismReport` is drawn from."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def tree(self) -> list[dict[str, str]]: ...
+    @property
+    def joints(self) -> list[dict[str, Any]]: ...
+    @property
+    def elements(self) -> list[dict[str, Any]]: ...
+    @property
+    def loop_joints(self) -> list[str]: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+    @property
+    def independent(self) -> list[str]: ...
+
+
+def place(report: Counted) -> Places:
+    """Bodies in the layer of their distance to ground in the tree, each above the middle of what it carries."""
+    carried: dict[str, list[str]] = {"ground": []}
+    for branch in report.tree:
+        carried.setdefault(branch["parent"], []).append(branch["body"])
+        carried.setdefault(branch["body"], [])
+    found: dict[str, tuple[float, float]] = {}
+    columns = layers = 0
+    waiting = [(body, 1, False) for body in reversed(carried["ground"])]
+    while waiting:
+        body, layer, seen = waiting.pop()
+        above = carried[body]
+        if above and not seen:
+            waiting += [(body, layer, True), *((child, layer + 1, False) for child in reversed(above))]
+            continue
+        if above:
+            found[body] = ((found[above[0]][0] + found[above[-1]][0]) / 2, float(layer))
+        else:
+            found[body] = (float(columns), float(layer))
+            columns += 1
+        layers = max(layers, layer)
+    return Places(found, max(columns, 1), layers)
+
+
+def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any:
+    """Draw it; see :meth:`.report.MechanismReport.draw`."""
+    if ax is None and file is None:  # one that a notebook or a window shows
+        ax = _part("pyplot").figure(figsize=_size(place(report)), layout="constrained").add_subplot()
+    elif ax is None:
+        ax = _part("figure").Figure(figsize=_size(place(report)), layout="constrained").add_subplot()
+    if file is not None:
+        known = ax.figure.canvas.get_supported_filetypes()
+        if as_path("file", file).suffix[1:].lower() not in known:
+            raise bad_file(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
+    _fill(report, ax)
+    if file is not None:
+        save_figure(ax.figure, file)
+    return ax
+
+
+def new_figure(report: Counted) -> Any:
+    """A figure of it without a window."""
+    figure = _part("figure").Figure(figsize=_size(place(report)), layout="constrained")
+    _fill(report, figure.add_subplot())
+    return figure
+
+
+def _part(name: str) -> Any:
+    try:
+        return import_module(f"matplotlib.{name}")
+    except ImportError as error:
+        raise MissingDependencyError("the picture needs matplotlib: pip install matplotlib") from error
+
+
+def _size(places: Places) -> tuple[float, float]:
+    return min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0)
+
+
+def _fill(report: Counted, ax: Any) -> None:
+    places = place(report)
+    font = max(SMALLEST, min(LARGEST, 10.0 * 40.0 / WIDE / max(places.columns, 27)))
+    tree = {branch["joint"] for branch in report.tree}
+    ends = [_Line(j["name"], j["type"], j["bodies"][0], j["bodies"][1], j["name"] in tree) for j in report.joints]
+    lanes: dict[tuple[str, str], int] = {}
+    for line in ends:
+        pair = (min(line.start, line.end), max(line.start, line.end))
+        _connect(ax, places, line, lanes.get(pair, 0), font)
+        lanes[pair] = lanes.get(pair, 0) + 1
+    for k, element in enumerate(report.elements):
+        _element(ax, places, element, k, font)
+    middle, half = (places.columns - 1) / 2, max((places.columns - 1) / 2 + 0.45, 0.9)
+    ax.plot([middle - half, middle + half], [0, 0], color="#555555", linewidth=6, solid_capstyle="butt", zorder=3)
+    ax.annotate("ground", (middle - half, 0), (0, -6), textcoords="offset points", va="top", fontsize=font)
+    box = {"boxstyle": "round,pad=0.35", "facecolor": BODY, "edgecolor": TREE}
+    for body, (x, y) in places.bodies.items():
+        ax.annotate(body, (x, y), ha="center", va="center", fontsize=font, bbox=box, zorder=4)
+    _finish(ax, report, middle, half, places.layers)
+
+
+class _Line(NamedTuple):
+    name: str
+    kind: str
+    start: str
+    end: str
+    in_tree: bool
+
+
+def _at(places: Places, body: str, towards: str) -> tuple[float, float]:
+    """Where a line to a body ends; on the ground below the other body."""
+    if body in places.bodies:
+        return places.bodies[body]
+    return (places.bodies[towards][0] if towards in places.bodies else 0.0, 0.0)
+
+
+def _connect(ax: Any, places: Places, line: _Line, lane: int, font: float) -> None:
+    """A joint: solid in the tree, dashed and bent where it closes a loop."""
+    start, end = _at(places, line.start, line.end), _at(places, line.end, line.start)
+    bend = 0.0 if line.in_tree else 0.28 + 0.22 * lane
+    if not line.in_tree and line.start not in places.bodies:  # from the ground, around the right of the body's column
+        start, bend = (start[0] + 0.45, 0.0), min(0.35, ARC / max(end[1], 1.0))
+    elif not line.in_tree and line.end not in places.bodies:
+        end, bend = (end[0] + 0.45, 0.0), -min(0.35, ARC / max(start[1], 1.0))
+    run, rise = end[0] - start[0], end[1] - start[1]
+    if bend and rise == 0.0 and start[1]:  # over what stands between
+        bend = -min(bend, ARC / abs(run)) if run > 0 else min(bend, ARC / max(abs(run), 0.1))
+    colour = TREE if line.in_tree else CUT
+    style = {"arrowstyle": "-", "connectionstyle": f"arc3,rad={bend}", "linewidth": 1.6, "color": colour,
+             "linestyle": "-" if line.in_tree else (0, (4, 3)), "shrinkA": 0, "shrinkB": 0}  # fmt: skip
+    ax.annotate("", end, start, arrowprops=style, zorder=1)
+    middle = ((start[0] + end[0] + bend * rise) / 2, (start[1] + end[1] - bend * run) / 2)
+    plain = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+    text = f"{line.name}\n{line.kind}"
+    ax.annotate(text, middle, ha="center", va="center", fontsize=0.8 * font, color=colour, bbox=plain, zorder=2)
+
+
+def _element(ax: Any, places: Places, element: dict[str, Any], index: int, font: float) -> None:
+    """A constraint element: a diamond amid the bodies it holds, with dotted lines to them."""
+    bodies = [body for body in element["bodies"] if body in places.bodies]
+    points = [places.bodies[body] for body in bodies] or [(0.0, 0.0)]
+    x = sum(p[0] for p in points) / len(points) + (0.3 if len(points) == 1 else 0.0)
+    y = sum(p[1] for p in points) / len(points) + 0.45 + 0.15 * (index % 2)
+    for point in points:
+        ax.plot([x, point[0]], [y, point[1]], color=ELEMENT, linestyle=":", linewidth=1.3, zorder=1)
+    ax.plot([x], [y], marker="D", color=ELEMENT, markersize=0.8 * font, zorder=3)
+    text = f"{element['name']} ({element['type']})"
+    ax.annotate(text, (x, y), (0, -0.8 * font), textcoords="offset points", ha="center", va="top", fontsize=0.8 * font,
+                color=ELEMENT, zorder=5)  # fmt: skip
+
+
+def _finish(ax: Any, report: Counted, middle: float, half: float, layers: int) -> None:
+    """Title, legend and limits."""
+    freedoms = report.degrees_of_freedom
+    words = f"{freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
+    if report.independent and len(report.independent) <= 4:
+        words += f" ({', '.join(report.independent)})"
+    ax.set_title(f"{report.name}: {words}")
+    lines = [("joint of the tree", TREE, "-")]
+    if report.loop_joints:
+        lines.append(("joint that closes a loop", CUT, "--"))
+    if report.elements:
+        lines.append(("constraint element", ELEMENT, ":"))
+    for label, colour, style in lines:
+        ax.plot([], [], color=colour, linestyle=style, label=label)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=len(lines), frameon=False, fontsize="small")
+    ax.set_xlim(middle - half - 0.35, middle + half + 0.35)
+    ax.set_ylim(-0.35, layers + (0.8 if report.elements or report.loop_joints else 0.45))
+    ax.set_axis_off()
+
+
+TIMED = {"holds": "for a time"}  #: of a constraint that closes and opens
+WIDTH = 110  #: of the lines of a report, at most
+
+
+@dataclass(frozen=True)
+class MechanismReport:
+    """Counts, topology and mobility of a mechanism.
+
+    Attributes
+    ----------
+    gruebler_kutzbach : int or None
+        6 (bodies) - sum over joints of 6 - f - equations of constraint elements; None for a bare Lagrangian.
+    gruebler_kutzbach_planar : int or None
+        The same with 3 - f, where the mechanism moves in a plane.
+    constraints : int
+        Rows that do not vanish identically, of ``constraints_declared``; ``nonholonomic`` of them at velocity level.
+    degrees_of_freedom, configuration_freedoms : int
+        Independent velocities; independent coordinates, which nonholonomic constraints do not restrict.
+    instantaneous_freedoms : int
+        Degrees of freedom at the reference configuration, more than usual at a change point.
+    redundant : list of str
+        Rows that follow from the others at the reference configuration.
+    candidates : dict of str to float
+        Coordinates that can be independent at the reference configuration, the best first, and their conditioning: 1 is
+        perfect, 0 not at all.
+    guessed : dict of str to list of two floats
+        The guess of a coordinate and the value found, the largest difference first; ``guess_distance`` is that
+        difference, angles in rad, lengths as a part of ``length_scale``.
+    other_branches : list of dict
+        Further closed positions with the same independent coordinates, which fit the initial values and the guess as
+        well: one coordinate that tells each apart, and its value there.
+    notes : list of str
+        Facts that deserve attention, each with a remedy.
+    """
+
+    name: str
+    bodies: list[str]
+    joints: list[dict[str, Any]]
+    tree: list[dict[str, str]]
+    loop_joints: list[str]
+    coordinates: list[str]
+    loop_coordinates: list[str]
+    independent: list[str]
+    dependent: list[str]
+    constraints: int
+    nonholonomic: int
+    constraints_declared: int
+    rank: int
+    ranks: list[int]
+    degrees_of_freedom: int
+    configuration_freedoms: int
+    instantaneous_freedoms: int
+    gruebler_kutzbach: int | None
+    gruebler_kutzbach_planar: int | None
+    redundant: list[str]
+    conditioning: float
+    candidates: dict[str, float]
+    notes: list[str]
+    length_scale: float
+    reference: dict[str, float]
+    assembly_restarts: int
+    assumed: bool
+    elements: list[dict[str, Any]]
+    guessed: dict[str, list[float]]
+    guess_distance: float
+    other_branches: list[dict[str, float]]
+
+    def draw(self, file: str | Path | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the mechanism as a graph: bodies above the bodies that carry them, joints between them.
+
+        Joints of the spanning tree are solid lines, those that close loops dashed; constraint elements are diamonds.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            Where to write the picture; its ending says the format (svg, png, pdf).
+        ax : matplotlib Axes, optional
+            Where to draw; by default a new figure, which a notebook shows.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib is not installed: ``pip install matplotlib``.
+        UsageError
+            A file name whose ending is no kind of picture.
+        """
+        drawn: Axes = draw(self, file, ax)
+        return drawn
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as plain values, for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        lines = [f"mechanism {self.name}"]
+        width = min(WIDTH, terminal_width() or WIDTH)
+
+        def say(label: str, text: str) -> None:
+            lines.extend(fold(text, width, f"  {label:<22}", " " * 24))
+
+        if self.bodies:
+            say("bodies", f"{len(self.bodies)}: {_list(self.bodies)}")
+            say("joints", f"{len(self.joints)}: {_list_joints(self.joints)}")
+            say("loop joints", _list(self.loop_joints) or "none (open tree)")
+        say("coordinates", f"{len(self.coordinates)}: {_list(self.coordinates)}")
+        if self.loop_coordinates:
+            say("at loop joints", _list(self.loop_coordinates))
+        if self.constraints_declared:
+            vanishing = self.constraints_declared - self.constraints
+            note = f" ({vanishing} more hold identically)" if vanishing else ""
+            kept = f", {self.nonholonomic} of them nonholonomic" if self.nonholonomic else ""
+            say("constraints", f"{self.constraints}{kept}{note}")
+            say("rank", f"{self.rank}" + (f"; redundant: {_list(self.redundant)}" if self.redundant else ""))
+        if len(set(self.ranks)) > 1:
+            say("", f"the rank differs between configurations: {sorted(set(self.ranks))}")
+        if timed := [str(element["name"]) for element in self.elements if TIMED.items() <= element.items()]:
+            say("held for a time", f"{_list(timed)}; what follows is without them")
+        counts = []
+        if self.gruebler_kutzbach is not None:
+            counts.append(f"Gruebler-Kutzbach {self.gruebler_kutzbach} in space")
+        if self.gruebler_kutzbach_planar is not None:
+            counts.append(f"{self.gruebler_kutzbach_planar} in the plane")
+        say("degrees of freedom", f"{self.degrees_of_freedom}" + (f" ({', '.join(counts)})" if counts else ""))
+        if self.instantaneous_freedoms != self.degrees_of_freedom:
+            say("at this configuration", str(self.instantaneous_freedoms))
+        if self.nonholonomic:
+            say("of the configuration", str(self.configuration_freedoms))
+        say("independent", _list(self.independent) or "none")
+        if self.dependent:
+            say("dependent", f"{_list(self.dependent)} (conditioning {self.conditioning:.2g})")
+        if len(self.candidates) > len(self.independent):
+            say("can be independent", _list([f"{name} {value:.2g}" for name, value in self.candidates.items()]))
+        if self.loop_joints and not self.assumed:
+            say("assembled", self._assembled())
+            if self.other_branches:
+                there = " or ".join(dict.fromkeys(_values(other) for other in self.other_branches))
+                say("", f"as near is a branch with {there}; a guess of {next(iter(self.other_branches[0]))} chooses")
+        if self.assumed:
+            lines.append("  some parameters have no value; random values were used to find the rank")
+        lines += [f"  note: {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def _assembled(self) -> str:
+        """On which branch the loops are closed."""
+        if self.guessed:
+            name, (guess, value) = next(iter(self.guessed.items()))
+            found = f"{name} = {value:.6g}, guessed {guess:.6g}"
+            if self.guess_distance > BESIDE:
+                return f"on the branch nearest to the guess, which is rough, off by {self.guess_distance:.2g}: {found}"
+            exact = self.guess_distance <= MEASURED
+            return "at the guess" if exact else f"on the branch nearest to the guess ({found})"
+        if self.assembly_restarts:
+            tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
+            return f"after {tries}: one of several ways to close the loops; give a guess to choose one"
+        return "from the initial values, and from 0 where there are none"
+
+    def _repr_html_(self) -> str:
+        text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
+        return side_by_side(picture_html(lambda: new_figure(self)), text) if self.bodies else text
+
+
+def _values(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+
+
+def _list(names: list[str], limit: int = 12) -> str:
+    if len(names) <= limit:
+        return ", ".join(names)
+    return ", ".join(names[: limit - 2]) + f", ... ({len(names) - limit + 2} more)"
+
+
+def _list_joints(joints: list[dict[str, Any]], limit: int = 12) -> str:
+    """Each with its type, or many of them by type."""
+    if len(joints) <= limit:
+        return ", ".join(f"{j['name']} ({j['type']})" for j in joints)
+    types = Counter(j["type"] for j in joints)
+    return ", ".join(f"{count} {kind}" for kind, count in types.most_common())
+
+
+def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
+    """Describe a mechanism and what its numbers say."""
+    m, c = kinematics.mechanism, kinematics.constraints
+    names = ["ground", *(b.name for b in m.bodies)]
+    spatial = planar = None
+    if not m.bare:
+        freedoms = [j.joint.allows for j in m.joints]
+        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
+        if plane_axis(kinematics) is not None and all(j.joint.role != "loop" for j in m.joints):
+            planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
+            planar -= sum(label in c.labels for label in kinematics.coupled)
+    return MechanismReport(
+        name=m.name,
+        bodies=names[1:],
+        joints=[
+            {
+                "name": j.name,
+                "type": j.joint.type_name,
+                "between": [j.predecessor.label, j.successor.label],
+                "coordinates": list(j.coordinates),
+                "bodies": [names[j.predecessor.body + 1], names[j.successor.body + 1]],
+            }
+            for j in m.joints
+        ],
+        tree=[
+            {"body": names[b.body + 1], "parent": names[b.parent + 1], "joint": m.joints[b.joint].name}
+            for b in kinematics.topology.branches
+        ],
+        loop_joints=[m.joints[k].name for k in kinematics.topology.cut],
+        coordinates=list(kinematics.names),
+        loop_coordinates=list(kinematics.loop_coordinates.names),
+        independent=list(mobility.independent),
+        dependent=list(mobility.dependent),
+        constraints=len(c.labels),
+        nonholonomic=c.nonholonomic,
+        constraints_declared=c.declared,
+        rank=mobility.rank,
+        ranks=list(mobility.ranks),
+        degrees_of_freedom=mobility.n_dof,
+        configuration_freedoms=mobility.n_positions,
+        instantaneous_freedoms=mobility.instantaneous,
+        gruebler_kutzbach=spatial,
+        gruebler_kutzbach_planar=planar,
+        redundant=list(mobility.redundant),
+        conditioning=mobility.conditioning,
+        candidates=dict(mobility.candidates),
+        notes=find_notes(kinematics, mobility),
+        length_scale=mobility.length_scale,
+        reference=dict(zip(kinematics.names, mobility.q_reference, strict=True)),
+        assembly_restarts=mobility.restarts,
+        assumed=mobility.assumed,
+        elements=[
+            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)]}
+            for e in m.constraints
+        ]
+        + [
+            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)], **TIMED}
+            for e in (s.constraint for s in m.switched)
+            if e is not None
+        ],
+        guessed={name: [guess, value] for name, guess, value in mobility.guessed},
+        guess_distance=mobility.guess_distance,
+        other_branches=[],
+    )
+
+
+def _touched(kinematics: Kinematics, element: object) -> list[int]:
+    """Bodies that a constraint element holds: those of its markers, and those that its coordinates move."""
+    m = kinematics.mechanism
+    found: set[int] = set()
+    moves = {n: (j.predecessor.body, j.successor.body) for j in m.joints for n in (*j.coordinates, *j.velocities)}
+
+    def visit(value: object) -> None:
+        if isinstance(value, Marker):
+            found.add(value.body)
+        elif isinstance(value, Expr):
+            for name in symbols_of([value]):
+                if name in moves:
+                    found.update(moves[name][1:])
+                elif name in m.quantities:
+                    seen = m.quantities[name]
+                    found.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
+        elif isinstance(value, tuple):
+            for item in value:
+                visit(item)
+        elif is_dataclass(value):
+            for item in fields(value):
+                visit(getattr(value, item.name))
+
+    visit(element)
+    return sorted(found)
+
+
+def plane_axis(kinematics: Kinematics) -> int | None:
+    """The ground axis about which every body turns and across which it moves, identically; else None."""
+    graph = kinematics.graph
+    turns, slides = [], []
+    for k in range(len(kinematics.mechanism.bodies)):
+        origin = Marker(k, Frame.identity(graph), "")
+        turns.append(kinematics.motion.angular_velocity(origin))
+        slides.append(kinematics.motion.velocity(origin))
+    for axis in range(3 if turns else 0):
+        others = [i for i in range(3) if i != axis]
+        if all(w[i].is_zero for w in turns for i in others) and all(v[axis].is_zero for v in slides):
+            return axis
+    return None

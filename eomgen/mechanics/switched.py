@@ -1,0 +1,134 @@
+"""Constraints that close and open: Switched -> their equations, and loads of multipliers for them.
+
+While closed, w = C'' + 2 b C' + b^2 C = 0 of an equation of positions, C' + b C of one of velocities, whose error dies
+away at the rate b (J. Baumgarte, Comput. Methods Appl. Mech. Eng. 1 (1972), 1-16).  The multiplier l acts as -C_q^T l.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..base.records import dataclass
+from ..elements.forces import CoordinateLoad, MarkerLoad
+from ..elements.forces.force import Force, Load, View, where
+from ..elements.frames import Frame, Marker
+from ..expr import vectors as vec
+from ..expr.core import Expr, reachable
+from ..expr.differentiate import jacobian
+from ..expr.rounding_bounds import vanishing
+from ..expr.vectors import Vec3
+from ..model.mechanism import Switched
+from .kinematics import ForceTerms, Kinematics
+from .loops import couple, differentiate_constraints, refuse_rows_of_time, refuse_unusable
+from .wrenches import JointWrenches, Row6
+
+#: Operations whose results are numbers whatever numbers they are given.
+FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}
+
+
+class SwitchedRow(NamedTuple):
+    """One equation of a constraint that closes and opens."""
+
+    label: str
+    state: str  #: 1 while it holds
+    jacobian: tuple[Expr, ...]  #: of C' by v
+    rate: Expr  #: C'
+    rest: Expr  #: w without the accelerations
+    multiplier: Expr
+    errors: tuple[Expr, Expr]  #: C, 0 for an equation of velocities, and C'; both 0 while it is open
+    kind: str  #: 'length' or 'angle'
+
+
+@dataclass(frozen=True)
+class HeldBy(Force):
+    """What a constraint exerts while it is closed."""
+
+    def loads(self, view: View) -> list[Load]:
+        return []
+
+
+def switched_rows(kinematics: Kinematics) -> tuple[list[SwitchedRow], list[ForceTerms]]:
+    """The equations of all constraints that close and open, and the loads of their multipliers."""
+    rows, loads = list[SwitchedRow](), list[ForceTerms]()
+    for switch in kinematics.mechanism.switched:
+        own, terms = _of_one(kinematics, switch)
+        rows += own
+        loads.append(terms)
+    return rows, loads
+
+
+def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow], ForceTerms]:
+    graph, motion = kinematics.graph, kinematics.motion
+    assert switch.constraint is not None
+    mechanism = replace(kinematics.mechanism, constraints=(switch.constraint,))
+    coupled = couple(mechanism, motion).rows
+    refuse_unusable(mechanism, motion, coupled)
+    found = differentiate_constraints(graph, coupled, [], motion.state, kinematics.length_scale)
+    refuse_rows_of_time(mechanism, found, for_a_time=True)
+    apart = replace(kinematics, mechanism=mechanism, constraints=found, coupled=found.labels)
+    on_bodies = JointWrenches(apart).element_rows()
+    rate = kinematics.resolve([switch.stabilisation])[0]
+    rows, along = [], dict[str, Expr]()
+    markers: list[MarkerLoad] = []
+    for i, label in enumerate(found.labels):
+        multiplier = graph.symbol(f"held[{label}]")
+        J, speed = found.jacobian[i], found.velocity[i]
+        if i < len(found.values):
+            rest = found.gamma[i] + 2.0 * rate * speed + rate * rate * found.values[i]
+        else:
+            rest = found.gamma[i] + rate * speed
+        row = [_while_closed(switch, x) for x in (*J, speed, rest)]
+        value = found.values[i] if i < len(found.values) else graph.zero
+        errors = (_closed_or_0(switch, value), _closed_or_0(switch, speed))
+        own = (label, switch.state, tuple(row[:-2]), row[-2], row[-1], multiplier, errors, found.kinds[i])
+        rows.append(SwitchedRow(*own))
+        for body, D in on_bodies[label].items():
+            markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))
+        for name, part in zip(kinematics.velocity_labels, _left(kinematics, J, on_bodies[label]), strict=True):
+            if not part.is_zero:
+                along[name] = along.get(name, graph.zero) - _while_closed(switch, part) * multiplier
+    loads = [CoordinateLoad(name, value) for name, value in along.items()]
+    force = HeldBy(switch.constraint.name)
+    return rows, ForceTerms(force, tuple(markers), tuple(loads), None, tuple(markers), tuple(loads))
+
+
+def _while_closed(switch: Switched, x: Expr) -> Expr:
+    """x, or 0 while the constraint is open and x may be no number: a disc that lies flat, far from its plane."""
+    if {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= FINITE:
+        return x
+    return _closed_or_0(switch, x)
+
+
+def _closed_or_0(switch: Switched, x: Expr) -> Expr:
+    return where(x.graph.apply("lt", 0.5, x.graph.symbol(switch.state)), x, 0.0)
+
+
+def _origin(kinematics: Kinematics, body: int) -> Marker:
+    graph = kinematics.graph
+    return Marker(body, Frame.identity(graph), kinematics.mechanism.bodies[body].name)
+
+
+def _load(kinematics: Kinematics, body: int, D: Row6, multiplier: Expr) -> MarkerLoad:
+    """The wrench -l D on a body, about its origin."""
+    x = [-(d * multiplier) for d in D]
+    return MarkerLoad(_origin(kinematics, body), (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+
+
+def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6]) -> list[Expr]:
+    """What of a row acts along coordinates of the tree, beyond the wrenches on bodies."""
+    if not on_bodies:
+        return list(J)
+    graph, total = kinematics.graph, list(J)
+    for body, D in on_bodies.items():
+        marker = _origin(kinematics, body)
+        v, w = kinematics.motion.velocity(marker), kinematics.motion.angular_velocity(marker)
+        slopes = jacobian([*v, *w], list(kinematics.v))
+        for j in range(len(total)):
+            column = [slopes.get((k, j), graph.zero) for k in range(6)]
+            first: Vec3 = (column[0], column[1], column[2])
+            second: Vec3 = (column[3], column[4], column[5])
+            work = vec.dot((D[0], D[1], D[2]), first) + vec.dot((D[3], D[4], D[5]), second)
+            total[j] = total[j] - work
+    return [graph.zero if vanishing([x])[0] else x for x in total]

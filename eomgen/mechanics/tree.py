@@ -1,0 +1,553 @@
+"""Topology -> links, the bodies of the tree with their placement, inertia and twist recursion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.limits.numbers import PLANE, ROUNDED
+from ..base.records import dataclass
+from ..elements.frames import GROUND, Frame, Marker
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
+from ..expr.differentiate import gradient
+from ..expr.evaluate import compile_evaluator
+from ..expr.rounding_bounds import settled_rotation, settled_vector, size_of
+from ..expr.spatial import Twist, Wrench
+from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
+from ..expr.vectors import Mat3, Vec3
+from ..model.mechanism import Body, Mechanism
+from .topology import Branch, Topology
+
+# -- angle sums --------------------------------------------------------------------------------------------------------
+
+
+Turns = tuple[Expr, list[tuple[int, float]]]  #: an angle, and the coordinates in it with their factors
+TRIALS = 3  #: random points at which an identity is tried
+
+
+def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
+    """The angle about z of a rotation that is about z at every q, else None.
+
+    Whether it is, is tried at random values of all symbols: an identity that holds there holds everywhere.
+
+    Returns
+    -------
+    angle : Expr
+        A constant plus coordinates with factors 1 and -1; equal to ``atan2(R_10, R_00)`` up to full turns.
+    terms : list of (index into q, factor)
+    """
+    angle = atan2(rotation[1][0], rotation[0][0])
+    places = {x.id: j for j, x in enumerate(q)}
+    held = (graph.symbol(name).id for name in symbols_of([angle]))
+    turning = sorted(places[i] for i in held if i in places)
+    slopes = gradient(angle, [q[j] for j in turning])
+    tried = [rotation[2][2], *slopes]
+    names = sorted(symbols_of(tried))
+    evaluate = compile_evaluator(tried, names)
+    random = np.random.default_rng(7)
+    found = []
+    for _ in range(TRIALS):
+        with np.errstate(all="ignore"):
+            found.append(np.array(evaluate(random.uniform(0.2, 1.4, len(names))), dtype=float))
+    steps = np.round(found[0][1:])
+    if any(not abs(x[0] - 1.0) < PLANE or not (np.abs(x[1:] - steps) < PLANE).all() for x in found):
+        return None
+    terms = [(j, float(step)) for j, step in zip(turning, steps, strict=True) if step]
+    start = substitute([angle], {q[j]: graph.zero for j in turning})[0]
+    for j, factor in terms:
+        start = start + factor * q[j]
+    return start, terms
+
+
+# -- link inertia ------------------------------------------------------------------------------------------------------
+
+# Written so that few operations are left: a turn about a coordinate axis touches only what it changes.
+
+
+@dataclass(frozen=True)
+class SpatialInertia:
+    """Mass, first moment m c and inertia about the link's origin, in link axes (Featherstone, RBDA, eq. 2.62)."""
+
+    mass: Expr
+    moment: Vec3
+    inertia: Mat3
+
+    def times(self, angular: Vec3, linear: Vec3) -> Wrench:
+        """(moment about the origin, force) of a twist or spatial acceleration: Featherstone, RBDA, eq. 2.63."""
+        turn = vec.add(vec.times(self.inertia, angular), vec.cross(self.moment, linear))
+        push = vec.sub(vec.scale(self.mass, linear), vec.cross(self.moment, angular))
+        return turn, push
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether all ten entries vanish identically."""
+        return all(x.is_zero for x in (self.mass, *self.moment, *(x for row in self.inertia for x in row)))
+
+    def plus(self, other: SpatialInertia) -> SpatialInertia:
+        """Both in one link."""
+        return SpatialInertia(
+            self.mass + other.mass,
+            vec.add(self.moment, other.moment),
+            symmetric(add_matrices(self.inertia, other.inertia)),
+        )
+
+    def turned(self, rotation: Mat3) -> SpatialInertia:
+        """In the axes that ``rotation`` takes its axes to."""
+        return SpatialInertia(self.mass, vec.times(rotation, self.moment), rotate_symmetric(rotation, self.inertia))
+
+    def shifted(self, p: Vec3) -> SpatialInertia:
+        """About the point that sees its origin at p (Featherstone, RBDA, eq. 2.66)."""
+        h, inertia = self.moment, self.inertia
+        moved = vec.add(h, vec.scale(self.mass, p))
+        both = vec.add(h, moved)
+        x, y, z = (p[k] * both[k] for k in range(3))  # 2 (p . h) 1 + m p^2 1, and less p h^T + h p^T + m p p^T
+        diagonal = (inertia[0][0] + (y + z), inertia[1][1] + (x + z), inertia[2][2] + (x + y))
+        xy, xz, yz = (inertia[i][j] - (p[i] * moved[j] + h[i] * p[j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+        rows = ((diagonal[0], xy, xz), (xy, diagonal[1], yz), (xz, yz, diagonal[2]))
+        return SpatialInertia(self.mass, moved, rows)
+
+
+def no_inertia(graph: Graph) -> SpatialInertia:
+    """That of nothing."""
+    o = vec.zero(graph)
+    return SpatialInertia(graph.zero, o, (o, o, o))
+
+
+def body_inertia(body: Body, frame: Frame) -> SpatialInertia:
+    """The spatial inertia of a body in its link frame.
+
+    First moment and inertia about the body's origin are taken as they are where the body has them, so that their
+    symbols stay the parameters of the equations.
+    """
+    back = vec.transpose(frame.rotation)
+    if body.moment is not None and body.inertia_origin is not None:
+        about_body = SpatialInertia(body.mass, body.moment, symmetric(body.inertia_origin))
+        return about_body.shifted(vec.neg(frame.position)).turned(back)
+    inertia = settled_matrix(rotate_symmetric(back, symmetric(body.inertia)), body.inertia)
+    return SpatialInertia(body.mass, vec.zero(body.mass.graph), inertia).shifted(place_point(frame, body.com))
+
+
+def place_point(frame: Frame, point: Vec3) -> Vec3:
+    """A point of a body, in the frame: numbers that cancel are exactly 0."""
+    moved = vec.transpose_times(frame.rotation, vec.sub(point, frame.position))
+    return settled_vector(moved, size_of(point, frame.position))
+
+
+def settled_matrix(turned: Mat3, before: Mat3) -> Mat3:
+    """A matrix that was turned, its constant entries exactly 0 where they are rounding of those before."""
+    size = max(size_of(row) for row in before)
+    return (settled_vector(turned[0], size), settled_vector(turned[1], size), settled_vector(turned[2], size))
+
+
+# -- axis turns --------------------------------------------------------------------------------------------------------
+
+# What a joint lets free about and along its z axis alone does not change if both of its markers turn about z by the
+# same angle. Along which direction x then lies is chosen for the link: along an arm, a hinge's axis or an axis of the
+# parent. Without that, mechanisms that lie obliquely in ground carry three components where straight ones carry two.
+
+
+#: What an entry costs that is neither 0, nor 1 in its own place, also one of a centre of mass, which enters no equation
+#: of loops; an exchange of axes is nearly free.
+MULTIPLIED, OF_CENTRE, EXCHANGED = 1.0, 0.5, 0.1
+
+
+class _Seen(NamedTuple):
+    """What becomes shorter in good axes: arms to joints as parts of their size, and axes of joints."""
+
+    lengths: list[np.ndarray]
+    centres: list[np.ndarray]  #: as lengths, to centres of mass
+    axes: list[np.ndarray]
+
+
+class AxisTurns:
+    """The turns of a mechanism's joints, from ground outwards.
+
+    Only links beyond an axis that is oblique in its parent's link frame are turned, those whose constants are numbers.
+    Nothing is turned where no joint closes a loop.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    topology : Topology
+    symbols : mapping of str to Expr
+        The coordinates of the tree by name.
+    """
+
+    def __init__(self, mechanism: Mechanism, topology: Topology, symbols: Mapping[str, Expr]) -> None:
+        self.mechanism, self.topology, self.symbols = mechanism, topology, symbols
+        self._open: set[int] = set()  # bodies beyond an oblique axis
+
+    def turned(self, branch: Branch, holder: Mat3, inner: Frame) -> Mat3 | None:
+        """The rotation about z by which both markers of a joint turn; None for none.
+
+        Parameters
+        ----------
+        branch : Branch
+            The joint in the tree.
+        holder : Mat3
+            Its marker on the parent, in the parent's link frame.
+        inner : Frame
+            Its marker on the body.
+        """
+        if not self.topology.cut:
+            return None
+        H, F = numbers(holder), numbers(inner.rotation)
+        if H is None or F is None or not self._symmetric(branch):
+            return None
+        if branch.parent not in self._open and np.count_nonzero(np.abs(H[:, 2]) > ROUNDED) < 2:
+            return None
+        self._open.add(branch.body)
+        seen = _Seen([], [], [])
+        self._look(branch, np.eye(3), seen)
+        angles = {0.0}
+        for x, y in (tuple(v[:2].tolist()) for v in (*seen.lengths, *seen.centres, *seen.axes, *H)):
+            if math.hypot(x, y) > ROUNDED:
+                angles |= {math.remainder(math.atan2(y, x) + k * math.pi / 2, 2 * math.pi) for k in range(4)}
+        costs = {a: _cost(a, H, seen) for a in angles}
+        best = min(angles, key=lambda a: (round(costs[a], 3), abs(a)))
+        if costs[0.0] - costs[best] < MULTIPLIED / 2:
+            return None
+        graph = self.mechanism.graph
+        c, s = graph.constant(math.cos(best)), graph.constant(math.sin(best))
+        return ((c, -s, graph.zero), (s, c, graph.zero), (graph.zero, graph.zero, graph.one))
+
+    def _look(self, branch: Branch, axes: np.ndarray, seen: _Seen) -> None:
+        """Note the arms and axes of a link, and those of links on hinges parallel to its own, in common axes."""
+        _, inner = self._ends(branch)
+        F, p = numbers(inner.frame.rotation), numbers([inner.frame.position])
+        if F is None or p is None:
+            return
+        points = [(seen.centres, self.mechanism.bodies[branch.body].com)]
+        for marker in self._others[branch.body]:
+            if marker is not inner:
+                points.append((seen.lengths, marker.frame.position))
+                if (R := numbers(marker.frame.rotation)) is not None:
+                    seen.axes.append(axes @ F.T @ R[:, 2])
+        for arms, point in points:
+            if (x := numbers([point])) is not None and (size := np.abs(x).max() + np.abs(p).max()):
+                arm = axes @ F.T @ (x - p)[0]
+                arms.append(np.where(np.abs(arm) <= ROUNDED * size, 0.0, arm / size))
+        for child in self._children.get(branch.body, ()):
+            outer, _ = self._ends(child)
+            R = numbers(outer.frame.rotation)
+            if R is not None and abs((F.T @ R)[2, 2] - 1.0) <= ROUNDED and self._symmetric(child):
+                self._look(child, axes @ F.T @ R, seen)
+
+    def _ends(self, branch: Branch) -> tuple[Marker, Marker]:
+        spec = self.mechanism.joints[branch.joint]
+        ends = (spec.predecessor, spec.successor)
+        return (ends[1], ends[0]) if branch.reversed else ends
+
+    def _symmetric(self, branch: Branch) -> bool:
+        """Whether a joint turns and slides about and along z alone, so that it looks the same from all around z."""
+        spec = self.mechanism.joints[branch.joint]
+        q = [self.symbols[name] for name in spec.coordinates]
+        (rotation, position), columns = (
+            spec.joint.pose(self.mechanism.graph, q),
+            spec.joint.subspace(self.mechanism.graph, q),
+        )
+        others = [*position[:2], *(x for column in columns for part in column for x in part[:2])]
+        c, s = rotation[0][0], rotation[1][0]
+        return all(x.is_zero for x in others) and about_z(rotation) and rotation[1][1] == c and rotation[0][1] == -s
+
+    @cached_property
+    def _others(self) -> dict[int, list[Marker]]:
+        """The markers of joints on each body."""
+        found: dict[int, list[Marker]] = {}
+        for spec in self.mechanism.joints:
+            for marker in (spec.predecessor, spec.successor):
+                found.setdefault(marker.body, []).append(marker)
+        return found
+
+    @cached_property
+    def _children(self) -> dict[int, list[Branch]]:
+        found: dict[int, list[Branch]] = {}
+        for branch in self.topology.branches:
+            found.setdefault(branch.parent, []).append(branch)
+        return found
+
+
+def turn_frame(frame: Frame, turn: Mat3) -> Frame:
+    """The frame turned in itself."""
+    return Frame(vec.product(frame.rotation, turn), frame.position)
+
+
+def about_z(rotation: Mat3) -> bool:
+    """Whether a rotation leaves the z axis alone."""
+    others = (rotation[0][2], rotation[1][2], rotation[2][0], rotation[2][1])
+    return rotation[2][2].value == 1.0 and all(x.is_zero for x in others)
+
+
+def numbers(rows: Sequence[Sequence[Expr]]) -> np.ndarray | None:
+    """Constant entries; None if one is not."""
+    values = [[x.value for x in row] for row in rows]
+    return None if any(x is None for row in values for x in row) else np.array(values, dtype=float)
+
+
+def _cost(angle: float, H: np.ndarray, seen: _Seen) -> float:
+    """How many constants stay that are multiplied with."""
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    cost = 0.0
+    for weight, arms in ((MULTIPLIED, seen.lengths), (OF_CENTRE, seen.centres)):
+        cost += weight * sum(np.count_nonzero(np.abs(turn.T @ x) > ROUNDED) for x in arms)
+    for i, row in enumerate(H @ turn):
+        for j, x in enumerate(row):
+            cost += _entry(x, i == j)
+    for x in seen.axes:
+        cost += sum(_entry(y, i == 2) for i, y in enumerate(turn.T @ x))
+    return cost
+
+
+def _entry(x: float, own: bool) -> float:
+    if abs(x) <= ROUNDED:
+        return 0.0
+    if abs(abs(x) - 1.0) <= ROUNDED:
+        return 0.0 if own and x > 0 else EXCHANGED
+    return MULTIPLIED
+
+
+# -- the tree ----------------------------------------------------------------------------------------------------------
+
+# Each body is described in its *link frame*: the marker by which its tree joint holds it.  Twists are (angular, linear)
+# in link axes at the link's origin (Featherstone, RBDA, ch. 2, with body coordinates).
+
+
+@dataclass(frozen=True)
+class Link:
+    """One body of the tree.
+
+    A vector in parent link axes goes to link axes by ``joint_rotation^T turn^T``; the link's origin is at ``position``
+    in parent link axes.  ``columns`` is the motion subspace in link axes, for coordinates ``first`` onwards.
+    """
+
+    name: str
+    body: int
+    parent: int  #: index of the parent link, GROUND for none
+    first: int
+    turn: Mat3  #: rotation of the joint's marker on the parent, constant
+    holder: Vec3  #: its place in parent link axes, constant
+    slide: Vec3  #: how far the joint has moved from there, along the marker's axes
+    joint_rotation: Mat3
+    position: Vec3
+    columns: tuple[Twist, ...]
+    mass: Expr
+    com: Vec3  #: centre of mass, link axes
+    inertia: Mat3  #: about the centre of mass, link axes
+    spatial: SpatialInertia  #: about the link's origin, link axes
+    frame: Frame  #: the link frame in the body
+
+    def down(self, x: Vec3) -> Vec3:
+        """Parent link axes to link axes."""
+        return vec.transpose_times(self.joint_rotation, vec.transpose_times(self.turn, x))
+
+    def up(self, x: Vec3) -> Vec3:
+        """Link axes to parent link axes."""
+        return vec.times(self.turn, vec.times(self.joint_rotation, x))
+
+    def up_inertia(self, inertia: SpatialInertia) -> SpatialInertia:
+        """Inertia of the link, about the parent's origin in parent link axes."""
+        return inertia.turned(self.joint_rotation).turned(self.turn).shifted(self.position)
+
+    def down_twist(self, twist: Twist) -> Twist:
+        """A twist of the parent, seen in this link's frame."""
+        angular, linear = twist
+        return self.down(angular), self.down(vec.add(linear, vec.cross(angular, self.position)))
+
+    def lift(self, wrench: Wrench) -> Wrench:
+        """A wrench on the link, about the parent's origin in parent link axes."""
+        push = self.up(wrench[1])
+        return vec.add(self.up(wrench[0]), vec.cross(self.position, push)), push
+
+
+def place(frame: Frame, marker: Frame) -> Frame:
+    """A marker of the body, in the link frame ``frame`` of the same body.
+
+    However the body's own axes are turned and shifted, numbers that cancel are exactly 0, so that the equations of a
+    mechanism do not depend on how its bodies are described.
+    """
+    turn = vec.transpose(frame.rotation)
+    return Frame(settled_rotation(vec.product(turn, marker.rotation)), place_point(frame, marker.position))
+
+
+def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Expr]) -> tuple[Link, ...]:
+    """Links in tree order; ``symbols`` gives the Expr of each tree coordinate by name."""
+    graph = mechanism.graph
+    ground = Frame.identity(graph)
+    index = {GROUND: GROUND}
+    frames = {GROUND: ground}
+    links: list[Link] = []
+    turns = AxisTurns(mechanism, topology, symbols)
+    first = 0
+    for branch in graph.marked(topology.branches):
+        spec = mechanism.joints[branch.joint]
+        q = [symbols[name] for name in spec.coordinates]
+        rotation, position = spec.joint.pose(graph, q)
+        columns = spec.joint.subspace(graph, q)
+        outer, inner = spec.predecessor, spec.successor
+        if branch.reversed:
+            outer, inner = inner, outer
+            columns = [_reverse(rotation, position, column) for column in columns]
+            position = vec.neg(vec.transpose_times(rotation, position))
+            rotation = vec.transpose(rotation)
+        held, frame = outer.frame, inner.frame
+        holder = place(frames[branch.parent], held)
+        turn = turns.turned(branch, holder.rotation, frame)
+        if turn is not None:
+            held, frame = turn_frame(held, turn), turn_frame(frame, turn)
+            holder = place(frames[branch.parent], held)
+        body = mechanism.bodies[branch.body]
+        back = vec.transpose(frame.rotation)
+        links.append(
+            Link(
+                name=body.name,
+                body=branch.body,
+                parent=index[branch.parent],
+                first=first,
+                turn=holder.rotation,
+                holder=holder.position,
+                slide=position,
+                joint_rotation=rotation,
+                position=vec.add(holder.position, vec.times(holder.rotation, position)),
+                columns=tuple(columns),
+                mass=body.mass,
+                com=place_point(frame, body.com),
+                inertia=settled_matrix(vec.product(back, vec.product(body.inertia, frame.rotation)), body.inertia),
+                spatial=body_inertia(body, frame),
+                frame=frame,
+            )
+        )
+        index[branch.body] = len(links) - 1
+        frames[branch.body] = frame
+        first += len(columns)
+    return tuple(links)
+
+
+def _reverse(rotation: Mat3, position: Vec3, column: Twist) -> Twist:
+    """The twist of P relative to S, in P axes at P, from that of S relative to P, in S axes at S."""
+    angular, linear = (vec.times(rotation, x) for x in column)
+    return vec.neg(angular), vec.sub(vec.cross(angular, position), linear)
+
+
+def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> list[Twist]:
+    """Twists of all links: omega_i = R^T omega_p + sum s v (Featherstone, RBDA, eq. 4.9)."""
+    twists: list[Twist] = []
+    still = (vec.zero(graph), vec.zero(graph))
+    for link in graph.marked(links):
+        twist = link.down_twist(twists[link.parent] if link.parent != GROUND else still)
+        for k, (angular, linear) in enumerate(link.columns):
+            rate = v[link.first + k]
+            twist = (vec.add(twist[0], vec.scale(rate, angular)), vec.add(twist[1], vec.scale(rate, linear)))
+        twists.append(twist)
+    return twists
+
+
+class Poses:
+    """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
+
+    def __init__(self, mechanism: Mechanism, links: tuple[Link, ...]) -> None:
+        self.graph = mechanism.graph
+        self.links = links
+        self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
+        self._pass = self.graph.begin_pass()
+        self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
+        self._turns: dict[tuple[int, ...], Turns | None] = {}
+
+    def marker_in_link(self, marker: Marker) -> Frame:
+        """Constant placement of a marker in its link frame (in ground for a ground marker)."""
+        if marker.body == GROUND:
+            return marker.frame
+        return place(self.links[self.link_of[marker.body]].frame, marker.frame)
+
+    def ancestors(self, link: int) -> list[int]:
+        """The link, its parent, ..., GROUND."""
+        chain = [link]
+        while chain[-1] != GROUND:
+            chain.append(self.links[chain[-1]].parent)
+        return chain
+
+    def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""
+        if link == base:
+            own = Frame.identity(self.graph)
+            return own if within is None else place(within, own)
+        key = (link, base, None if within is None else (within.rotation, within.position))
+        if key not in self._known:
+            missing = [link]
+            while (above := self.links[missing[-1]].parent) != base and (above, *key[1:]) not in self._known:
+                missing.append(above)
+            for k in reversed(missing):  # from base outwards, so that no chain recurses deeply
+                self._known[k, base, key[2]] = self._step(k, base, within)
+        return self._known[key]
+
+    def _step(self, k: int, base: int, within: Frame | None) -> Frame:
+        self.graph.mark(self._pass)
+        link = self.links[k]
+        if link.parent != base:
+            parent = self.link(link.parent, base, within)
+            rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
+            return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+        if within is None:
+            return Frame(vec.product(link.turn, link.joint_rotation), link.position)
+        holder = place(within, Frame(link.turn, link.holder))
+        moved = vec.add(holder.position, vec.times(holder.rotation, link.slide))
+        return Frame(vec.product(holder.rotation, link.joint_rotation), moved)
+
+    def marker(self, marker: Marker, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a marker in link ``base``, an ancestor of its link, or in a constant frame ``within`` that."""
+        inner = self.marker_in_link(marker)
+        link = self.link_of[marker.body]
+        if link == base and within is not None:
+            return place(within, inner)
+        outer = self.link(link, base, within)
+        return Frame(
+            vec.product(outer.rotation, inner.rotation),
+            vec.add(outer.position, vec.times(outer.rotation, inner.position)),
+        )
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        outer, inner = self.pair(start, end)
+        back = vec.transpose(outer.rotation)
+        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
+
+    def turns(self, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
+        """What :func:`.tree.sum_of_turns` finds of a rotation, looked for once."""
+        key = tuple(x.id for row in rotation for x in row)
+        if key not in self._turns:
+            self._turns[key] = sum_of_turns(self.graph, rotation, q)
+        return self._turns[key]
+
+    def pair(self, start: Marker, end: Marker) -> tuple[Frame, Frame]:
+        """Placements of two markers in the frame of :meth:`between`."""
+        base, within = self.between(start, end)
+        return self.marker(start, base, within), self.marker(end, base, within)
+
+    def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
+        """The nearest link that carries both markers, and a frame in it: the joint with which one of the chains begins.
+
+        So the frames of ground and of bodies, which a description may choose as it likes, drop out of what is relative.
+        """
+        base = self.common(start, end)
+        within = self.marker_in_link(start)
+        for marker in (end, start):
+            chain = self.ancestors(self.link_of[marker.body])
+            if chain[0] != base:
+                link = self.links[chain[chain.index(base) - 1]]
+                within = Frame(link.turn, link.holder)
+                break
+        along = all(x.value in (0.0, 1.0, -1.0) for row in within.rotation for x in row)
+        if along:  # then the axes of the base are as simple, and labels of rows say what they mean
+            within = Frame(vec.identity(self.graph), within.position)
+        return base, within
+
+    def common(self, a: Marker, b: Marker) -> int:
+        """The nearest link that carries both markers."""
+        first = self.ancestors(self.link_of[a.body])
+        second = set(self.ancestors(self.link_of[b.body]))
+        return next(k for k in first if k in second)

@@ -1,0 +1,498 @@
+"""Bodies: mass, centre of mass and inertia, given in any of the ways there are, of solids, meshes and points -> Body.
+
+Ways that exclude each other are reported as faults; what is given adds up: the body's own mass, its solids, its points.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..base.algebra import Array
+from ..base.files import beside
+from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
+from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_scales, judge_bodies, longest_within
+from ..elements import kinds
+from ..elements.frames import GROUND, Frame
+from ..elements.kinds import DISPLAY, POINT, Vector
+from ..elements.solids import SOLIDS, MassProperties, combine, point
+from ..elements.solids.mesh import measure_mesh
+from ..errors import UsageError
+from ..expr import vectors as vec
+from ..expr.core import Expr, symbols_of
+from ..expr.evaluate import evaluate
+from ..expr.tensors import add_matrices, rotate_symmetric, shift_tensor
+from ..expr.vectors import Mat3, Vec3
+from .checks import check_keys, unknown_key
+from .description import DescribedEntry, items, place_of
+from .fields import BODY, SOLID, SOLID_KEYS, solid_fields
+from .mechanism import Body, BodyShape, JointSpec
+from .names import nearest
+from .placement import TURNS, rpy_rotation, turn_matrix
+from .requirements import Requirements
+from .values import Reader
+
+
+def check_bodies(
+    bodies: Sequence[Body], joints: Sequence[JointSpec], requirements: Requirements
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Note masses and inertias that no body can have, as far as the values of parameters tell.
+
+    Returns
+    -------
+    negative : tuple of str
+        Names of bodies with a negative mass or moment that are taken as they are.
+    notes : tuple of str
+        What of them is to be noted.
+    """
+    notes: list[str] = []
+    negative: dict[str, None] = {}
+    faults = requirements.faults
+    masses = [requirements.known([body.mass]) for body in bodies]
+    tensors = [requirements.known(_entries(body)) for body in bodies]
+    numbers = [_numbers_of(body, points) for body, points in zip(bodies, _points(bodies, joints), strict=True)]
+    values = [x for own in numbers for group in own for x in _known(requirements, group)]
+    flaws = judge_bodies(values, [_described(*one, True) for one in zip(bodies, numbers, strict=True)])
+    scales = inertia_scales(
+        [0.0 if mass is None else mass[0] for mass in masses],
+        [np.zeros((3, 3)) if tensor is None else tensor.reshape(3, 3) for tensor in tensors],
+        longest_within(_known_points(requirements, points) for points in _points(bodies, joints)),
+    )
+    for body, mass, tensor, scale in zip(bodies, masses, tensors, scales, strict=True):
+        path = f"bodies.{body.name}"
+        found: list[tuple[str, str, str]] = []
+        remedy = f"give a mass of 0 or more, {SWITCH}"
+        if mass is not None and mass[0] < 0:
+            how = "" if body.mass.value is not None else " at the declared values"
+            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", remedy))
+        elif body.check == "error":
+            requirements.inside(f"{path}.mass", body.mass, NOT_NEGATIVE, remedy)
+        if not faults.under(f"{path}.inertia"):
+            if not is_symmetric(body.inertia, None if tensor is None else tensor.tolist(), COMPUTED * scale):
+                found.append((f"{path}.inertia", *ASYMMETRIC))
+            else:
+                found += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
+        for place, message, told in found:
+            if body.check == "error":
+                faults.add(place, message, told, "EG-INERTIA")
+            else:
+                if told not in (EXCESS, ASYMMETRIC[1]):
+                    negative[body.name] = None
+                if body.check == "note":
+                    notes.append(f"{place}: {message}; it is used as given")
+    if any(symbols_of(_entries(body)) for body in bodies if body.check == "error"):
+        alike: dict[Any, tuple[Body, list[Sequence[Expr]]]] = {}  # of bodies that are alike the first stands for all
+        for body, own in zip(bodies, numbers, strict=True):
+            alike.setdefault((body.check, *(tuple(x.id for x in group) for group in own)), (body, own))
+        data = [_described(body, own, body.check == "error") for body, own in alike.values()]
+        requirements.keep("bodies", BODIES, [x for _, own in alike.values() for g in own for x in g], (data,))
+    return tuple(negative), tuple(notes)
+
+
+def _numbers_of(body: Body, points: Sequence[Vec3]) -> list[Sequence[Expr]]:
+    """Mass, tensor, axis of the one moment that was given, and points: what judges bodies, in this order."""
+    return [[body.mass], _entries(body), () if body.plane is None else body.plane, *points]
+
+
+def _described(body: Body, numbers: Sequence[Sequence[Expr]], judged: bool) -> tuple[str, bool, int, bool]:
+    """What :func:`~..base.value_rules.judge_bodies` takes beside the numbers."""
+    return body.name, body.plane is not None, len(numbers) - 3, judged
+
+
+def _known(requirements: Requirements, group: Sequence[Expr]) -> list[float]:
+    found = requirements.known(group)
+    return [math.nan] * len(group) if found is None else found.tolist()
+
+
+def _entries(body: Body) -> list[Expr]:
+    return [entry for row in body.inertia for entry in row]
+
+
+def _points(bodies: Sequence[Body], joints: Sequence[JointSpec]) -> list[list[Vec3]]:
+    """Centre of mass, joints and the point of the inertia of each body; the centre of no mass does not count."""
+    points: list[list[Vec3]] = [[] if body.mass.is_zero else [body.com] for body in bodies]
+    for own, body in zip(points, bodies, strict=True):
+        own += [] if body.about is None else [body.about]
+    for spec in joints:
+        for marker in (spec.predecessor, spec.successor):
+            if marker.body != GROUND:
+                points[marker.body].append(marker.frame.position)
+    return points
+
+
+def _known_points(requirements: Requirements, points: Sequence[Vec3]) -> list[Array]:
+    found = [requirements.known(point) for point in points]
+    return [point for point in found if point is not None]
+
+
+ASYMMETRIC = ("the tensor is not symmetric", "entries [i][j] and [j][i] must be equal")
+
+
+def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed: float = 0.0) -> bool:
+    """Whether a tensor equals its mirror image: at its values if they are known, else wherever one looks.
+
+    ``computed`` is what rounding may leave of its entries (kg m^2).
+    """
+    pairs = [(inertia[i][j], inertia[j][i]) for i, j in ((0, 1), (0, 2), (1, 2))]
+    if all(a == b for a, b in pairs):
+        return True
+    if tensor is not None:
+        full = np.reshape(tensor, (3, 3))
+        atol = max(TENSOR_TERMS * float(np.max(np.abs(full), initial=0.0)), computed)
+        return bool(np.allclose(full, full.T, rtol=TENSOR, atol=atol))
+    # written differently above and below the diagonal: equal if they agree wherever one looks
+    flat = [x for pair in pairs for x in pair]
+    names = sorted(symbols_of(flat))
+    for seed in (1, 2, 3):
+        draws = np.random.default_rng(seed).uniform(0.5, 1.5, len(names))
+        result = np.asarray(evaluate(flat, dict(zip(names, draws.tolist(), strict=True))), dtype=float)
+        if not np.allclose(result[::2], result[1::2], rtol=TENSOR, atol=TENSOR_TERMS):
+            return False
+    return True
+
+
+def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
+    """Mass properties of the solids and points of a body; those with faults are left out."""
+    parts: list[MassProperties] = []
+    for key, read in (("solids", _solid), ("points", _point)):
+        if key not in values:
+            continue
+        listed = items(values[key])
+        if listed is None:
+            reader.wrong(f"{path}.{key}", values[key], BODY[key])
+            continue
+        for k, given in enumerate(listed):
+            place = f"{path}.{key}[{k}]"
+            if not isinstance(given, Mapping):
+                reader.wrong(place, given, kinds.Table)
+                continue
+            part = read(reader, place, given)
+            if part is not None:
+                parts.append(part)
+    return parts
+
+
+def _point(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
+    check_keys(path, values, POINT, reader.faults)
+    if "mass" not in values:
+        return None
+    at = reader.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(reader.graph)
+    return point(reader.graph, reader.expression(f"{path}.mass", values["mass"]), at)
+
+
+def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
+    faults, graph = reader.faults, reader.graph
+    kind = values.get("type")
+    if not isinstance(kind, str) or kind not in SOLID:
+        if kind is None:
+            faults.missing(f"{path}.type", f"give one of {', '.join(SOLID)}")
+        else:
+            faults.add(f"{path}.type", f"no solid of type {kind!r}", nearest(str(kind), SOLID, "types"), "EG-CHOICE")
+        return None
+    fields = solid_fields(kind)
+    for key in values:
+        if key not in fields:
+            message = f"a {kind} has no {key!r}" if key in SOLID_KEYS else "unknown key"
+            faults.add(f"{path}.{key}", message, unknown_key(key, fields), "EG-NAME-UNKNOWN")
+    for key, field in fields.items():
+        if field.required and key not in values:
+            faults.missing(f"{path}.{key}", f"give {field.says}: {field.doc}")
+    density = "line_density" if "line_density" in fields else "density"
+    if ("mass" in values) == (density in values):
+        wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
+        faults.add(path, wrong, "give one of them", "EG-CONFLICT")
+    given = {
+        key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values
+    }
+    frame = reader.frame(path, values)
+    if "axis" in values:
+        columns = reader.axis(f"{path}.axis", values["axis"])
+        if columns != TURNS["z"]:
+            frame = Frame(vec.product(frame.rotation, turn_matrix(graph, columns)), frame.position)
+    subtract = reader.flag(f"{path}.subtract", values["subtract"]) if "subtract" in values else False
+    own = _mesh(reader, path, values, given.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
+    if own is None or faults.under(path):
+        return None
+    mass = given["mass"] if "mass" in given else given[density] * own.mass
+    if subtract:
+        mass = -mass
+    tensor = rotate_symmetric(frame.rotation, own.inertia)
+    x, y, z = (vec.scale(mass, row) for row in tensor)
+    com = vec.add(frame.position, vec.times(frame.rotation, own.com))
+    return MassProperties(mass, com, (x, y, z))
+
+
+def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> MassProperties | None:
+    """What a solid has at density 1, its inertia for each kg, in its own axes."""
+    solid, graph = SOLIDS[kind], reader.graph
+    lengths: dict[str, tuple[Expr, Expr, Expr]] = {}
+    for key, dimension in solid.dimensions.items():
+        if key not in values:
+            return None
+        place = f"{path}.{key}"
+        if isinstance(dimension, Vector):
+            lengths[key] = reader.vector(place, values[key])
+        else:
+            lengths[key] = (reader.expression(place, values[key]),) * 3
+        for x in dict.fromkeys(lengths[key]):
+            told = f"{values[key]!r} is negative".replace("{", "{{").replace("}", "}}")
+            reader.requirements.inside(place, x, NOT_NEGATIVE, "a length must be 0 or positive", told)
+    if "inner_radius" in lengths and "outer_radius" in lengths:
+        inner, outer = (lengths[key][0] for key in ("inner_radius", "outer_radius"))
+        message, remedy = "{:g} exceeds the outer radius {:g}", "give a smaller inner radius"
+        reader.requirements.in_order(f"{path}.inner_radius", inner, outer, message, remedy)
+    made, o = solid(lengths), graph.zero
+    a, b, c = made.gyration()
+    return MassProperties(made.content(), made.centre(), ((a, o, o), (o, b, o), (o, o, c)))
+
+
+def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None) -> MassProperties | None:
+    """The same of the solid that a mesh bounds."""
+    if values.get("file") is None:
+        return None
+    place = f"{path}.file"
+    file = reader.file(place, values["file"])
+    if file is None:
+        return None
+    graph = reader.graph
+    if scale is not None:
+        size, need = f"{path}.scale", reader.requirements
+        remedy = "give a scale greater than 0; mirror the file itself"
+        mirrored, nothing = "{:g} is negative, which would mirror the mesh", "0 leaves nothing of the mesh"
+        if need.inside(size, scale, NOT_NEGATIVE, remedy, mirrored) or need.not_zero(size, scale, remedy, nothing):
+            return None
+    try:
+        found = measure_mesh(_locate(reader, file))
+    except UsageError as error:
+        needed = "a mesh must be a closed surface of triangles that face outwards"
+        reader.faults.add(place, str(error), needed * (error.code == "EG-FILE-DAMAGED"), error.code)
+        return None
+    one = graph.one if scale is None else scale
+    x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)
+    centre = vec.scale(one, vec.vector(graph, found.centre))
+    return MassProperties(found.volume * one * one * one, centre, (x, y, z))  # type: ignore[arg-type]
+
+
+def _locate(reader: Reader, file: str) -> str:
+    """The path of a file beside the model file, below its folder; from Python any path.
+
+    Raises
+    ------
+    UsageError
+        A model file names a file outside its own folder.
+    """
+    model = place_of("", reader.faults.lines)[0]
+    return beside(model, file) if model else file
+
+
+#: Sizes of the shapes of ``display``, in the order of a BodyShape's.
+SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}
+
+
+def read_body_shapes(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> list[BodyShape]:
+    """Shapes of one body, where its description has no faults; ``display`` comes first, as solids are for the mass."""
+    displayed = [
+        shape
+        for k, given in enumerate(items(values.get("display", ())) or ())
+        if (shape := _displayed(reader, f"{path}.display[{k}]", body, given)) is not None
+    ]
+    if displayed:
+        return displayed
+    return [
+        shape
+        for k, given in enumerate(items(values.get("solids", ())) or ())
+        if not given.get("subtract") and (shape := _solid_shape(reader, f"{path}.solids[{k}]", body, given)) is not None
+    ]
+
+
+def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str, ...]) -> tuple[Expr, ...]:
+    found: list[Expr] = []
+    for key in keys:
+        if items(values[key]) is not None:
+            found += reader.vector(f"{path}.{key}", values[key])
+        else:
+            found.append(reader.expression(f"{path}.{key}", values[key]))
+    return tuple(found)
+
+
+def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
+    kind, frame, color = str(values.get("shape")), reader.frame(path, values), str(values.get("color", ""))
+    if kind == "mesh":
+        scale = _sizes(reader, path, values, ("scale",)) if "scale" in values else (reader.graph.one,) * 3
+        return BodyShape(body, kind, scale, frame, str(values.get("file", "")), color)
+    keys = SIZES.get(kind, ())
+    if not keys or any(key not in values for key in keys):
+        return None
+    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame, color=color)
+
+
+def _solid_shape(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
+    kind, frame = str(values.get("type")), reader.frame(path, values)
+    if "axis" in values:
+        columns = reader.axis(f"{path}.axis", values["axis"])
+        if columns != TURNS["z"]:
+            frame = Frame(vec.product(frame.rotation, turn_matrix(reader.graph, columns)), frame.position)
+    if kind == "mesh":
+        scale = reader.expression(f"{path}.scale", values["scale"]) if "scale" in values else reader.graph.one
+        return BodyShape(body, kind, (scale,) * 3, frame, str(values.get("file", "")))
+    keys = tuple(key for key in SOLIDS[kind].dimensions if key != "inner_radius")
+    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame)
+
+
+_COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+def check_display(reader: Reader, path: str, given: Any) -> None:
+    """Note faults of the shapes of a body; the files they name are not looked for."""
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, kinds.Display)
+        return
+    for k, shape in enumerate(listed):
+        place = f"{path}[{k}]"
+        if not isinstance(shape, Mapping):
+            reader.wrong(place, shape, kinds.Display)
+            continue
+        check_keys(place, shape, DISPLAY, reader.faults)
+        for key, value in shape.items():
+            if key not in DISPLAY:
+                continue
+            found = DISPLAY[key].read(reader, f"{place}.{key}", value)
+            if key == "scale" and any(x.is_zero for x in found):
+                remedy = "give three numbers other than 0; negative ones mirror"
+                message = "a scale of 0 leaves nothing of the mesh"
+                reader.faults.add(f"{place}.{key}", message, remedy, "EG-RANGE")
+            if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
+                remedy = 'give six hexadecimal digits: "#1f77b4"'
+                reader.faults.add(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")
+
+
+#: Keys of which a body has one at most.
+EXCLUSIVE = (("inertia", "principal"), ("com", "first_moment"))
+OWN = ("mass", "com", "first_moment", "inertia", "principal")
+POINTS = ("com", "origin")  #: words for the point an inertia is about
+
+
+def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
+    """One body; ``check`` says what becomes of an impossible inertia unless the body says otherwise."""
+    path, values = entry.path, {k: v for k, v in entry.values.items() if v is not None}
+    graph, faults = reader.graph, reader.faults
+    for pair in EXCLUSIVE:
+        if all(key in values for key in pair):
+            faults.add(f"{path}.{pair[1]}", f"is given beside {pair[0]}", "give one of them", "EG-CONFLICT")
+    for key in ("about", "axes"):
+        if key in values and not ("inertia" in values or "principal" in values):
+            faults.add(f"{path}.{key}", "is given without an inertia", "give inertia or principal too", "EG-MISSING")
+    if "check_inertia" in values:
+        check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
+    parts = read_parts(reader, path, values)
+    own = [key for key in OWN if key in values]
+    if "solids" in values and own:
+        for key in own:
+            remedy = "leave it out, or add points"
+            faults.add(f"{path}.{key}", "is given beside solids, which already determine it", remedy, "EG-CONFLICT")
+    elif "mass" not in values and (own or not ("solids" in values or "points" in values or faults.under(path))):
+        faults.missing(f"{path}.mass", f"give {kinds.Scalar.says}, solids or points")
+    if "solids" in values or not own:
+        o = vec.zero(graph)
+        whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
+        return Body(entry.name, whole.mass, whole.com, whole.inertia, check=check)
+    return _own(reader, entry.name, path, values, parts, check)
+
+
+def _own(
+    reader: Reader, name: str, path: str, values: Mapping[str, Any], points: list[MassProperties], check: str
+) -> Body:
+    """A body with a mass, a centre of mass and an inertia of its own, and points."""
+    graph = reader.graph
+    o = vec.zero(graph)
+    mass = reader.expression(f"{path}.mass", values["mass"]) if "mass" in values else graph.zero
+    tensor, rotation = _tensor(reader, path, values)
+    about = values.get("about", "com")
+    point = _about(reader, path, about)
+    if point is not None and point[1] is not None:
+        if "axes" in values:
+            message = "is given beside a marker in about, which has axes already"
+            reader.faults.add(f"{path}.axes", message, "give about: [x, y, z]", "EG-CONFLICT")
+        rotation = point[1]
+    plane = _plane(tensor)
+    axis = None if plane is None else vec.transpose(rotation)[plane]
+    if rotation != reader.identity:  # which mirrors the upper triangle
+        if not is_symmetric(tensor):
+            reader.faults.add(f"{path}.inertia", *ASYMMETRIC, code="EG-INERTIA")
+        tensor = rotate_symmetric(rotation, tensor)
+    moment: Vec3 | None = None
+    if "first_moment" in values:
+        moment = reader.vector(f"{path}.first_moment", values["first_moment"])
+        if mass.is_zero and not all(x.is_zero for x in moment):
+            reader.faults.add(
+                f"{path}.first_moment",
+                "a body without mass has no first moment",
+                "give the body a mass",
+                "EG-NO-INERTIA",
+            )
+        com = o if mass.is_zero else (moment[0] / mass, moment[1] / mass, moment[2] / mass)
+    else:
+        com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o
+    at_origin: Mat3 | None = tensor if isinstance(about, str) and about == "origin" else None
+    about_point = None if point is None else point[0]
+    if point is not None:
+        negative = shift_tensor(-mass, vec.sub(com, point[0]))
+        tensor = add_matrices(tensor, negative)
+    for p in points if moment is not None or at_origin is not None else ():
+        moment = None if moment is None else vec.add(moment, vec.scale(p.mass, p.com))
+        at_origin = None if at_origin is None else add_matrices(at_origin, shift_tensor(p.mass, p.com))
+    whole = combine(graph, [MassProperties(mass, com, tensor), *points])
+    return Body(
+        name, whole.mass, whole.com, whole.inertia, moment, at_origin, check=check, plane=axis, about=about_point
+    )
+
+
+def _tensor(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[Mat3, Mat3]:
+    """The tensor as given, and the turn from its axes to body axes."""
+    key = "principal" if "principal" in values and "inertia" not in values else "inertia"
+    o = vec.zero(reader.graph)
+    tensor: Mat3 = (o, o, o)
+    if key in values:
+        given = values[key]
+        parts = items(given)
+        if key == "principal" and (parts is None or any(items(part) is not None for part in parts)):
+            reader.wrong(f"{path}.{key}", given, kinds.Vector)
+        else:
+            tensor = BODY["inertia"].read(reader, f"{path}.{key}", given)
+    if "axes" not in values:
+        return tensor, reader.identity
+    return tensor, rpy_rotation(reader.graph, reader.vector(f"{path}.axes", values["axes"]))
+
+
+def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | None:
+    """The point an inertia is about, None for the centre of mass; and its axes where it is a marker."""
+    place, body = f"{path}.about", path.partition(".")[2]
+    if isinstance(about, str):
+        if about == "com":
+            return None
+        if about == "origin":
+            return vec.zero(reader.graph), None
+        label = about if about.startswith(f"{body}.") else f"{body}.{about}"
+        marker = reader.markers.get(label)
+        if marker is None:
+            own = [key.partition(".")[2] for key in reader.markers if key.startswith(f"{body}.")]
+            remedy = nearest(about, [*POINTS, *own], "allowed")
+            reader.faults.add(place, f"{body!r} has no marker {about!r}", remedy, "EG-NAME-UNKNOWN")
+            return None
+        return marker.frame.position, marker.frame.rotation
+    if items(about) is None:
+        reader.wrong(place, about, kinds.About)
+        return None
+    return reader.vector(place, about), None
+
+
+def _plane(tensor: Mat3) -> int | None:
+    """The axis of the one moment that was given, None where there are others, or products."""
+    given = [i for i in range(3) if not tensor[i][i].is_zero]
+    products = any(not tensor[i][j].is_zero for i in range(3) for j in range(3) if i != j)
+    return given[0] if len(given) == 1 and not products else None

@@ -1,0 +1,282 @@
+"""Entries of the joints section -> coordinate names in the namespace, then JointSpecs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..base.records import dataclass
+from ..base.value_rules import NOT_NEGATIVE
+from ..elements import kinds
+from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.frames import Frame, Marker
+from ..elements.joints import JOINTS, Joint
+from ..elements.kinds import LIMITS, Scalar
+from ..expr import vectors as vec
+from ..expr.core import Expr
+from ..expr.shown import quoted, shown
+from ..expr.vectors import Mat3
+from .checks import check_keys, check_names, unknown_key
+from .description import DescribedEntry, Description, items
+from .fields import joint_fields
+from .mechanism import JointSpec
+from .names import nearest
+from .placement import TURNS, turn_matrix
+from .printed_names import take_coordinates_latex
+from .sympy_face import name_of
+from .values import Reader
+
+Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
+
+
+def limits_nothing(key: str, value: Any) -> bool:
+    """Whether a limit is the infinity that no value passes, as URDF and MJCF files write it."""
+    return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
+
+
+def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
+    """Limits of each coordinate of a joint.
+
+    A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
+    """
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, kinds.Limits)
+        return tuple(() for _ in coordinates)
+    check_keys(path, given, LIMITS, reader.faults)
+    result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
+    for key in LIMITS:
+        if key not in given or given[key] is None:
+            continue
+        listed = items(given[key])
+        values = [given[key]] if listed is None else listed
+        if len(values) != len(coordinates):
+            message = f"{len(values)} values for {len(coordinates)} coordinates"
+            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
+            continue
+        for k, value in enumerate(values):
+            place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
+            number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
+            if number is not None and number < 0 and key in ("velocity", "effort"):
+                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
+            elif number is not None:
+                result[k].append((key, number))
+    for name, found in zip(coordinates, result, strict=True):
+        limits = dict(found)
+        if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
+            message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
+            reader.faults.add(path, message, "exchange them", "EG-RANGE")
+    return tuple(tuple(found) for found in result)
+
+
+def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
+    """Coulomb friction of a joint (N m or N), as data."""
+    value = reader.number(path, given)
+    if value is not None and value < 0:
+        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
+    return value or 0.0
+
+
+def read_armature(reader: Reader, path: str, given: Any) -> Expr:
+    """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
+    value = reader.expression(path, given)
+    reader.requirements.inside(path, value, NOT_NEGATIVE, "an inertia must be 0 or positive")
+    return value
+
+
+WELD = "weld"
+
+
+def with_locks(description: Description) -> Description:
+    """The description with a constraint for each joint that closes and opens; the same one where there is none."""
+    joints = [_lock_of(entry) for entry in description.sections["joints"]]
+    added = [constraint for _, constraint in joints if constraint is not None]
+    if not added:
+        return description
+    sections = description.sections | {
+        "joints": [joint for joint, _ in joints if joint is not None],
+        "constraints": [*description.sections["constraints"], *added],
+    }
+    return replace(description, sections=sections)
+
+
+def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEntry | None]:
+    """What of an entry remains a joint, and what is a constraint."""
+    kind: Any = entry.values.get("type")
+    own = {key: value for key, value in entry.values.items() if key in SWITCHING}
+    if not own or not isinstance(kind, str) or kind not in JOINTS:
+        return entry, None
+    rest = {key: value for key, value in entry.values.items() if key not in SWITCHING}
+    if kind == WELD:
+        held = {"axes": "xyz", "turning": "xyz", **{key: x for key, x in rest.items() if key != "type"}}
+        return None, replace(entry, values={"type": "hold", **held, **own})
+    if not JOINTS[kind].coordinates:
+        return entry, None
+    return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **own})
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A joint whose type and coordinates are known, before its markers and expressions are looked up."""
+
+    entry: DescribedEntry
+    joint: Joint
+    coordinates: tuple[str, ...]
+    named: bool
+
+
+def coordinate_names(
+    type_name: str, name: str, values: dict[str, Any], joint: Joint | None = None
+) -> tuple[tuple[Any, ...], bool]:
+    """Names of a joint's coordinates as given or by default, and whether they were given."""
+    if "coordinate" in values:
+        return (name_of(values["coordinate"]),), True
+    if "coordinates" in values:
+        given = values["coordinates"]
+        listed = [given] if isinstance(given, str) else items(given)
+        return tuple(name_of(x) for x in listed or ()), True
+    return tuple(name + c.suffix for c in (joint or sketch(type_name, values)).coordinates), False
+
+
+def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
+    """A joint from its raw keys, whose faults are told elsewhere."""
+    kind = JOINTS[type_name]
+    given = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
+    return kind(**{key: field.default for key, field in kind.options.items()} | given)
+
+
+def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[Declared]:
+    """Check types, keys and coordinates of all joints and take the coordinates into the namespace."""
+    result = []
+    for entry in check_names(entries, "joint", reader.faults):
+        type_name = _type(reader, entry)
+        if type_name is None:  # its coordinates are known all the same, so that their users are not at fault too
+            for key in ("coordinate", "coordinates"):
+                if key in entry.values:
+                    for name in coordinate_names("", entry.name, {key: entry.values[key]})[0]:
+                        reader.names.declare("coordinate", name, f"{entry.path}.{key}")
+            continue
+        joint = _joint(reader, entry, type_name)
+        names, named = coordinate_names(type_name, entry.name, entry.values, joint)
+        count = len(joint.coordinates)
+        path = entry.path
+        if named:
+            path += ".coordinate" if "coordinate" in entry.values else ".coordinates"
+        if len(names) != count:
+            remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
+            plural = "" if len(names) == 1 else "s"
+            reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy, "EG-SHAPE")
+        for k, name in enumerate(names):
+            parameter = k < count and joint.coordinates[k].kind == "parameter"
+            reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
+        if "latex" in entry.values and count and len(names) == count:
+            others = [f"{name}_dot" for name in names] + [
+                entry.name + w.suffix for w in joint.velocities if w.of is None
+            ]
+            take_coordinates_latex(reader, f"{entry.path}.latex", names, entry.values["latex"], others)
+        for velocity in joint.velocities:
+            if velocity.of is None:
+                reader.names.declare("velocity", entry.name + velocity.suffix, entry.path)
+        if len(names) == count:
+            result.append(Declared(entry, joint, tuple(str(n) for n in names), named))
+    return result
+
+
+def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, ...]:
+    """Look up the markers of joints and turn them so that the axis is their z; joints with faults are left out."""
+    result = []
+    for joint in declared:
+        path, values = joint.entry.path, joint.entry.values
+        pair = reader.pair(f"{path}.between", values["between"]) if "between" in values else None
+        kind = _with_expressions(reader, joint)
+        columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
+        if "axes" in values:
+            if "axis" in values:
+                reader.faults.add(f"{path}.axes", "axis is given too", "leave out one of them", "EG-CONFLICT")
+            columns = reader.axes(f"{path}.axes", values["axes"])
+        if pair is None:
+            continue
+        if pair[0].body == pair[1].body:
+            message = f"{pair[0].label} and {pair[1].label} are on the same body"
+            reader.faults.add(f"{path}.between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
+            continue
+        if columns != TURNS["z"]:
+            turn = turn_matrix(reader.graph, columns)
+            pair = (_turned(pair[0], turn), _turned(pair[1], turn))
+        spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named, axes=columns)
+        result.append(_with_data(reader, spec, path, values))
+    return tuple(result)
+
+
+def _with_data(reader: Reader, spec: JointSpec, path: str, values: dict[str, Any]) -> JointSpec:
+    """Limits, dry friction and armature of a joint."""
+    data: dict[str, Any] = {}
+    if spec.coordinates and "limits" in values:
+        data["limits"] = read_limits(reader, f"{path}.limits", values["limits"], spec.coordinates)
+    if len(spec.coordinates) == 1 and "dry_friction" in values:
+        data["dry_friction"] = read_dry_friction(reader, f"{path}.dry_friction", values["dry_friction"])
+    if len(spec.coordinates) == 1 and "armature" in values:
+        data["armature"] = read_armature(reader, f"{path}.armature", values["armature"])
+    return replace(spec, **data) if data else spec
+
+
+def _turned(marker: Marker, turn: Mat3) -> Marker:
+    return Marker(marker.body, Frame(vec.product(marker.frame.rotation, turn), marker.frame.position), marker.label)
+
+
+def _type(reader: Reader, entry: DescribedEntry) -> str | None:
+    path, given = f"{entry.path}.type", entry.values.get("type")
+    if reader.faults.under(entry.path):
+        return None
+    if isinstance(given, str) and given in JOINTS:
+        return given
+    if given is None:
+        reader.faults.missing(path, f"give one of {', '.join(JOINTS)}")
+    else:
+        reader.faults.add(
+            path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"), "EG-CHOICE"
+        )
+    return None
+
+
+def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
+    """The joint itself, with its options; keys are checked."""
+    fields = joint_fields(type_name)
+    for key in entry.values:
+        if key not in fields:
+            others = set().union(*map(joint_fields, JOINTS))
+            elsewhere = key in others
+            message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
+            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING else unknown_key(key, fields)
+            reader.faults.add(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
+    for key, field in fields.items():
+        if field.required and key not in entry.values and key != "type":
+            reader.faults.missing(f"{entry.path}.{key}", f"give {field.says}")
+    if {"coordinate", "coordinates"} <= entry.values.keys():
+        reader.faults.add(
+            f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT"
+        )
+    kind = JOINTS[type_name]
+    options: dict[str, Any] = {}
+    for option in kind.options:
+        if isinstance(fields[option], Scalar):  # its names are not all known yet
+            options[option] = fields[option].absent(reader)
+        else:
+            value = entry.values.get(option, fields[option].default)
+            options[option] = fields[option].read(reader, f"{entry.path}.{option}", value)
+    if options.get("rotation") == "euler_parameters" and "sequence" in entry.values:
+        remedy = "leave out sequence, or choose rotation: euler_angles"
+        reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
+    return kind(**options)
+
+
+def _with_expressions(reader: Reader, declared: Declared) -> Joint:
+    """The joint with those of its options that are expressions."""
+    joint, values = declared.joint, declared.entry.values
+    found = {
+        option: field.read(reader, f"{declared.entry.path}.{option}", values[option], declared.coordinates[: field.own])
+        for option, field in joint.options.items()
+        if isinstance(field, Scalar) and option in values
+    }
+    return replace(joint, **found)

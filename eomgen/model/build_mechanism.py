@@ -1,0 +1,363 @@
+"""Description (raw) -> Mechanism, or ModelError with every problem at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from ..base.names import place_of_marker
+from ..elements import kinds
+from ..elements.constraints import CONSTRAINTS
+from ..elements.forces import FORCES, Force
+from ..elements.frames import GROUND, Frame, Marker
+from ..errors import ModelError
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph
+from ..expr.shown import quoted, shown
+from .bodies import check_bodies, check_display, read_body, read_body_shapes
+from .build_functions import build_functions
+from .build_joints import build_joints, declare_coordinates, with_locks
+from .build_quantities import Outputs, read_input, read_parameter, with_signal
+from .build_states import (
+    begun_switches,
+    build_events,
+    build_states,
+    build_switches,
+    check_resets,
+    declare_states,
+    declare_switches,
+    events_of_switches,
+    states_of_switches,
+)
+from .check_dimensions import check_dimensions, with_units
+from .checks import check_connected, check_keys, check_names
+from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
+from .element_entry import Surroundings, build_elements, check_turns, declare_contacts, own_states
+from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
+from .fields import GROUND as GROUND_FIELDS
+from .given_equations import build_equations, check_energies, declare_equations
+from .input_rates import add_rates
+from .lagrangian import build_lagrangian, declare_lagrangian
+from .mechanism import Body, Mechanism, Simulation
+from .names import fault_of_model_name, nearest
+from .quantities import SUMS, CarriedQuantity, WrenchQuantity
+from .read_shapes import read_shapes
+from .scope import Namespace
+from .sympy_face import in_order, name_of
+from .values import Reader
+from .visit import undotted
+
+
+def build(description: Description) -> Mechanism:
+    """Check a description and lower it to one graph.
+
+    Parameters
+    ----------
+    description : Description
+        What the user said.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    ModelError
+        The description has faults; all of them are listed.
+    """
+    description = with_locks(undotted(description))
+    faults = Faults(description)
+    if description.incomplete:
+        raise ModelError(faults.sorted())
+    names = Namespace(faults)
+    graph = Graph()
+    reader = Reader(graph, names, faults, description)
+    values, sections = description.values, description.sections
+
+    name = values.get("name")
+    fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
+    if fault:
+        faults.add("name", *fault, "EG-MISSING" if name is None else "EG-NAME-FORM")
+    if values.get("attachments"):
+        remedy = "add this model to that one as a component, which gives a marker for each attachment"
+        faults.add("attachments", "attachments stand for markers of another model", remedy, "EG-CONFLICT")
+    parameters = tuple(read_parameter(reader, entry) for entry in sections["parameters"])
+    inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
+    reader.requirements.declare({p.name: p.value for p in parameters})
+    build_functions(reader, sections["functions"])
+    reader.joints = specs = declare_coordinates(reader, sections["joints"])
+    contacts = declare_contacts(reader, sections["constraints"])
+    lagrangian_values = declare_lagrangian(
+        reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
+    )
+    given_values = declare_equations(
+        reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
+    )
+
+    declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
+    held, state_rates = own_states(reader, sections["forces"])
+    switching = declare_switches(reader, sections["constraints"])
+    read_outputs = Outputs(reader, sections["outputs"]).all
+    inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
+    reader.mass_data = bodies = _bodies(reader, sections["bodies"])
+    joints = build_joints(reader, specs)
+    reader.shapes = partial(read_shapes, reader)
+    around = Surroundings(reader, specs, joints, bodies, contacts)
+    forces = build_elements(around, "force", sections["forces"], FORCES)
+    lagrangian = build_lagrangian(reader, lagrangian_values)
+    given = build_equations(reader, given_values)
+    constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
+    gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
+    states, begun, clocks, samplings = build_states(reader, declared)
+    outputs = read_outputs()
+    switched = build_switches(reader, switching, constraints)
+    constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
+    own_events = build_events(reader, sections["events"])
+    check_resets(reader, own_events, clocks, switched)
+    events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, switched, events, outputs)
+    moves = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
+    starts = _initial(reader, "initial", values.get("initial", {}), (*moves, "output"))
+    moving = set(reader.names.of(*moves))
+    guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
+    independent = _independent(reader, values.get("independent", ()))
+    simulation = _simulation(reader, values.get("simulation", {}))
+    doc = reader.text("doc", values.get("doc", ""))
+    limits_told = _limits_told(reader, values.get("limits"))
+    check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
+
+    if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
+        faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian", "EG-MISSING")
+    _check_mass(reader, bodies)
+    negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
+    check_turns(constraints, reader.requirements)
+    check_energies(given, outputs, faults)
+    _check_asked(reader, forces)
+    if not faults:
+        check_dimensions(reader, joints)
+    if len(joints) == len(sections["joints"]):
+        check_connected(bodies, joints, faults)
+    if faults:
+        raise ModelError(faults.sorted())
+    outputs = with_units(reader, joints, outputs)
+    described = len(bodies)
+    bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
+    return Mechanism(
+        name=str(name),
+        graph=graph,
+        parameters=parameters,
+        inputs=inputs,
+        gravity=gravity,
+        bodies=bodies,
+        joints=joints,
+        forces=forces,
+        outputs=outputs,
+        states=(*states, *held, *states_of_switches(reader, switched)),
+        clocks=clocks,
+        events=events,
+        quantities=dict(reader.quantities),
+        element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.carried} | state_rates,
+        wrench_quantities=_exerted(reader),
+        reaction_quantities=_carried(reader),
+        initial=begun
+        | begun_switches(graph, switched)
+        | {name: value for name, value in starts.items() if name in moving},
+        initial_outputs={name: value for name, value in starts.items() if name not in moving},
+        guess=guess,
+        independent=independent,
+        simulation=simulation,
+        lagrangian=lagrangian,
+        given=given,
+        constraints=constraints,
+        switched=switched,
+        lines=dict(description.lines),
+        doc=doc,
+        latex=dict(reader.latex),
+        instances=dict(description.instances),
+        check_inertia=check_inertia,
+        limits_told=limits_told,
+        negative=negative,
+        named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
+        body_shapes=tuple(
+            shape
+            for entry in sections["bodies"]
+            for shape in read_body_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+        ),
+        added_bodies=tuple(range(described, len(bodies))),
+        default_gravity="gravity" not in values,
+        notes=inertia_notes,
+        requirements=tuple(reader.requirements.all),
+    )
+
+
+def _limits_told(reader: Reader, given: Any) -> bool:
+    if given == "stop":
+        remedy = "add a force of type stop for each joint; allowed here: note, off"
+        reader.faults.add(
+            "limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE"
+        )
+        return True
+    return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
+
+
+def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
+    """Bodies, with all markers taken in before anything refers to them."""
+    faults, graph = reader.faults, reader.graph
+    ground = [entry for entry in entries if entry.name == GROUND_NAME]
+    usable = check_names([entry for entry in entries if entry.name != GROUND_NAME], "body", faults)
+    for k, entry in enumerate(usable):
+        reader.bodies[entry.name] = k
+    for entry in usable + ground:
+        if not faults.under(entry.path):
+            check_keys(entry.path, entry.values, GROUND_FIELDS if entry.name == GROUND_NAME else BODY, faults)
+        if "display" in entry.values:
+            check_display(reader, f"{entry.path}.display", entry.values["display"])
+    origin = Frame(reader.identity, vec.zero(graph))
+    for name, index in reader.bodies.items():
+        reader.markers[name] = Marker(index, origin, name)
+    for entry in usable + ground:
+        index = GROUND if entry.name == GROUND_NAME else reader.bodies[entry.name]
+        for marker in check_names(_marker_entries(reader, entry), "marker", faults):
+            label = f"{entry.name}.{marker.name}"
+            reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
+    check = reader.check_word("check_inertia", reader.description.values.get("check_inertia", True))
+    return tuple(read_body(reader, entry, check) for entry in usable)
+
+
+def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntry]:
+    """Markers of a body: a mapping from a file, a list of (name, placement) from Python."""
+    path = f"{entry.path}.markers"
+    given: Any = entry.values.get("markers", ())
+    if isinstance(given, Mapping):
+        given = list(given.items())
+    if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
+        reader.wrong(path, given, kinds.Markers)
+        return []
+    return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+
+
+def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
+    """Note centres of mass and momenta asked of a mechanism without mass."""
+    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
+    if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
+        what = ", ".join(name.removesuffix("()") for name in asked)
+        message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
+        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
+
+
+def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
+    """The parts of reactions and the multipliers that expressions speak of."""
+    found = {}
+    for asked, path in reader.asked.items():
+        if asked.carried:
+            axes = reader.moving(asked.axes) if asked.axes else None
+            found[str(asked)] = CarriedQuantity(asked.of, asked.part, axes, path)
+    return found
+
+
+def _exerted(reader: Reader) -> dict[str, WrenchQuantity]:
+    """The parts of what force elements exert on bodies that expressions speak of."""
+    found = {}
+    for asked, path in reader.asked.items():
+        if asked.on:
+            axes = reader.moving(asked.axes) if asked.axes else None
+            found[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
+    return found
+
+
+def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
+    """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
+    known = {force.name: force for force in forces}
+    for asked, path in reader.asked.items():
+        quantity, name, on = asked.name, asked.of, asked.on
+        if name in known and known[name].is_rigid and not on:
+            told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
+            columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
+            reader.faults.add(
+                path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED"
+            )
+        elif quantity != "power" and not on and name in known and not known[name].acts_along:
+            remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
+            message = f"{name!r} does not act along a path"
+            reader.faults.add(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
+
+
+def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -> dict[str, Expr]:
+    """Values by coordinate (or rate, or output): expressions in parameters."""
+    if not isinstance(given, Mapping):
+        reader.wrong(section, given, kinds.Table)
+        return {}
+    known = list(dict.fromkeys(reader.names.of(*whats)))
+    result: dict[str, Expr] = {}
+    for name, value in in_order(given, known):
+        path = f"{section}.{name}"
+        if name in known:
+            result[name] = reader.expression(path, value)
+        elif section == "initial" and (place := place_of_marker(name)):
+            result[f"{place[0]}({place[1]})"] = reader.expression(path, value)
+            _check_place(reader, path, *place)
+        else:
+            remedy = nearest(shown(name), known, _listed([_PLURAL[what] for what in whats], "and"))
+            reader.faults.add(path, f"no {_listed(whats, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+    return result
+
+
+def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
+    """Note what is wrong with a marker whose place or velocity is an initial value."""
+    marker = reader.markers.get(label)
+    if marker is None:
+        named = [known for known, marker in reader.markers.items() if marker.body != GROUND]
+        reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"), "EG-NAME-UNKNOWN")
+    elif marker.body == GROUND:
+        kind = "velocity" if what.startswith("v") else "position"
+        reader.faults.add(
+            path, f"is a {kind} on the ground, which does not move", "name a marker of another body", "EG-REFERENCE"
+        )
+
+
+def _listed(words: Sequence[str], last: str) -> str:
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if words[1:] else words[0]
+
+
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "states", "output": "outputs"}
+
+
+def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong("independent", given, kinds.Names)
+        return ()
+    coordinates = list(reader.names.of("coordinate"))
+    rates = [name + "_dot" for name in coordinates]
+    known = [*coordinates, *(name for name in reader.names.of("velocity") if name not in rates)]
+    result: list[str] = []
+    for k, item in enumerate(listed):
+        name = name_of(item)
+        if name not in known and name not in rates:
+            remedy = nearest(shown(name), known, "coordinates")
+            reader.faults.add(f"independent[{k}]", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+        elif name in result:
+            reader.faults.add(
+                f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once", "EG-CONFLICT"
+            )
+        else:
+            result.append(name)
+    return tuple(result)
+
+
+def _simulation(reader: Reader, given: Any) -> Simulation:
+    if not isinstance(given, Mapping):
+        reader.wrong("simulation", given, kinds.Table)
+        return Simulation()
+    check_keys("simulation", given, SIMULATION, reader.faults)
+    settings: dict[str, Any] = {}
+    for key, field in SIMULATION.items():
+        if key not in given:
+            continue
+        settings[key] = field.read(reader, f"simulation.{key}", given[key])
+    if (settings.get("method") in FIXED_STEP) != ("step" in settings):
+        remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
+        told = "only methods RK4 and moreau take steps of one size, and they need their size"
+        reader.faults.add("simulation.step", told, remedy, "EG-CONFLICT")
+    return Simulation(**settings)

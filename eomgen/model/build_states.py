@@ -1,0 +1,431 @@
+"""Entries of ``states`` and ``events``, constraints that close and open -> first-order states, clocks, events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..base.operations import CONDITION, operations_with
+from ..base.value_rules import POSITIVE
+from ..elements import kinds
+from ..elements.constraints import Constraint
+from ..elements.kinds import LAW, OUTPUT
+from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.shown import quoted, shown
+from .build_quantities import in_si, read_described
+from .checks import check_keys
+from .description import DescribedEntry, items
+from .fields import EVENT, STATE
+from .mechanism import Clock, Event, FirstOrderState, Switched
+from .names import nearest
+from .read_shapes import positive
+from .scope import late_names
+from .sympy_face import in_order
+from .values import Reader, is_number
+
+
+def build_events(reader: Reader, entries: list[DescribedEntry]) -> tuple[Event, ...]:
+    """Events in the order of their declaration; faults are noted."""
+    return tuple(_event(reader, entry) for entry in entries)
+
+
+def _event(reader: Reader, entry: DescribedEntry) -> Event:
+    path, values = entry.path, entry.values
+    reader.names.declare("event", entry.name, path)
+    check_keys(path, values, EVENT, reader.faults)
+    expression = reader.stand_in
+    if "expression" in values:
+        expression = instant(reader, f"{path}.expression", values["expression"])
+        if expression.node[0] in operations_with(lambda row: row.kind == CONDITION):
+            message, remedy = "is a comparison, which has no zero", "give the difference of its sides: a - b for a > b"
+            reader.faults.add(f"{path}.expression", message, remedy, "EG-EVENT")
+    direction = values.get("direction", 0)
+    if not is_number(direction) or direction not in (-1, 0, 1):
+        remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
+        reader.faults.add(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
+        direction = 0
+    reset = _reset(reader, f"{path}.reset", {} if values.get("reset") is None else values["reset"])
+    restitution = None
+    if values.get("restitution") is not None:
+        restitution = reader.number(f"{path}.restitution", values["restitution"])
+        if restitution is not None and not 0.0 <= restitution <= 1.0:
+            reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1", code="EG-RANGE")
+        if reset:
+            reader.faults.add(f"{path}.reset", "is given beside a restitution", "give one of the two", "EG-CONFLICT")
+        if direction == 1:
+            message = "with a restitution only a falling value (a gap that closes) is an impact"
+            reader.faults.add(f"{path}.direction", message, "give -1, or leave it out", "EG-EVENT")
+        direction = -1
+    doc = reader.text(f"{path}.doc", values.get("doc", ""))
+    terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
+    friction, slip = _friction(reader, path, values)
+    return Event(str(entry.name), expression, terminal, int(direction), reset, restitution, doc, friction, slip)
+
+
+def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[float | None, tuple[str, ...]]:
+    """The coefficient of friction of an impact, and the outputs that are its sliding velocities."""
+    given, slip = values.get("friction"), values.get("slip")
+    if given is None and slip is None:
+        return None, ()
+    if values.get("restitution") is None:
+        what = "friction" if given is not None else "slip"
+        remedy = "give the restitution of the impact, from 0 to 1"
+        reader.faults.add(
+            f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy, "EG-MISSING"
+        )
+    if given is None or slip is None:
+        missing, there = ("slip", "friction") if slip is None else ("friction", "slip")
+        remedy = "slip: the output that is the sliding velocity" if slip is None else "friction: the coefficient"
+        reader.faults.add(f"{path}.{there}", f"is given without {missing}", f"give {remedy}", "EG-MISSING")
+        return None, ()
+    friction = reader.number(f"{path}.friction", given)
+    if friction is not None and not friction >= 0.0:
+        reader.faults.add(f"{path}.friction", f"{friction:g} is negative", "give 0 or more", "EG-RANGE")
+    names = [slip] if isinstance(slip, str) else items(slip)
+    outputs = [*reader.names.of("output")]
+    if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
+        reader.wrong(f"{path}.slip", slip, kinds.SomeNames)
+        return None, ()
+    for name in names:
+        if name not in outputs:
+            remedy = nearest(name, outputs, "outputs")
+            reader.faults.add(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy, "EG-NAME-UNKNOWN")
+        elif (unit := reader.units.get(f"outputs.{name}")) is not None and unit.size != 1.0:
+            reader.faults.add(
+                f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit", "EG-UNIT"
+            )
+    return friction, tuple(names)
+
+
+def _times(reader: Reader, path: str, value: Any) -> int:
+    if isinstance(value, bool) or value is None:
+        return int(bool(value))
+    if isinstance(value, int) and value > 0:
+        return value
+    reader.wrong(path, value, kinds.Times)
+    return 0
+
+
+def check_resets(
+    reader: Reader, events: Sequence[Event], clocks: Sequence[Clock], switched: Sequence[Switched]
+) -> None:
+    """Note new values of states that count samples, and others than 0 and 1 of whether a constraint is closed."""
+    counters = {clock.counter: clock.states for clock in clocks}
+    closed = {switch.state for switch in switched}
+    for event in events:
+        for name, value in event.reset:
+            path = f"events.{event.name}.reset.{name}"
+            if name in counters:
+                remedy = f"reset {', '.join(counters[name])}, or declare them with another period or offset"
+                reader.faults.add(
+                    path, f"{name!r} counts samples, and a sample would be missed or come twice", remedy, "EG-EVENT"
+                )
+            elif name in closed and value.value not in (0.0, 1.0):
+                remedy = "give 1 to close the constraint, 0 to open it"
+                reader.faults.add(
+                    path, f"{name!r} is 1 while the constraint is closed and 0 while it is open", remedy, "EG-EVENT"
+                )
+
+
+def instant(reader: Reader, path: str, value: Any) -> Expr:
+    """An expression of what is known of a state without solving for accelerations."""
+    expression = reader.expression(path, value, OUTPUT)
+    for name, what in late_names(reader.names, symbols_of([expression])):
+        remedy = (
+            "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
+        )
+        reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy, "EG-REFERENCE")
+    return expression
+
+
+def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...]:
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, kinds.Rates)
+        return ()
+    known = list(reader.names.of("coordinate", "velocity", "state"))
+    result = []
+    for name, value in in_order(given, known):
+        if name in known:
+            result.append((str(name), instant(reader, f"{path}.{name}", value)))
+        else:
+            states = bool(reader.description.sections["states"])
+            remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
+            reader.faults.add(
+                f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy, "EG-NAME-UNKNOWN"
+            )
+    return tuple(result)
+
+
+COUNTER, SAMPLED = "_samples", "_sampled"  #: what follows the name of a clock's first state
+
+
+class Timing(NamedTuple):
+    """The sampled states of one period and offset, the first of which gives the clock its name."""
+
+    entries: tuple[DescribedEntry, ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the first state."""
+        return str(self.entries[0].name)
+
+
+def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[Timing]:
+    """Sampled states by period and offset as they are written, the names of their clocks taken in."""
+    groups: dict[tuple[str, str], list[DescribedEntry]] = {}
+    for entry in entries:
+        if "sampled" in entry.values or ("period" in entry.values and "rate" not in entry.values):
+            written = (_shown_time(entry.values.get("period")), _shown_time(entry.values.get("offset", 0)))
+            groups.setdefault(written, []).append(entry)
+    timings = [Timing(tuple(group)) for group in groups.values()]
+    for timing in timings:
+        reader.names.declare("state", timing.name + COUNTER, timing.entries[0].path)
+        reader.names.declare("event", timing.name + SAMPLED, timing.entries[0].path)
+    return timings
+
+
+def build_clocks(
+    reader: Reader, timings: Sequence[Timing], new: Mapping[str, Expr]
+) -> tuple[tuple[Clock, ...], tuple[Event, ...]]:
+    """The clocks and their events.
+
+    Parameters
+    ----------
+    new : mapping of str to Expr
+        Sampled state -> its new value.
+    """
+    graph, time = reader.graph, reader.graph.symbol("t")
+    clocks, events = [], []
+    for timing in timings:
+        period, offset = _sampling_times(reader, timing)
+        names = tuple(str(entry.name) for entry in timing.entries)
+        clock = Clock(timing.name + COUNTER, timing.name + SAMPLED, names, period, offset)
+        count = graph.symbol(clock.counter)
+        renewed: dict[Expr, Expr] = {}
+        for name in names:
+            renewed[graph.symbol(name)] = substitute([new[name]], renewed)[0]
+        reset = (*((name, renewed[graph.symbol(name)]) for name in names), (clock.counter, count + 1.0))
+        doc = f"a sampling time of {', '.join(names)}"
+        events.append(Event(clock.event, time - (offset + count * period), 0, 1, reset, None, doc))
+        clocks.append(clock)
+    return tuple(clocks), tuple(events)
+
+
+def _sampling_times(reader: Reader, timing: Timing) -> tuple[Expr, Expr]:
+    """Period and offset of a clock, read in each entry so that each fault has its place."""
+    found = []
+    for entry in timing.entries:
+        path, given = f"{entry.path}.period", entry.values.get("period")
+        if given is None:
+            reader.faults.missing(path, "give the time from one sampling time to the next, in s")
+        period = reader.stand_in if given is None else reader.expression(path, given)
+        if given is not None:
+            remedy = "give the time between samples, in s"
+            reader.requirements.inside(path, period, POSITIVE, remedy, "{:g} is not positive")
+        found.append((period, reader.expression(f"{entry.path}.offset", entry.values.get("offset", 0.0))))
+    return found[0]
+
+
+def _shown_time(given: Any) -> str:
+    """A number or expression as text, so that 0.010 and "0.01" are the same."""
+    try:
+        return repr(float(given))
+    except (TypeError, ValueError):
+        return "".join(str(given).split())
+
+
+class DeclaredStates(NamedTuple):
+    """The entries whose names are taken in, and those that are sampled by clock."""
+
+    entries: list[DescribedEntry]
+    timings: list[Timing]
+
+    def __bool__(self) -> bool:
+        return bool(self.entries)
+
+
+class BuiltStates(NamedTuple):
+    """The states in the order of their declaration, counters of clocks last, and what belongs to them."""
+
+    states: tuple[FirstOrderState, ...]
+    initial: dict[str, Expr]
+    clocks: tuple[Clock, ...]
+    events: tuple[Event, ...]  #: one a clock
+
+
+def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) -> DeclaredStates:
+    """Take in the names of all states before any expression is read; those that can be used are returned.
+
+    Parameters
+    ----------
+    bare : bool
+        Whether a Lagrangian or equations came instead of bodies and joints, which have no states beside them.
+    """
+    if entries and bare:
+        message = "a bare Lagrangian, or equations, have no states beside them"
+        reader.faults.add(
+            "states",
+            message,
+            "write them as velocities of from_equations, or describe bodies and joints",
+            "EG-CONFLICT",
+        )
+    usable = []
+    for entry in entries:
+        if isinstance(entry.name, str) and entry.name.endswith("_dot"):
+            remedy = "choose a name that does not end in _dot"
+            reader.faults.add(
+                entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy, "EG-NAME-TAKEN"
+            )
+        if reader.names.declare("state", entry.name, entry.path):
+            usable.append(entry)
+    return DeclaredStates(usable, group_by_clock(reader, usable))
+
+
+def build_states(reader: Reader, declared: DeclaredStates) -> BuiltStates:
+    """The states, their initial values and sampling; faults are noted."""
+    states: list[FirstOrderState] = []
+    initial: dict[str, Expr] = {}
+    for entry in declared.entries:
+        unit, doc = read_described(reader, entry, STATE)
+        start, path = entry.values.get("initial"), f"{entry.path}.initial"
+        if is_number(start):
+            value = in_si(reader, path, reader.number(path, start), unit)
+            initial[entry.name] = reader.graph.constant(0.0 if value is None else value)
+        elif start is not None:
+            initial[entry.name] = reader.expression(path, start)
+        rate, sampled = _motion(reader, entry)
+        states.append(FirstOrderState(str(entry.name), rate, unit.si, doc, sampled))
+    new = {state.name: state.sampled for state in states if state.sampled is not None}
+    clocks, events = build_clocks(reader, declared.timings, new)
+    zero = reader.graph.zero
+    counters = (FirstOrderState(c.counter, zero, doc=f"samples of {', '.join(c.states)} so far") for c in clocks)
+    return BuiltStates((*states, *counters), initial, clocks, events)
+
+
+def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
+    """The rate of a state, and its new value at sampling times if it is sampled."""
+    values, path = entry.values, entry.path
+    if "rate" in values and "sampled" in values:
+        reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period", "EG-CONFLICT")
+    if "sampled" in values:
+        return reader.graph.zero, reader.expression(f"{path}.sampled", values["sampled"], LAW)
+    if "period" in values and "rate" not in values:  # a function of the run renews it
+        return reader.graph.zero, reader.graph.symbol(str(entry.name))
+    for key in ("period", "offset"):
+        if key in values:
+            reader.faults.add(
+                f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate", "EG-CONFLICT"
+            )
+    if values.get("rate") is None:
+        reader.faults.missing(f"{path}.rate", "give the derivative of the state, or sampled and period")
+        return reader.stand_in, None
+    return reader.expression(f"{path}.rate", values["rate"], LAW), None
+
+
+CLOSED, CLOSES, OPENS = "_closed", "_closes", "_opens"  #: what follows the constraint's name: its state and events
+KEYS = ("closes", "opens", "closed")
+
+
+def is_switched(entry: DescribedEntry) -> bool:
+    """Whether a constraint closes or opens."""
+    return isinstance(entry.name, str) and not entry.values.keys().isdisjoint(KEYS)
+
+
+def declare_switches(reader: Reader, entries: Sequence[DescribedEntry]) -> list[DescribedEntry]:
+    """Take in the names of states and events; the entries that have them."""
+    found = [entry for entry in entries if is_switched(entry)]
+    for entry in found:
+        reader.names.declare("state", f"{entry.name}{CLOSED}", entry.path)
+        for key, suffix in (("closes", CLOSES), ("opens", OPENS)):
+            if key in entry.values:
+                reader.names.declare("event", f"{entry.name}{suffix}", entry.path)
+    return found
+
+
+def build_switches(
+    reader: Reader, entries: Sequence[DescribedEntry], constraints: Sequence[Constraint]
+) -> tuple[Switched, ...]:
+    """The constraints that close and open, with what makes them do so."""
+    names = [str(entry.name) for entry in entries]
+    made = {constraint.name: constraint for constraint in constraints}
+    found = []
+    for entry in entries:
+        path, values = entry.path, entry.values
+        closed = values.get("closed", "closes" not in values)
+        releases = _released(reader, entry, names)
+        rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
+        positive(reader, f"{path}.stabilisation", rate)
+        switch = Switched(
+            made.get(str(entry.name)), f"{entry.name}{CLOSED}", reader.flag(f"{path}.closed", closed), rate,
+            tuple(f"{name}{CLOSED}" for name in releases),
+        )  # fmt: skip
+        found.append(switch)
+    return tuple(found)
+
+
+def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> list[str]:
+    """The constraints that let go; one name counts as a list of one."""
+    path, given = f"{entry.path}.releases", entry.values.get("releases")
+    if given is None:
+        return []
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong(path, given, kinds.SomeNames)
+        return []
+    for k, name in enumerate(listed):
+        if name not in names or name == entry.name:
+            remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
+            place = path if isinstance(given, str) else f"{path}[{k}]"
+            reader.faults.add(place, f"{name!r} is no other constraint that opens", remedy, "EG-NAME-UNKNOWN")
+    return [str(name) for name in listed]
+
+
+def states_of_switches(reader: Reader, switched: Sequence[Switched]) -> tuple[FirstOrderState, ...]:
+    """1 while a constraint holds."""
+    zero = reader.graph.zero
+    return tuple(FirstOrderState(s.state, zero, doc=f"1 while {s.state.removesuffix(CLOSED)} holds") for s in switched)
+
+
+def begun_switches(graph: Graph, switched: Sequence[Switched]) -> dict[str, Expr]:
+    """Where they start."""
+    return {s.state: graph.one if s.closed else graph.zero for s in switched}
+
+
+def events_of_switches(
+    reader: Reader, entries: Sequence[DescribedEntry], switched: Sequence[Switched]
+) -> tuple[Event, ...]:
+    """What closes and opens them; velocities after an impact follow when the mechanism is known."""
+    graph, events = reader.graph, []
+    for entry, switch in zip(entries, switched, strict=True):
+        state = graph.symbol(switch.state)
+        holds = graph.apply("lt", 0.5, state)
+        if "closes" in entry.values:
+            gap = _falling(reader, f"{entry.path}.closes", entry.values["closes"])
+            reset: list[tuple[str, Expr]] = [(name, graph.zero) for name in switch.releases]
+            reset.append((switch.state, graph.one))
+            gap = graph.apply("select", holds, graph.one, gap)
+            events.append(Event(f"{entry.name}{CLOSES}", gap, 0, -1, tuple(reset), None, f"{entry.name} closes"))
+        if "opens" in entry.values:
+            left = _falling(reader, f"{entry.path}.opens", entry.values["opens"])
+            left = graph.apply("select", holds, left, graph.one)
+            reset = [(switch.state, graph.zero)]
+            events.append(Event(f"{entry.name}{OPENS}", left, 0, -1, tuple(reset), None, f"{entry.name} opens"))
+    return tuple(events)
+
+
+def _falling(reader: Reader, path: str, value: object) -> Expr:
+    """An expression that can fall to 0."""
+    before = len(reader.faults.problems)
+    found = instant(reader, path, value)
+    if len(reader.faults.problems) > before:
+        return found
+    remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
+    if found.node[0] in ("lt", "le", "eq", "not", "and", "or"):
+        reader.faults.add(
+            path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy, "EG-EXPRESSION"
+        )
+    elif symbols_of([found]) <= {*reader.names.of("parameter")}:
+        reader.faults.add(
+            path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy, "EG-EXPRESSION"
+        )
+    return found

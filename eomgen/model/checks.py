@@ -1,0 +1,93 @@
+"""Checks without kinematics: keys by the table of fields, names, connection to ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from ..elements.frames import GROUND
+from ..elements.kinds import Fields
+from .description import DescribedEntry, Faults
+from .mechanism import Body, JointSpec
+from .names import fault_of_name, nearest
+
+
+def check_keys(path: str, values: Mapping[str, Any], fields: Fields, faults: Faults) -> None:
+    """Note keys that a table does not know, and required ones that are missing."""
+    for key in values:
+        if key not in fields:
+            faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields), "EG-NAME-UNKNOWN")
+    for key, field in fields.items():
+        if field.required and key not in values:
+            faults.missing(f"{path}.{key}", f"give {field.says}")
+
+
+def unknown_key(key: object, fields: Iterable[str]) -> str:
+    """The remedy for a key that a table does not know."""
+    remedy = nearest(str(key), fields, "allowed")
+    if fault_of_name(key):  # the tail of a text that a comma cut
+        remedy += "; inside { } a text with a comma needs quotes"
+    return remedy
+
+
+def check_names(
+    entries: Sequence[DescribedEntry], what: str, faults: Faults, reserved: Sequence[str] = ()
+) -> list[DescribedEntry]:
+    """Note names that are no identifiers, reserved or used twice; returns the entries whose names can be used."""
+    usable: list[DescribedEntry] = []
+    seen: set[Any] = set()
+    for entry in entries:
+        fault = fault_of_name(entry.name)
+        if fault:
+            faults.add(entry.path, *fault, "EG-NAME-FORM")
+            continue
+        if entry.name in reserved:
+            faults.add(
+                entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}", "EG-NAME-TAKEN"
+            )
+        elif entry.name in seen:
+            faults.add(
+                entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one", "EG-NAME-TAKEN"
+            )
+        else:
+            usable.append(entry)
+        seen.add(entry.name)
+    return usable
+
+
+_PLURAL = {"body": "bodies"}
+
+
+#: Message and remedy for a body that only pure constraints (rods and the like) connect to ground.
+UNHELD = (
+    "only constraints without coordinates connect it to ground",
+    "add a joint that has coordinates; if the body otherwise moves freely, use a joint of type free",
+)
+
+
+def check_connected(bodies: Sequence[Body], joints: Sequence[JointSpec], faults: Faults) -> None:
+    """Note bodies that no chain of joints connects to ground."""
+    reached = _reached([joint for joint in joints if joint.joint.role != "loop"])
+    touched = _reached(joints)
+    for k, body in enumerate(bodies):
+        if k not in touched:
+            remedy = "add a joint; for a body that moves freely use a joint of type free"
+            faults.add(f"bodies.{body.name}", "no chain of joints connects it to ground", remedy, "EG-TOPOLOGY")
+        elif k not in reached:
+            faults.add(f"bodies.{body.name}", *UNHELD, code="EG-TOPOLOGY")
+
+
+def _reached(joints: Sequence[JointSpec]) -> set[int]:
+    """Bodies that these joints connect to ground."""
+    neighbours: dict[int, list[int]] = {}
+    for joint in joints:
+        a, b = joint.predecessor.body, joint.successor.body
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    reached, waiting = {GROUND}, [GROUND]
+    while waiting:
+        for near in neighbours.get(waiting.pop(), ()):
+            if near not in reached:
+                reached.add(near)
+                waiting.append(near)
+    return reached

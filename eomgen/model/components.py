@@ -1,0 +1,811 @@
+"""The sections ``components`` and ``add`` of a model file, and ``Model.add`` -> entries of the model.
+
+An instance is a component whose names have a prefix, whose attachments are markers of the model, and whose parameters
+are parameters or expressions of the model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from typing import Any, NamedTuple
+
+from ..base.notation import with_instance
+from ..elements import kinds
+from ..elements.joints import JOINTS
+from ..elements.kinds import MARKER, ROUNDS, items
+from ..errors import Problem, UsageError
+from .build_joints import coordinate_names, sketch
+from .build_states import CLOSED, COUNTER, SAMPLED, is_switched
+from .checks import unknown_key
+from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
+from .element_entry import needs_point, states_of
+from .fields import ADDED, COMPONENT
+from .names import fault_of_name, function_words, nearest
+from .quantities import COM, QUANTITIES, TOTALS, Named
+from .scope import ENERGIES, RATES
+from .units import UnitError, read_unit
+from .visit import Slot, Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
+
+#: Notes a fault: path, message, remedy, code.
+Fault = Callable[[str, str, str, str], None]
+
+#: Words of expressions that no model declares.
+WORDS = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *function_words()))
+
+
+def is_constant(value: Any) -> bool:
+    """Whether a value is a number, or a text of numbers alone such as ``-pi/6``."""
+    return not isinstance(value, str) or names_of(value) <= {"pi", *function_words()}
+
+
+# -- the names of a component ------------------------------------------------------------------------------------------
+class OwnNames:
+    """Names that a description declares: symbols of expressions, bodies, joints and constraints."""
+
+    def __init__(self, description: Description) -> None:
+        sections = description.sections
+
+        def named(*places: str) -> set[str]:
+            return {entry.name for place in places for entry in sections[place] if isinstance(entry.name, str)}
+
+        self.bodies = named("bodies") - {GROUND_NAME}
+        self.elements = named("joints", "constraints")
+        self.symbols = named("parameters", "inputs", "functions", "states", "outputs", "events")
+        for entry in sections["joints"]:
+            kind = entry.values.get("type")
+            if not isinstance(entry.name, str):
+                continue
+            if not isinstance(kind, str) or kind not in JOINTS:  # told when the model is checked
+                self.symbols |= {entry.name, str(entry.values.get("coordinate", entry.name))}
+                continue
+            joint = sketch(kind, entry.values)
+            self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
+            self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
+        self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
+        self.symbols |= {f"{entry.name}{CLOSED}" for entry in sections["constraints"] if is_switched(entry)}
+        for entry in sections["states"]:
+            if "period" in entry.values and isinstance(entry.name, str):
+                self.symbols |= {entry.name + COUNTER, entry.name + SAMPLED}
+        for entry in sections["constraints"]:
+            if needs_point(entry.values):
+                self.symbols.add(str(entry.values.get("coordinate", f"{entry.name}_contact")))
+
+    def has_symbol(self, name: str) -> bool:
+        """Whether a name, or the quantity whose rate it is, is declared."""
+        return any(name.endswith(rate) and name[: len(name) - len(rate)] in self.symbols for rate in RATES)
+
+
+class Attached(NamedTuple):
+    """What stands in the place of an attachment: a marker of the model, and where it is in its body."""
+
+    reference: Any
+    body: str
+    placed: Mapping[str, Any]
+
+
+class Renaming(Visitor):
+    """A component's names as an instance has them, its attachments the markers given, its parameters put in.
+
+    Parameters
+    ----------
+    own : OwnNames
+    prefix : str
+        Put before every name of the component.
+    values : mapping of str to str
+        Parameters and inputs in whose place an expression of the model stands.
+    attached : mapping of str to Attached
+        By attachment, ground among them.
+    closed : bool
+        Whether names that the component does not declare are faults.
+    fault : callable
+        Told path, message and remedy of what cannot be said.
+    """
+
+    def __init__(
+        self,
+        own: OwnNames,
+        prefix: str,
+        values: Mapping[str, str],
+        attached: Mapping[str, Attached],
+        closed: bool,
+        fault: Callable[[str, str, str, str], None],
+    ) -> None:
+        self.own, self.prefix, self.values, self.attached = own, prefix, values, attached
+        self.closed, self.fault = closed, fault
+        self.markers: dict[str, tuple[str, Mapping[str, Any]]] = {}  #: name -> body and place of markers to add
+
+    def word(self, name: str, slot: Slot) -> str:
+        """A name in an expression."""
+        if name in self.values:
+            return in_brackets(self.values[name])
+        if self.own.has_symbol(name):
+            return self.prefix + name
+        if name not in WORDS:
+            self._foreign(
+                name,
+                slot,
+                "declare a parameter or an input of that name in it, and give it where you add the component",
+            )
+        return name
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        hidden = slot.field.local if slot.field else ()
+
+        def place(marker: str) -> str:
+            if marker == COM and COM not in self.own.bodies:
+                return marker
+            found = self.marker(marker, slot)
+            return found if isinstance(found, str) else self._named(marker, found)
+
+        def quantity(named: Named) -> str:
+            return str(named.renamed(place, lambda name: self.prefix + name))
+
+        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), quantity)
+
+    def coordinate(self, name: str) -> str:
+        known = name in self.own.elements or self.own.has_symbol(name)
+        return self.prefix + name if known or self.closed else name
+
+    def latex(self, text: Any) -> Any:
+        return with_instance(text, self.prefix.strip("_")) if isinstance(text, str) and text else text
+
+    def body(self, name: str) -> str:
+        if name in self.attached:
+            return self.attached[name].body
+        return self.prefix + name if name in self.own.bodies or self.closed else name
+
+    def marker(self, reference: Any, slot: Slot) -> Any:
+        body = reference.get("body") if isinstance(reference, Mapping) else reference
+        if not isinstance(body, str):
+            return reference
+        body, _, name = body.partition(".")
+        if body in self.attached:
+            return self._on_attachment(body, name, reference, slot)
+        if body not in self.own.bodies:
+            self._foreign(
+                body, slot, f"it has the bodies and attachments {', '.join([*self.own.bodies, *self.attached])}"
+            )
+            return reference if isinstance(reference, str) else super().marker(reference, slot)
+        return super().marker(reference, slot)
+
+    def _on_attachment(self, body: str, name: str, reference: Any, slot: Slot) -> Any:
+        found = self.attached[body]
+        if isinstance(reference, str):
+            if name:  # a marker that the component gives to ground
+                return f"{found.body}.{self.prefix}{name}"
+            return found.reference
+        placed = self.placement(body, {key: value for key, value in reference.items() if key != "body"}, slot)
+        return {"body": found.body, **self.placed(body, placed)}
+
+    def placed(self, attachment: str, placed: Any) -> Mapping[str, Any]:
+        """A place in the axes of an attachment, in the axes of the body that it is on."""
+        inner, outer = placed if isinstance(placed, Mapping) else {"at": placed}, self.attached[attachment].placed
+        if not outer:
+            return inner
+        return {**inner, "on": self.placed(attachment, inner["on"]) if "on" in inner else outer}
+
+    def _named(self, attachment: str, reference: Mapping[str, Any]) -> str:
+        """The label of a marker that expressions can speak of, in the place of an attachment without a name."""
+        name = self.prefix + attachment
+        self.markers[name] = (reference["body"], {k: v for k, v in reference.items() if k != "body"})
+        return f"{reference['body']}.{name}"
+
+    def _foreign(self, name: str, slot: Slot, remedy: str) -> None:
+        if self.closed and slot.entry is not None:
+            message = f"{name!r} is not declared in the component, and a component knows only its own names"
+            self.fault(f"{slot.entry.path}.{slot.key}", message, remedy, "EG-NAME-UNKNOWN")
+
+
+# -- instances ---------------------------------------------------------------------------------------------------------
+VALUE_KEYS = ("value", "unit")
+
+
+class InstanceValue(NamedTuple):
+    """What an instance gives for a parameter or an input."""
+
+    value: Any
+    unit: str | None = None  #: None for that of the component
+
+
+def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
+    """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
+
+    Parameters
+    ----------
+    entry : DescribedEntry
+        The parameter or input of the component.
+    given
+        As the instance has it.
+    path : str
+        Where that is.
+    fault : callable
+    """
+    if not isinstance(given, Mapping):
+        return InstanceValue(given)
+    for key in given:
+        if key not in VALUE_KEYS:
+            fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), VALUE_KEYS, "keys"), "EG-NAME-UNKNOWN")
+            return None
+    if given.get("value") is None:
+        fault(path, f"{dict(given)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
+        return None
+    unit, own = given.get("unit"), entry.values.get("unit")
+    if unit is None:
+        return InstanceValue(given["value"])
+    try:
+        if not isinstance(unit, str):
+            raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
+        read = read_unit(unit)
+        if isinstance(own, str) and own and read_unit(own).dimension != read.dimension:
+            message = f"{unit!r} does not measure what {entry.name} is in: {own}"
+            fault(f"{path}.unit", message, "give a unit like that", "EG-UNIT")
+            return None
+    except UnitError as error:
+        fault(f"{path}.unit", str(error), error.remedy, "EG-UNIT")
+        return None
+    if not is_constant(given["value"]) and read.size != 1.0:
+        remedy = "leave the unit out: parameters are in SI units, so the expression is too"
+        fault(
+            f"{path}.unit", f"{str(given['value'])!r} is an expression, and {unit} is not an SI unit", remedy, "EG-UNIT"
+        )
+        return None
+    return InstanceValue(given["value"], unit)
+
+
+@dataclass
+class Component:
+    """A part of a mechanism that models take in, as often as they like.
+
+    Attributes
+    ----------
+    name : str
+        How messages call it.
+    place : str
+        Dotted path of its entries in messages.
+    description : Description
+        Its entries, values numbers and texts; instances in it are expanded.
+    attachments : tuple of str
+        Names that stand for markers of the model.
+    closed : bool
+        Whether it knows no names but its own: it has a file of its own, or is a Model.
+    """
+
+    name: str
+    place: str
+    description: Description
+    attachments: tuple[str, ...] = ()
+    closed: bool = True
+
+    def __post_init__(self) -> None:
+        self.names = OwnNames(self.description)
+        self.size = size_of(self.description) + 1
+        self.given = {e.name: e for s in ("parameters", "inputs") for e in self.description.sections[s]}
+
+
+def size_of(description: Description) -> int:
+    """Number of entries and instances."""
+    return sum(map(len, description.sections.values())) + len(description.instances)
+
+
+@dataclass
+class Instance:
+    """One use of a component: its name, prefix, attachments by name, and values of parameters and inputs.
+
+    ``places`` tells where in the instance's entry each value stands.
+    """
+
+    name: str
+    prefix: str
+    at: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
+    initial: Mapping[str, Any] = field(default_factory=dict)
+    guess: Mapping[str, Any] = field(default_factory=dict)
+
+
+def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> None:
+    """Add the entries of an instance to a description; what is wrong with it is noted at ``path``."""
+
+    def told(place: str, message: str, remedy: str, code: str) -> None:
+        """A fault of the component itself."""
+        where = component.description.place(place)
+        faults.take(Problem(f"{component.place}{place}", message, remedy, *where, code))
+
+    attached = _attachments(target, component, instance, path, faults.add)
+    values = _values(component, instance, path, faults.add, told)
+    if attached is None or values is None:
+        return
+    numbers, texts, units = values
+    origins = {
+        f"{section}.{entry.name}": f"{section}.{instance.prefix}{entry.name}"
+        for section, entries in component.description.sections.items()
+        for entry in entries
+    }
+    renaming = Renaming(component.names, instance.prefix, texts, attached, component.closed, told)
+    _copy_origins(target, component, instance, origins)
+    for section in SECTIONS:
+        for entry in component.description.sections[section]:
+            if section == "bodies" and entry.name == GROUND_NAME:
+                _add_to_ground(target, renaming, entry)
+            elif section not in ("parameters", "inputs") or entry.name not in texts:
+                made = visit_entry(section, entry, renaming)
+                if section in ("parameters", "inputs") and entry.name in numbers:
+                    made.values["value"] = numbers[entry.name]
+                    made.values |= {"unit": units[entry.name]} if entry.name in units else {}
+                if made.values.get("type") == "native" and section == "functions":
+                    made.values.setdefault("function", entry.name)
+                made.name = f"{instance.prefix}{entry.name}"
+                made.path = f"{section}.{made.name}"
+                target.sections[section].append(made)
+    for name, (body, placed) in renaming.markers.items():
+        _add_marker(target, body, name, placed)
+    _add_starts(target, component, instance, renaming)
+
+
+def _split(place: str) -> tuple[str, str]:
+    """``joints.hip`` and ``.axis`` of ``joints.hip.axis``."""
+    section, _, rest = place.partition(".")
+    name = rest.partition(".")[0].partition("[")[0]
+    return f"{section}.{name}", rest[len(name) :]
+
+
+def _attachments(
+    target: Description, component: Component, instance: Instance, path: str, fault: Fault
+) -> dict[str, Attached] | None:
+    known = [*component.attachments, GROUND_NAME]
+    found, sound = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}, True
+    for name in instance.at:
+        if name not in known:
+            message = f"{component.name} has no attachment {name!r}"
+            fault(f"{path}.at.{name}", message, nearest(str(name), known, "it has"), "EG-NAME-UNKNOWN")
+            sound = False
+    for name in known:
+        if name in instance.at:
+            attached = _attached(target, instance.at[name])
+            if attached is None:
+                remedy = "give a body, body.marker, ground or {body, at, rpy}; the marker must be declared before"
+                fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy, "EG-TYPE")
+                sound = False
+            else:
+                found[name] = attached
+        elif name != GROUND_NAME:
+            remedy = "give a body, body.marker, ground or {body, at, rpy}"
+            fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy, "EG-MISSING")
+            sound = False
+    return found if sound else None
+
+
+def _attached(target: Description, reference: Any) -> Attached | None:
+    plain = Undotted(target.instances).coordinate
+    if isinstance(reference, Mapping):
+        body = reference.get("body")
+        placed = {key: value for key, value in reference.items() if key != "body"}
+        return Attached({**reference, "body": plain(body)}, plain(body), placed) if isinstance(body, str) else None
+    if not isinstance(reference, str):
+        return None
+    reference = plain(reference)
+    body, dot, name = reference.partition(".")
+    if not dot:
+        return Attached(reference, body, {})
+    for entry in target.sections["bodies"]:
+        markers = entry.values.get("markers", {}) if entry.name == body else {}
+        for marker, placed in markers.items() if isinstance(markers, Mapping) else markers:
+            if marker == name:
+                return Attached(reference, body, placed if isinstance(placed, Mapping) else {"at": placed})
+    return None
+
+
+def _values(
+    component: Component, instance: Instance, path: str, fault: Fault, told: Fault
+) -> tuple[dict[str, Any], dict[str, str], dict[str, str]] | None:
+    """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
+    sound = True
+    for name in instance.values:
+        if name not in component.given:
+            remedy = nearest(str(name), component.given, "parameters and inputs")
+            place = instance.places.get(name, name)
+            fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
+            sound = False
+    numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
+    for name, entry in component.given.items():
+        read = read_given(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
+        if read is None:
+            sound = False
+            continue
+        given = read.value
+        if given is not None and is_constant(given):
+            numbers[name] = given
+            units |= {} if read.unit is None else {name: read.unit}
+        elif given is not None:
+            texts[name] = str(given)
+        elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
+            if _is_converted(entry.values.get("unit")):
+                place = f"{entry.path}.unit"
+                remedy = "give an SI unit: parameters are in SI units, so the expression is too"
+                told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
+                sound = False
+            renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
+            texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))
+    return (numbers, texts, units) if sound else None
+
+
+def _is_converted(unit: Any) -> bool:
+    """Whether a value in this unit is not the same number in SI units."""
+    try:
+        return isinstance(unit, str) and read_unit(unit).size != 1.0
+    except UnitError:  # told where the parameter is read
+        return False
+
+
+def _copy_origins(target: Description, component: Component, instance: Instance, origins: Mapping[str, str]) -> None:
+    """Lines and origins of what the instance brings."""
+    inner = component.description
+    for key, new in origins.items():
+        found = inner.origins.get(key)
+        place, name, prefix = found or (f"{component.place}{key}", "", "")
+        whole = f"{instance.name}.{name}" if name else instance.name
+        target.origins[new] = Origin(place, whole, instance.prefix + prefix)
+    for key, place_in_file in inner.lines.items():
+        head, rest = _split(key)
+        if head in origins:
+            target.lines.setdefault(origins[head] + rest, place_in_file)
+    for name, prefix in inner.instances.items():
+        target.instances[f"{instance.prefix}{name}"] = instance.prefix + prefix
+
+
+def _add_to_ground(target: Description, renaming: Renaming, entry: DescribedEntry) -> None:
+    """Markers and shapes that a component gives to ground, on the body that stands in its place."""
+    made = visit_entry("bodies", entry, renaming).values
+    markers = made.get("markers", {})
+    for name, placed in markers.items() if isinstance(markers, Mapping) else ():
+        if isinstance(placed, Mapping):
+            body = renaming.attached[GROUND_NAME].body
+            _add_marker(target, body, f"{renaming.prefix}{name}", renaming.placed(GROUND_NAME, placed))
+    shapes = made.get("display", [])
+    for shape in shapes if isinstance(shapes, list) else ():
+        home = _body_entry(target, renaming.attached[GROUND_NAME].body)
+        if home is not None and isinstance(shape, Mapping):
+            own = {key: x for key, x in shape.items() if key in MARKER}
+            placed_shape = {**shape, **renaming.placed(GROUND_NAME, own)}
+            home.values["display"] = [*home.values.get("display", ()), placed_shape]
+
+
+def _body_entry(target: Description, body: str) -> DescribedEntry | None:
+    entries = target.sections["bodies"]
+    found = next((entry for entry in entries if entry.name == body), None)
+    return target.add("bodies", GROUND_NAME, {}) if found is None and body == GROUND_NAME else found
+
+
+def _add_marker(target: Description, body: str, name: str, placed: Mapping[str, Any]) -> None:
+    entry = _body_entry(target, body)
+    if entry is not None:
+        markers = entry.values.get("markers", {})
+        listed = dict(markers.items() if isinstance(markers, Mapping) else markers)
+        entry.values["markers"] = {**listed, name: dict(placed)}
+
+
+def _add_starts(target: Description, component: Component, instance: Instance, renaming: Renaming) -> None:
+    """Initial values and guesses; those of the model itself come after them, and before them in force."""
+    for key, given in (("initial", instance.initial), ("guess", instance.guess)):
+        own = component.description.values.get(key, {})
+
+        def inside(name: Any, slot: Slot) -> Any:
+            return started(name, lambda plain: renaming.prefix + plain, renaming, slot)
+
+        slots = {name: Slot("", "", key, (name,)) for name in (own if isinstance(own, Mapping) else ())}
+        made = {inside(name, slot): renaming.scalar(own[name], slot) for name, slot in slots.items()}
+        made |= {inside(name, Slot("", "", key, (name,))): value for name, value in given.items()}
+        if made:
+            kept = target.values.get(key, {})
+            whole = {**made, **kept} if isinstance(kept, Mapping) else made
+            if isinstance(kept, dict) and type(kept) is not dict:  # the Settings of a Model
+                kept.clear()
+                kept.update(whole)
+            else:
+                target.values[key] = whole
+
+
+# -- the variables of repeated instances -------------------------------------------------------------------------------
+Round = dict[str, Any]
+
+_LISTS = "give a list of numbers or expressions, a count n for 1 to n, or {from, to, step}"
+
+
+def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
+    """The values of all variables in each round; None where something is wrong, which is told."""
+    if not isinstance(given, Mapping) or not given:
+        fault(path, f"{given!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
+        return None
+    columns: dict[str, list[Any]] = {}
+    for name, values in given.items():
+        place = f"{path}.{name}"
+        wrong = fault_of_name(name, symbol=True)
+        if wrong:
+            fault(place, *wrong, "EG-NAME-FORM")
+            return None
+        listed = _values_of(values)
+        if listed is None:
+            fault(place, f"{values!r} is not a list of values", _LISTS, "EG-TYPE")
+            return None
+        if not 1 <= len(listed) <= ROUNDS:
+            many, none = ("has more than {} values", "EG-TOO-LARGE"), ("has no values", "EG-SHAPE")
+            wrong_count, code = many if listed else none
+            fault(place, wrong_count.format(ROUNDS), f"1 to {ROUNDS}", code)
+            return None
+        columns[name] = listed
+    counts = {name: len(values) for name, values in columns.items()}
+    if len(set(counts.values())) > 1:
+        shown = ", ".join(f"{name} has {count}" for name, count in counts.items())
+        remedy = "all lists must have the same length: the variables take their values side by side"
+        fault(path, f"lists of different lengths: {shown}", remedy, "EG-SHAPE")
+        return None
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _values_of(values: Any) -> list[Any] | None:
+    if isinstance(values, int) and not isinstance(values, bool):
+        return list(range(1, min(values, ROUNDS + 1) + 1))
+    if isinstance(values, Mapping):
+        first, last, step = (values.get(key, default) for key, default in (("from", 1), ("to", None), ("step", 1)))
+        if not {*values} <= {"from", "to", "step"} or not all(map(_is_number, (first, last, step))) or step == 0:
+            return None
+        begin, end, by = (Decimal(repr(x)) for x in (first, last, step))  # as written, so that the end counts
+        count = math.floor((end - begin) / by) + 1
+        whole = all(isinstance(x, int) for x in (first, step))
+        return [(int if whole else float)(begin + k * by) for k in range(max(0, min(count, ROUNDS + 1)))]
+    listed = items(values)
+    if listed is None or not all(isinstance(x, str) or _is_number(x) for x in listed):
+        return None
+    return listed
+
+
+def put_in(value: Any, variables: Round) -> Any:
+    """A value, or all that it holds, with the variables of a round put in."""
+    if isinstance(value, str):
+        if value.strip() in variables:
+            return variables[value.strip()]
+        return rewritten(value, lambda name: _text_of(name, variables))
+    if isinstance(value, Mapping):
+        return {key: part if key == "body" else put_in(part, variables) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [put_in(part, variables) for part in value]
+    return value
+
+
+def _text_of(name: str, variables: Round) -> str:
+    if name not in variables:
+        return name
+    value = variables[name]
+    return in_brackets(value if isinstance(value, str) else repr(value))
+
+
+ENTRIES = 20_000  #: most entries and instances of a model that its components make
+
+
+# -- the sections of a model file --------------------------------------------------------------------------------------
+#: Reads the sections of a mapping into a description: mapping, path before its keys, the description.
+Fill = Callable[[Mapping[str, Any], str, Description], None]
+#: Reads a file that the model file names; None where it is at fault, which is told.
+Open = Callable[[str], Description | None]
+
+
+class Components:
+    """The components of one model file, each read when it is first added.
+
+    Parameters
+    ----------
+    given : object
+        The section ``components``.
+    lines : mapping
+        Dotted path -> (file, line) in the model file.
+    fill, open_file : callable
+        Read what stands in the model file, and files that it names.
+    faults : Faults
+    """
+
+    def __init__(
+        self, given: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
+    ) -> None:
+        self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
+        self.given: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
+        if given is not None and not isinstance(given, Mapping):
+            faults.add(
+                "components", f"is not {kinds.Table.says}", "write the names of the components as keys", "EG-TYPE"
+            )
+        self.read: dict[str, Component | None] = {}
+        self.within: list[str] = []
+
+    def read_all(self) -> None:
+        """Read also those that nothing adds, so that their faults are told."""
+        for name in self.given:
+            self.find(name, f"components.{name}")
+
+    def find(self, name: Any, path: str) -> Component | None:
+        """The component of a name; None where there is none, or it has faults, which are told."""
+        if not isinstance(name, str) or name not in self.given:
+            self.fault(path, f"no component {name!r}", nearest(str(name), self.given, "components"), "EG-NAME-UNKNOWN")
+            return None
+        if name in self.within:
+            chain = ", ".join([*self.within[self.within.index(name) :], name])
+            self.fault(
+                path, f"the component {name!r} adds itself: {chain}", "remove one of these additions", "EG-CIRCLE"
+            )
+            return None
+        if name not in self.read:
+            self.within.append(name)
+            self.read[name] = self._read(name)
+            self.within.pop()
+        return self.read[name]
+
+    def _read(self, name: str) -> Component | None:
+        given, path = self.given[name], f"components.{name}"
+        wrong = fault_of_name(name)
+        if wrong:
+            self.fault(path, *wrong, "EG-NAME-FORM")
+        if not isinstance(given, Mapping):
+            self.fault(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
+            return None
+        for key in given:
+            if key not in COMPONENT:
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT), "EG-NAME-UNKNOWN")
+        if "file" in given:
+            if len(given) > 1:
+                remedy = "give file alone; the file describes the whole component"
+                self.fault(path, "has keys beside file", remedy, "EG-CONFLICT")
+            return self._read_file(name, given["file"], path)
+        start = f"{path}."
+        lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
+        description = Description(lines=lines)
+        self.fill(given, start, description)
+        self.add(given.get("add"), start, description)
+        description = undotted(description)
+        return self._checked(Component(name, start, description, self._attachments(given, start), closed=False))
+
+    def _read_file(self, name: str, file: Any, path: str) -> Component | None:
+        if not isinstance(file, str):
+            self.fault(f"{path}.file", f"{file!r} is not {kinds.File.says}", "", "EG-TYPE")
+            return None
+        try:
+            description = self.open_file(file)
+        except FileNotFoundError:
+            self.fault(
+                f"{path}.file", f"there is no file {file}", "give its path from the folder of the model file", "EG-FILE"
+            )
+            return None
+        except UsageError as error:
+            self.fault(f"{path}.file", str(error), "", error.code)
+            return None
+        except OSError as error:
+            self.fault(f"{path}.file", f"{file} cannot be read ({error.strerror})", "", "EG-FILE")
+            return None
+        if description is None:
+            return None
+        return self._checked(component_of(description, name, "", lambda _, *what: self.fault(f"{path}.file", *what)))
+
+    def _checked(self, component: Component) -> Component:
+        for name in component.attachments:
+            if name in component.names.bodies or name in (GROUND_NAME, "body"):
+                message = f"the attachment {name!r} has the name of a body"
+                self.fault(f"{component.place}attachments", message, "rename one of them", "EG-NAME-TAKEN")
+        return component
+
+    def _attachments(self, given: Mapping[str, Any], start: str) -> tuple[str, ...]:
+        listed = given.get("attachments") or []
+        listed = [listed] if isinstance(listed, str) else listed
+        if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
+            self.fault(f"{start}attachments", f"{listed!r} is not {kinds.Names.says}", "such as [foot, top]", "EG-TYPE")
+            return ()
+        return tuple(listed)
+
+    # -- instances ------------------------------------------------------------------------------------------------
+    def add(self, given: Any, start: str, target: Description) -> None:
+        """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
+        if given is None:
+            return
+        if not isinstance(given, Mapping):
+            self.fault(
+                f"{start}add", f"is not {kinds.Table.says}", "write the names of the instances as keys", "EG-TYPE"
+            )
+            return
+        for name, keys in given.items():
+            self._add_one(name, keys, f"{start}add.{name}", target)
+
+    def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:
+        wrong = fault_of_name(name)
+        if wrong:
+            self.fault(path, *wrong, "EG-NAME-FORM")
+            return
+        if not isinstance(keys, Mapping):
+            self.fault(path, f"is not {kinds.Table.says}", "write component: NAME and its other keys", "EG-TYPE")
+            return
+        for key in keys:
+            if key not in ADDED:
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED), "EG-NAME-UNKNOWN")
+        if "component" not in keys:
+            self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
+            return
+        component = self.find(keys["component"], f"{path}.component")
+        rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
+        prefix = keys.get("prefix", f"{name}_")
+        if prefix != "" and fault_of_name(prefix):
+            remedy = "use letters, digits and underscores"
+            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", remedy, "EG-NAME-FORM")
+            return
+        if component is None or rounds is None:
+            return
+        if size_of(target) + component.size * len(rounds) > ENTRIES:
+            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances", "EG-TOO-LARGE")
+            return
+        for k, variables in enumerate(rounds):
+            number = str(k + 1) if "for" in keys else ""
+            before = f"{prefix.rstrip('_')}{number}_" if number else prefix
+            instance = self._instance(component, f"{name}{number}", before, keys, variables, path)
+            if instance is None or not claim(target, instance, path, self.fault):
+                return
+            add_instance(target, component, instance, path, self.faults)
+
+    def _instance(
+        self, component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Any, path: str
+    ) -> Instance | None:
+        tables: dict[str, Mapping[str, Any]] = {}
+        for key in ("parameters", "inputs", "initial", "guess"):
+            given = put_in(keys.get(key) or {}, variables)
+            if not isinstance(given, Mapping):
+                self.fault(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
+                return None
+            tables[key] = given
+        at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
+        values = {**tables["parameters"], **tables["inputs"]}
+        named = named_attachments(component, at, f"{path}.at", self.fault)
+        if named is None:
+            return None
+        places = {one: f"{key}.{one}" for key in ("parameters", "inputs") for one in tables[key]}
+        return Instance(name, prefix, named, values, places, tables["initial"], tables["guess"])
+
+
+def named_attachments(component: Component, at: Any, path: str, fault: Fault) -> Mapping[str, Any] | None:
+    """What is given as ``at``, by the names of attachments; one marker stands for the only one, or for ground."""
+    if at is None:
+        return {}
+    if isinstance(at, Mapping) and "body" not in at:
+        return at
+    if len(component.attachments) > 1:
+        remedy = f"give a mapping of {', '.join(component.attachments)}"
+        fault(path, f"{component.name} has several attachments", remedy, "EG-MISSING")
+        return None
+    return {(component.attachments or (GROUND_NAME,))[0]: at}
+
+
+def claim(target: Description, instance: Instance, path: str, fault: Fault) -> bool:
+    """Take the name of an instance into a description; False, and a fault, where it is taken."""
+    if instance.name in target.instances:
+        fault(path, f"there is an instance {instance.name!r} already", "rename one of them", "EG-NAME-TAKEN")
+        return False
+    if any(entry.name == instance.name for entry in target.sections["bodies"]):
+        message = f"{instance.name!r} is a body too, so {instance.name}.x could mean two things"
+        fault(path, message, "rename one of them", "EG-NAME-TAKEN")
+        return False
+    target.instances[instance.name] = instance.prefix
+    return True
+
+
+def component_of(description: Description, name: str, place: str, fault: Fault) -> Component:
+    """A component of the description of a whole model: its bodies, joints and what belongs to them."""
+    for key in ("lagrangian", "equations"):
+        if description.values.get(key) is not None:
+            remedy = "a component can contain only bodies, joints and what belongs to them"
+            fault("", f"{name} has {key}", remedy, "EG-UNSUPPORTED")
+    check = description.values.get("check_inertia")
+    for entry in description.sections["bodies"]:
+        if check is not None and entry.name != GROUND_NAME:
+            entry.values.setdefault("check_inertia", check)
+    attachments = description.values.get("attachments") or []
+    attachments = [attachments] if isinstance(attachments, str) else attachments
+    return Component(name, place, description, tuple(map(str, attachments)))

@@ -1,0 +1,248 @@
+"""What Python calls and model files both fill, in the layout of the model file.
+
+A :class:`Description` is plain data: sections of named entries whose values are numbers, texts, sequences, mappings or
+SymPy expressions as the user gave them.  Nothing is looked up or judged here; that is done by
+:mod:`~eomgen.model.build_mechanism`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from ..elements.kinds import is_zero as is_zero
+from ..elements.kinds import items as items
+from ..errors import Problem, cannot
+from ..expr.shown import NO_TEXT, shortened, shown
+
+GROUND_NAME = "ground"
+
+#: Sections made of named entries, in the order of a model file.
+SECTIONS = (
+    *("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "states", "outputs", "events"),
+)
+
+Values = dict[str, Any]
+
+
+@dataclass
+class DescribedEntry:
+    """One named thing of a section; ``path`` is its dotted place.
+
+    ``trusted`` tells whether it may bring code of its own, ``folder`` where its relative file names start.
+    """
+
+    name: Any
+    values: Values
+    path: str
+    trusted: bool = True
+    folder: str = ""
+
+
+class Origin(NamedTuple):
+    """Where an entry that an instance of a component brought comes from.
+
+    ``place`` is the dotted path of the entry in the component, ``instance`` the name of the instance (``leg1``, or
+    ``leg1.knee``), ``prefix`` what stands before its names.
+    """
+
+    place: str
+    instance: str
+    prefix: str
+
+
+@dataclass
+class Description:
+    """Everything said about a model so far, and where.
+
+    Attributes
+    ----------
+    values : dict
+        What stands outside the sections: name, doc, gravity, independent, initial,
+        guess, simulation, lagrangian.
+    sections : dict of list of DescribedEntry
+        One list for each of :data:`SECTIONS`, in the order of the description; names may still repeat.
+    motions : dict
+        Label of an unnamed marker whose motion was asked for -> its reference (a mapping of body, at, rpy).
+    lines : dict
+        Dotted path -> (file, line), filled when the model comes from a file.
+    problems : list of Problem
+        Faults found while the description was made.
+    notes : list of str
+        What an import left out or changed.
+    renamed : dict
+        Section -> name in an imported file, or in SymPy -> name in the model, where they differ.
+    instances : dict of str to str
+        Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
+    origins : dict of str to Origin
+        Path of an entry that an instance brought -> where it comes from.
+    incomplete : bool
+        Whether components or instances have faults, so that names are missing.
+    """
+
+    values: Values = field(default_factory=dict)
+    sections: dict[str, list[DescribedEntry]] = field(default_factory=lambda: {name: [] for name in SECTIONS})
+    motions: dict[str, Values] = field(default_factory=dict)
+    lines: dict[str, tuple[str, int]] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    renamed: dict[str, dict[str, str]] = field(default_factory=dict)
+    instances: dict[str, str] = field(default_factory=dict)
+    origins: dict[str, Origin] = field(default_factory=dict)
+    incomplete: bool = False
+
+    def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
+        """Append an entry to a section."""
+        entry = DescribedEntry(name, values, f"{section}.{shortened(name)}")
+        self.sections[section].append(entry)
+        return entry
+
+    def declare(self, parameters: Mapping[str, Any], inputs: Mapping[str, Any], used: Sequence[str]) -> None:
+        """Declare inputs and parameters with their values, None for none, and what else is used as parameters."""
+        for name in dict.fromkeys((*parameters, *used)):
+            value = parameters.get(name)
+            self.add("parameters", name, {} if value is None else {"value": value})
+        for name, value in inputs.items():
+            self.add("inputs", name, {} if value is None else {"value": value})
+
+    def note_renamed(self, renamed: dict[str, dict[str, str]]) -> None:
+        """Keep the names that an import changed, and note them."""
+        self.renamed = renamed
+        for section, names in renamed.items():
+            self.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
+
+    def place(self, path: str) -> tuple[str, int]:
+        """File and line of a dotted path; ``("", 0)`` if the model comes from no file."""
+        return place_of(path, self.lines)
+
+
+def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]:
+    """File and line of a dotted path, or of the nearest enclosing one; ``("", 0)`` if there is none."""
+    while True:
+        found = lines.get(path)
+        if found is not None:
+            return found
+        if not path:
+            return ("", 0)
+        path = parent_of(path)
+
+
+_LAST_PART = re.compile(r"(\.[^.\[]*|\[\d+\])\Z")
+
+
+def parent_of(path: str) -> str:
+    """The path without its last key or index; empty for a path of one part."""
+    shorter = _LAST_PART.sub("", path)
+    return shorter if shorter != path else ""
+
+
+class Faults:
+    """Collects the problems of one description, with the file and line of each."""
+
+    def __init__(self, description: Description) -> None:
+        self.lines, self.origins = description.lines, description.origins
+        self.problems: list[Problem] = []
+        self._seen: set[Problem] = set()
+        self._paths: set[str] = set()
+        for problem in description.problems:
+            self.take(problem)
+
+    def add(self, path: str, message: str, remedy: str = "", code: str = "") -> None:
+        """Note a fault at a dotted path."""
+        self.take(Problem(path, message, remedy, *place_of(path, self.lines), code))
+
+    def missing(self, path: str, remedy: str) -> None:
+        """Note that something is missing."""
+        self.add(path, "is missing", remedy, "EG-MISSING")
+
+    def take(self, problem: Problem) -> None:
+        """Note a fault whose file and line are known; one that was noted already counts once."""
+        if problem in self._seen:
+            return
+        self._seen.add(problem)
+        self.problems.append(problem)
+        path = problem.path
+        while path and path not in self._paths:
+            self._paths.add(path)
+            path = parent_of(path)
+
+    def __len__(self) -> int:
+        return len(self.problems)
+
+    def under(self, path: str) -> bool:
+        """Whether a fault was noted at a path or inside it."""
+        return path in self._paths
+
+    def sorted(self) -> list[Problem]:
+        """All problems; those of a file in the order of its lines, one of several instances once."""
+        return list_names_once(sorted(self._told_once(), key=lambda p: (p.file, p.line)))
+
+    def _told_once(self) -> list[Problem]:
+        """Problems of what instances brought, at the entry of the component, with the names of the instances."""
+        found: dict[Any, tuple[Problem, list[str]]] = {}
+        for problem in self.problems:
+            section, _, rest = problem.path.partition(".")
+            name = re.split(r"[.\[]", rest, maxsplit=1)[0]
+            origin = self.origins.get(f"{section}.{name}")
+            if origin is None:
+                found[problem] = (problem, [])
+                continue
+            path = origin.place + rest[len(name) :]
+            alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
+            first = problem._replace(path=path)
+            found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
+        return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in found.values()]
+
+
+def list_names_once(problems: Sequence[Problem]) -> list[Problem]:
+    """The same problems, of which only the first that lists certain names does so; the others refer to it."""
+    told: set[str] = set()
+    result = []
+    for problem in problems:
+        for names in _LISTED.findall(problem.remedy):
+            if names in told:
+                problem = problem._replace(remedy=problem.remedy.replace(names, "those listed above", 1))
+            told.add(names)
+        result.append(problem)
+    return result
+
+
+#: Four names or more behind what they are: ``bodies: ground, rod, ...``.
+_LISTED = re.compile(r"(?<=: )(?:[\w.]+, ){3,}[\w.]+")
+
+
+def _in_instances(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:3])
+    return f" (in {shown} and {len(names) - 3} more)" if len(names) > 3 else f" (in {shown})"
+
+
+def text_of(value: Any) -> str:
+    """A value as it is shown in labels: numbers exactly, expressions as written."""
+    if isinstance(value, float):
+        return repr(float(value))
+    listed = items(value)
+    if listed is not None:
+        return "(" + ", ".join(text_of(x) for x in listed) + ")"
+    return shown(value)
+
+
+def label_of(reference: Mapping[str, Any]) -> str:
+    """The label of an unnamed marker, e.g. ``crank.at(r, 0, 0)``."""
+    at = reference.get("at", (0, 0, 0))
+    text = text_of(at)
+    if not text.startswith("("):
+        text = f"({text})"
+    turn = items(reference.get("rpy"))
+    if turn is not None and not is_zero(turn):
+        text = f"{text[:-1]}, rpy={text_of(turn)})"
+    for key in ("axes", "matrix", "on"):
+        if key in reference:
+            text = f"{text[:-1]}, {key}={text_of(reference[key])})"
+    if NO_TEXT in text:  # two such markers would bear one label
+        raise cannot(
+            f"the place of an unnamed marker of {shown(reference.get('body'))} cannot be written as a text; name the "
+            "marker"
+        )
+    return f"{reference.get('body')}.at{text}"

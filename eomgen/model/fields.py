@@ -1,0 +1,424 @@
+"""Section or type -> the keys it knows, what each holds, and its default; from these the JSON Schema (draft 2020-12).
+
+This one table drives the check of Python calls, the keys of model files and the exported JSON Schema.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..base.numeric.splines import KINDS as TABLES
+from ..contact import CONTACTS
+from ..elements import kinds as k
+from ..elements.constraints import CONSTRAINTS
+from ..elements.constraints.switching import SWITCHING
+from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REACH, TIME, Dimension
+from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
+from ..elements.element_type import ElementType, Types
+from ..elements.forces import FORCES
+from ..elements.joints import JOINTS
+from ..elements.kinds import LIMITS as LIMITS
+from ..elements.kinds import MARKER, Fields, Schema, Table, definitions, object_schema, ref, table_schema, typed_schema
+from ..elements.kinds import PLACED as PLACED
+from ..elements.solids import SOLIDS
+from .mechanism import Simulation
+
+FORCES |= CONTACTS
+
+SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4", "moreau")
+FIXED_STEP = ("RK4", "moreau")  #: methods whose steps are of one size
+
+_UNIT = k.Unit("unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
+_DOC = k.Text("one sentence, shown in reports", default="")
+_LATEX = k.Latex("how formulas and plots print it, in LaTeX (from its name unless given)", default="")
+_LATEXES = k.Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
+_NAME = k.Name("name of the model and of the generated module", required=True)
+
+PARAMETER: Fields = {
+    "value": k.Number("value; needed when the model is compiled"),
+    "unit": _UNIT,
+    "doc": _DOC,
+    "latex": _LATEX,
+}
+INPUT: Fields = {
+    "value": k.Number("value as long as a call gives none", default=0.0),
+    "signal": k.Scalar(
+        "value over time, in runs that give none: of t, coordinates, velocities, parameters", level=k.MOTION
+    ),
+    "unit": _UNIT,
+    "doc": _DOC,
+    "latex": _LATEX,
+}
+OUTPUT_FIELDS: Fields = {
+    "expression": k.Scalar(
+        "the result: of t, parameters, inputs, coordinates, rates, markers", required=True, level=k.OUTPUT
+    ),
+    "unit": _UNIT,
+    "doc": _DOC,
+    "latex": _LATEX,
+}
+STATE: Fields = {
+    "rate": k.Scalar(
+        "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
+        level=k.LAW,
+    ),
+    "sampled": k.Scalar(
+        "instead of rate: its new value at each sampling time, held in between; without it a run's controllers give it",
+        level=k.LAW,
+    ),
+    "period": k.Scalar("time from one sampling time to the next (s)", dimension=TIME),
+    "offset": k.Scalar("a sampling time (s)", default=0, dimension=TIME),
+    "initial": k.Scalar("its value where a run begins", default=0),
+    "unit": k.Unit("unit of the state; an initial value that is a number is converted to SI", default=""),
+    "doc": _DOC,
+    "latex": _LATEX,
+}
+EVENT: Fields = {
+    "expression": k.Scalar(
+        "the event is where it is 0: of t, parameters, inputs, coordinates, rates, positions, velocities of markers",
+        required=True,
+        level=k.OUTPUT,
+    ),
+    "terminal": k.Times("whether the event ends the run, or how many do", default=False),
+    "direction": k.Sign("1: only where it rises, -1: only where it falls, 0: both", default=0),
+    "reset": k.Rates("new coordinates and velocities, from those before the event", default=(), level=k.OUTPUT),
+    "restitution": k.Number("for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
+    "friction": k.Number("beside a restitution: Coulomb's coefficient of friction in the impact"),
+    "slip": k.SomeNames("beside friction: the output that is the sliding velocity; in space two of them"),
+    "doc": _DOC,
+}
+FUNCTION: dict[str, Fields] = {
+    "table": {
+        "x": k.Numbers("points, strictly increasing", required=True),
+        "y": k.Numbers("values at the points; with z, points along the second argument", required=True),
+        "z": k.Grid("values on the grid of x and y, for a function of two arguments"),
+        "kind": k.Choice("interpolation between the points", default="cubic", choices=tuple(TABLES)),
+        "extrapolation": k.Choice(
+            "beyond the points: keep the slope or the value", default="linear", choices=("linear", "constant")
+        ),
+    },
+    "native": {
+        "source": k.Text("C source file, relative to the model file; needs --allow-native", required=True),
+        "function": k.Name("C function double f(double, ...) (the name of the entry unless given)"),
+        "arguments": k.Count("number of arguments (that of derivatives unless given, or 1)"),
+        "derivatives": k.Functions("C functions of the derivative along each argument"),
+        "second_derivatives": k.Functions("C functions of the second derivatives, along 11, 12, .., 22, .."),
+        "python": k.Text("Python file with functions of the same names, for evaluation without C"),
+    },
+}
+_MASS = k.Scalar("mass (kg), instead of a density", dimension=MASS)
+_DENSITY = k.Scalar("density (kg/m^3)", dimension=Dimension(-3, 1))
+_SUBTRACT = k.Flag("whether the solid is a hole", default=False)
+#: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
+SOLID: dict[str, Fields] = {
+    name: dict(solid.dimensions)
+    | ({"axis": k.Axis("direction of its z axis in the body", default="z")} if solid.has_axis else {})
+    | {
+        solid.content_key: _DENSITY
+        if solid.content_key == "density"
+        else k.Scalar("mass per length (kg/m)", dimension=Dimension(-1, 1))
+    }
+    for name, solid in SOLIDS.items()
+} | {
+    "mesh": {
+        "file": k.File("STL file; its path from the folder of the model file", required=True),
+        "scale": k.Scalar("metres in one unit of the file", default=1, dimension=LENGTH),
+        "density": _DENSITY,
+    }
+}
+
+
+def solid_fields(type_name: str) -> Fields:
+    """The keys of one type of solid."""
+    kind = k.Choice("type of the solid", required=True, choices=tuple(SOLID))
+    return {"type": kind, **SOLID[type_name], "mass": _MASS, **MARKER, "subtract": _SUBTRACT}
+
+
+SOLID_KEYS = frozenset(key for name in SOLID for key in solid_fields(name))
+
+
+class Solids(k.BodyParts):
+    """A list of solids {type, ...}."""
+
+    schema, defines = k.define("solids", lambda: k.array({"oneOf": [_solid_schema(name) for name in SOLID]}))
+    parts = {key: field for fields in SOLID.values() for key, field in fields.items()} | MARKER
+
+
+def _solid_schema(name: str) -> k.Schema:
+    density = "line_density" if "line_density" in SOLID[name] else "density"
+    schema = k.typed_schema(solid_fields(name), name)
+    return {**schema, "oneOf": [{"required": ["mass"]}, {"required": [density]}]}
+
+
+BODY: Fields = {
+    "mass": k.Scalar("mass (kg); 0 for a body without mass", dimension=MASS),
+    "com": k.Vector("centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
+    "inertia": k.Inertia(
+        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say",
+        default=(0, 0, 0),
+        dimension=MOMENT_OF_INERTIA,
+    ),
+    "markers": k.Markers("named frames fixed in the body", default=()),
+    "principal": k.Vector("principal moments (kg m^2), instead of inertia", dimension=MOMENT_OF_INERTIA),
+    "first_moment": k.Vector(
+        "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
+    ),
+    "about": k.About("point of the inertia; a marker gives its axes too", default="com", dimension=LENGTH),
+    "axes": k.Vector("roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
+    "solids": Solids("solids of uniform density, which give mass, com, inertia", default=()),
+    "points": k.Points("point masses that are added", default=()),
+    "check_inertia": k.Check("a mass and inertia that no body can have: as in the model, unless given"),
+    "display": k.Display("shapes for pictures, in body axes", default=()),
+}
+GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
+
+JOINT: Fields = {
+    "type": k.Choice("type of the joint", required=True, choices=tuple(JOINTS)),
+    "between": k.Pair(
+        "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P",
+        required=True,
+    ),
+}
+AXIS = k.Axis("axis of the joint, in both markers", default="z")
+AXIS_PAIR = k.TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
+COORDINATE = k.CoordinateName("name of the coordinate (the joint's name unless given)")
+COORDINATES = k.CoordinateNames("names of the coordinates, in order")
+#: Data of a joint that has coordinates; the last only where it has one.
+JOINT_DATA: Fields = {
+    "limits": k.Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
+    "dry_friction": k.Number("Coulomb friction (N m or N); stored, but it does not act"),
+    "armature": k.Scalar(
+        "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
+        dimension=ENERGY.times(TIME, 2).times(REACH, -2),
+    ),
+}
+LAGRANGIAN: Fields = {
+    "coordinates": k.CoordinateNames("generalized coordinates, in order", required=True),
+    "expression": k.Scalar("L(q, q_dot, t) = T - V", required=True, level=k.MOTION, dimension=ENERGY),
+    "forces": k.CoordinateForces("generalized forces", default=(), level=k.MOTION),
+    "dissipation": k.Scalar(
+        "Rayleigh's dissipation function", default=0, level=k.MOTION, dimension=ENERGY.times(TIME, -1)
+    ),
+    "constraints": k.Scalars(
+        "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=k.MOTION
+    ),
+    "latex": _LATEXES,
+}
+EQUATIONS: Fields = {
+    "coordinates": k.CoordinateNames("generalized coordinates q, in order", required=True),
+    "velocities": k.CoordinateNames("generalized velocities v, in order (<coordinate>_dot unless given)"),
+    "rates": k.Rates("q' of q, v, t, linear in v (q' = v unless given)", level=k.MOTION),
+    "intermediates": k.Rates("named parts of the expressions; each may use those before", level=k.MOTION),
+    "mass_matrix": k.Matrix("M in M v' = f, of q and t, symmetric", required=True, level=k.MOTION),
+    "forcing": k.Scalars("f, of q, v, t and inputs", required=True, level=k.MOTION),
+    "constraints": k.Scalars(
+        "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=k.MOTION
+    ),
+    "multipliers": k.Names("names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
+    "kinetic_energy": k.Scalar("kinetic energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
+    "potential_energy": k.Scalar("potential energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
+    "latex": _LATEXES,
+}
+SIMULATION: Fields = {
+    "end": k.PositiveNumber("end time (s)", default=Simulation.end),
+    "method": k.Choice("integrator", default=Simulation.method, choices=SOLVERS),
+    "rtol": k.PositiveNumber("relative tolerance", default=Simulation.rtol),
+    "atol": k.PositiveNumber("absolute tolerance", default=Simulation.atol),
+    "step": k.PositiveNumber("step size (s), for RK4 and moreau only"),
+}
+MODEL: Fields = {
+    "name": _NAME,
+    "doc": _DOC,
+    "gravity": k.Vector("acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0), dimension=ACCELERATION),
+    "parameters": k.Table("constants that can change between runs"),
+    "inputs": k.Table("quantities given from outside over time"),
+    "functions": k.Table("functions for use in expressions: tables, and C code"),
+    "bodies": k.Table("rigid bodies"),
+    "joints": k.Table("joints between bodies"),
+    "forces": k.Table("force elements"),
+    "contacts": k.Table("contact between groups of shapes: forces of type contacts"),
+    "constraints": k.Table("equations between coordinates or markers"),
+    "states": k.Table("first-order states: names of quantities with their rates"),
+    "outputs": k.Table("named results"),
+    "events": k.Table("events to find during a run, and what they do"),
+    "components": k.Table("parts of mechanisms that can be added several times"),
+    "add": k.Table("instances of components"),
+    "attachments": k.Names("names for markers of the model to which this one is added"),
+    "lagrangian": k.Table("a bare Lagrangian, instead of bodies and joints"),
+    "equations": k.Table("equations of motion M v' = f, instead of bodies and joints"),
+    "independent": k.Names("independent coordinates of a mechanism with loops", default=()),
+    "initial": k.Table("initial values by coordinate, <coordinate>_dot, output or place of a marker"),
+    "guess": k.Table("rough values of coordinates, from which loops are closed"),
+    "simulation": k.Table("defaults of a simulation"),
+    "limits": k.Choice("whether a run that passes a limit of a joint warns", default="note", choices=("note", "off")),
+    "check_inertia": k.Check("masses and inertias that no body can have: refused or noted", default=True),
+}
+
+#: Keys of a model file that hold parts of mechanisms and their use; what they bring stands in the sections then.
+PARTS = ("components", "add")
+COMPONENT: Fields = {
+    "doc": _DOC,
+    "file": k.File("model file of the component (path from this file's folder), instead of all other keys"),
+    "attachments": MODEL["attachments"],
+    **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
+    **{key: MODEL[key] for key in ("constraints", "states", "outputs", "events", "initial", "guess", "add")},
+}
+ADDED: Fields = {
+    "component": k.Name("name of a component", required=True),
+    "prefix": k.Prefix("text before each name of the component (the entry's name and _ unless given)"),
+    "for": k.Loops("variables and their lists of values; one instance for each value, numbered 1, 2, ..."),
+    "at": k.AttachedTo("a marker for each attachment, or one for the only attachment or for its ground"),
+    "parameters": k.Measured("its parameters: numbers, {value, unit}, or expressions that replace them"),
+    "inputs": k.Measured("its inputs: numbers, {value, unit}, or expressions that replace them"),
+    "initial": k.Values("initial values, by names within the component"),
+    "guess": k.Values("rough coordinates, by names within the component"),
+}
+
+#: Sections whose entries may be written as one value: section -> the key it stands for.
+SHORT = {"parameters": "value", "inputs": "value", "states": "rate", "outputs": "expression", "events": "expression"}
+
+
+def joint_type(type_name: str) -> ElementType:
+    """One joint type as the type of an element."""
+    text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
+    keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
+    doc = f"a joint of type {type_name}: {text}".replace(", removes", " of 6 degrees of freedom, removes")
+    doc = doc.replace(". Allows", ".  Allows")
+    return ElementType(type_name, doc, keys, ends=("predecessor", "successor"))
+
+
+def joint_fields(type_name: str) -> Fields:
+    """The keys of one joint type."""
+    joint = JOINTS[type_name]
+    fields = JOINT | {key: field for key, field in joint.options.items() if field.required}
+    if joint.has_axis:
+        fields["axis"] = AXIS
+    if joint.has_axes:
+        fields["axes"] = AXIS_PAIR
+    if len(joint.coordinates) == 1:
+        fields["coordinate"] = COORDINATE
+    fields |= {key: field for key, field in joint.options.items() if key != "rotation"}
+    if joint.coordinates:
+        fields["coordinates"] = COORDINATES
+        fields |= joint.options  # in the order of the arguments
+        fields["limits"] = JOINT_DATA["limits"]
+    if len(joint.coordinates) == 1:
+        fields |= JOINT_DATA
+    if joint.coordinates:
+        fields["latex"] = _LATEXES
+    return fields | SWITCHING if joint.coordinates or type_name == "weld" else fields
+
+
+def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
+    """The keys of an entry of a section; empty for a type that is not known."""
+    kind = values.get("type")
+    types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
+    if types is not None and isinstance(kind, str) and kind in types:
+        return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
+    own: dict[str, Fields] = {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "states": STATE}
+    own |= {"outputs": OUTPUT_FIELDS, "events": EVENT}
+    return own.get(section, {})
+
+
+def acts_on_length(section: str, values: Mapping[str, Any], field: k.Field, is_length: Callable[[str], bool]) -> bool:
+    """Whether an entry acts on a length rather than an angle, where the dimension of a field depends on it.
+
+    Parameters
+    ----------
+    is_length : callable
+        Name of a coordinate, or of a joint of one, -> whether it is a length.
+    """
+    for key in (field.along, "coordinate"):
+        if values.get(key) is not None and section in ("forces", "constraints"):
+            return is_length(str(values[key]))
+    return "between" in values or "marker" in values or "first" in values
+
+
+def function_fields(type_name: str) -> Fields:
+    """The keys of one type of function, ``type`` among them."""
+    choices = tuple(FUNCTION)
+    return {"type": k.Choice("type of the function", required=True, choices=choices), **FUNCTION[type_name]}
+
+
+def _contacts() -> Schema:
+    """An entry of the section contacts: keys of the type, its law one by one or as a mapping."""
+    schema = _element("force", FORCES, "contacts")
+    del schema["properties"]["type"]
+    schema["required"] = ["first"]
+    return schema
+
+
+def _body() -> Schema:
+    given = [{"required": [key]} for key in ("mass", "solids", "points")]
+    return {**table_schema(BODY), "anyOf": given}
+
+
+def _element(what: str, types: Types, type_name: str) -> Schema:
+    schema = typed_schema(types[type_name].fields(what, types), type_name)
+    if types[type_name].one_of:
+        schema["oneOf"] = [{"required": [key]} for key in types[type_name].one_of]
+    return schema
+
+
+def _section(entry: Schema, doc: str) -> Schema:
+    return {
+        "type": ["object", "null"],
+        "propertyNames": ref("name"),
+        "additionalProperties": entry,
+        "description": doc,
+    }
+
+
+def _short(section: str, fields: Fields) -> Schema:
+    """An entry that may be written as the value of its main key alone."""
+    alone: list[Schema] = [fields[SHORT[section]].json()]
+    if not fields[SHORT[section]].required:
+        alone.append({"type": "null"})
+    return {"anyOf": [*alone, table_schema(fields)]}
+
+
+def model_schema() -> dict[str, Any]:
+    """The JSON Schema of model files.
+
+    Returns
+    -------
+    dict
+        Plain data, ready for ``json.dumps``.  It describes the layout; names and expressions are judged by the check.
+    """
+    values = {**_section(ref("expression"), ""), "propertyNames": ref("reference")}
+    sections: Schema = {
+        "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
+        "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
+        "functions": _section(
+            {"oneOf": [typed_schema(function_fields(name), name) for name in FUNCTION]}, MODEL["functions"].doc
+        ),
+        "bodies": _section(_body(), MODEL["bodies"].doc),
+        "joints": _section({"oneOf": [typed_schema(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
+        "forces": _section({"oneOf": [_element("force", FORCES, name) for name in FORCES]}, MODEL["forces"].doc),
+        "contacts": _section(_contacts(), MODEL["contacts"].doc),
+        "constraints": _section(
+            {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
+        ),
+        "states": _section(_short("states", STATE), MODEL["states"].doc),
+        "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
+        "events": _section(_short("events", EVENT), MODEL["events"].doc),
+        "lagrangian": {**table_schema(LAGRANGIAN), "description": MODEL["lagrangian"].doc},
+        "equations": {**table_schema(EQUATIONS), "description": MODEL["equations"].doc},
+        "simulation": {**table_schema(SIMULATION), "description": MODEL["simulation"].doc},
+        "initial": {**values, "description": MODEL["initial"].doc},
+        "guess": {**values, "description": MODEL["guess"].doc},
+    }
+    sections["bodies"]["properties"] = {"ground": table_schema(GROUND)}
+    sections["add"] = _section(table_schema(ADDED), MODEL["add"].doc)
+    own = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in COMPONENT.items()}
+    sections["components"] = _section(object_schema(own), MODEL["components"].doc)
+    properties = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in MODEL.items()}
+    properties["independent"]["items"] = ref("reference")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "eomgen model file",
+        **object_schema(properties, [key for key, field in MODEL.items() if field.required]),
+        "$defs": definitions(),
+    }

@@ -1,0 +1,307 @@
+"""Model (builder) -> Mechanism, the frozen value every later stage reads.
+
+A Mechanism holds graph expressions in the symbols of its graph: ``t``; parameters, inputs and coordinates under their
+own names; the velocity and acceleration of coordinate ``theta`` as ``theta_dot`` and ``theta_ddot``.  A coordinate of
+*any* joint may appear in an expression, also of one that a later stage cuts.  Motion of a marker in ground axes appears
+as a symbol named like ``vx(rod.tip)`` whose meaning is in :attr:`Mechanism.quantities`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..base.limits.runs import ATOL, RTOL
+from ..base.records import dataclass
+from ..elements.frames import Frame, Marker
+from ..errors import ModelError, Problem
+from ..expr.core import Expr, Graph
+from ..expr.vectors import Mat3, Vec3
+from .description import place_of
+from .placement import TURNS, Columns
+from .quantities import CarriedQuantity, Quantity, WrenchQuantity
+from .requirements import Requirement
+
+if TYPE_CHECKING:
+    from ..elements.constraints.constraint import Constraint
+    from ..elements.forces.force import Force
+    from ..elements.joints.joint import Joint
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A constant of the model that can change between runs without recompiling."""
+
+    name: str
+    value: float | None = None
+    unit: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A quantity given from outside over time."""
+
+    name: str
+    value: float = 0.0
+    unit: str = ""
+    doc: str = ""
+    signal: Expr | None = None  #: of runs that give none
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes.
+
+    ``moment`` (m c, kg m) and ``inertia_origin`` (about the body's origin) are there where the user gave them, so that
+    these parameters stay as they are; the centre of mass and the inertia about it follow from them then.
+    """
+
+    name: str
+    mass: Expr
+    com: Vec3
+    inertia: Mat3
+    moment: Vec3 | None = None
+    inertia_origin: Mat3 | None = None
+    check: str = "error"  #: what becomes of a mass and inertia that no body can have: error, note or off
+    plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
+    about: Vec3 | None = None  #: the point that the inertia was given about, if not the centre of mass
+
+    @property
+    def checked(self) -> bool:
+        """Whether mass and inertia must be those of a possible body."""
+        return self.check == "error"
+
+
+@dataclass(frozen=True)
+class JointSpec:
+    """A joint between two markers; ``joint`` answers what its type means, ``coordinates`` are the full names.
+
+    ``predecessor`` and ``successor`` already include the turn that brings the joint's axis to their z; ``axes`` are the
+    directions of x, y and z of the joint in the markers as they were given.
+    ``named`` tells whether the user named the coordinates (such joints are kept in the spanning tree first).
+    """
+
+    name: str
+    joint: Joint
+    predecessor: Marker
+    successor: Marker
+    coordinates: tuple[str, ...]
+    named: bool
+    limits: tuple[tuple[tuple[str, float], ...], ...] = ()  #: (key, value) of each coordinate; data only
+    dry_friction: float = 0.0  #: data only
+    armature: Expr | None = None  #: inertia of the drive, added to the coordinate's own
+    axes: Columns = TURNS["z"]
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Full names of the generalized velocities."""
+        return velocity_names(self.joint, self.name, self.coordinates)
+
+
+def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple[str, ...]:
+    """``<coordinate>_dot`` for the rate of a coordinate, ``<joint>_wx`` .. for an angular velocity."""
+    return tuple(
+        f"{name}{velocity.suffix}" if velocity.of is None else f"{coordinates[velocity.of]}_dot"
+        for velocity in joint.velocities
+    )
+
+
+class BodyShape(NamedTuple):
+    """A solid of a body that pictures show, in axes of its own."""
+
+    body: int
+    kind: str  #: box, cylinder, sphere, capsule, cone, ellipsoid, mesh
+    sizes: tuple[Expr, ...]  #: edges, half axes, or radius and length (m); of a mesh its scale
+    frame: Frame
+    file: str = ""  #: of a mesh
+    color: str = ""  #: #rrggbb; the body's own where there is none
+
+
+@dataclass(frozen=True)
+class Output:
+    """A named result: an expression in t, coordinates, their rates, parameters, inputs and marker quantities."""
+
+    name: str
+    expression: Expr
+    unit: str = ""
+    doc: str = ""
+    of_velocities: bool = False  #: whether it is written with a velocity, even one that is always 0
+
+
+STATE_RATE = "state "  #: begins the quantity of an element that is the rate of its state of a number
+
+
+@dataclass(frozen=True)
+class FirstOrderState:
+    """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism.
+
+    One that is sampled is held between the times of its clock, where it becomes the value of ``sampled``.
+    """
+
+    name: str
+    rate: Expr
+    unit: str = ""
+    doc: str = ""
+    sampled: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The sampling times offset + k period, k = 0, 1, .., of states that are sampled together.
+
+    The state ``counter`` holds the k of the next time; ``event`` happens there.
+    """
+
+    counter: str
+    event: str
+    states: tuple[str, ...]
+    period: Expr
+    offset: Expr
+
+
+@dataclass(frozen=True)
+class Lagrangian:
+    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0.
+
+    A constraint that contains velocities is linear in them.
+    """
+
+    coordinates: tuple[str, ...]
+    expression: Expr
+    forces: tuple[Expr, ...]
+    dissipation: Expr
+    constraints: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class GivenEquations:
+    """Equations of motion as they are given: M v' + C_q^T l = f with q' = N(q, t) v + b(q, t) and constraints C = 0.
+
+    M is of q and t, f of q, v and t; a constraint that contains velocities is linear in them.  ``multipliers`` names
+    the l, in the order of the constraints; there are none, or one for each.
+    """
+
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+    rates: tuple[Expr, ...]
+    mass_matrix: tuple[tuple[Expr, ...], ...]
+    forcing: tuple[Expr, ...]
+    constraints: tuple[Expr, ...]
+    multipliers: tuple[str, ...]
+    kinetic_energy: Expr
+    potential_energy: Expr
+
+
+@dataclass(frozen=True)
+class Event:
+    """A zero of an expression, and what happens there."""
+
+    name: str
+    expression: Expr
+    terminal: int = 0  #: the run ends when it has happened so often; 0: never
+    direction: int = 0  #: 1 rising, -1 falling, 0 both
+    reset: tuple[tuple[str, Expr], ...] = ()  #: new values of coordinates and velocities
+    restitution: float | None = None  #: of an impact
+    doc: str = ""
+    friction: float | None = None  #: coefficient in the impact
+    slip: tuple[str, ...] = ()  #: outputs that are its sliding velocities
+
+
+class Switched(NamedTuple):
+    """A constraint that closes and opens in a run: the state that is 1 while it holds, and whether it does at first.
+
+    ``stabilisation`` is the rate at which its error dies away; ``releases`` are states that become 0 as it closes.
+    """
+
+    constraint: Constraint | None  #: None where its entry has faults
+    state: str
+    closed: bool
+    stabilisation: Expr
+    releases: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Defaults of ``simulate`` and ``eomgen run``."""
+
+    end: float = 10.0
+    method: str = "DOP853"
+    rtol: float = RTOL
+    atol: float = ATOL
+    step: float | None = None
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What the user said, checked and lowered to one graph."""
+
+    name: str
+    graph: Graph
+    parameters: tuple[Parameter, ...]
+    inputs: tuple[Input, ...]
+    gravity: Vec3
+    bodies: tuple[Body, ...]
+    joints: tuple[JointSpec, ...]
+    forces: tuple[Force, ...]
+    outputs: tuple[Output, ...]
+    states: tuple[FirstOrderState, ...] = ()
+    clocks: tuple[Clock, ...] = ()
+    events: tuple[Event, ...] = ()
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
+    wrench_quantities: Mapping[str, WrenchQuantity] = field(default_factory=dict)  #: by symbol
+    reaction_quantities: Mapping[str, CarriedQuantity] = field(default_factory=dict)  #: by symbol
+    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
+    initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
+    guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
+    independent: tuple[str, ...] = ()
+    simulation: Simulation = Simulation()
+    lagrangian: Lagrangian | None = None
+    given: GivenEquations | None = None
+    constraints: tuple[Constraint, ...] = ()
+    switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
+    lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
+    doc: str = ""
+    latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given
+    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix, for display
+    check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
+    default_gravity: bool = False  #: whether the description leaves gravity out
+    negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
+    named_markers: tuple[Marker, ...] = ()  #: for pictures
+    body_shapes: tuple[BodyShape, ...] = ()  #: for pictures
+    added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
+    notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
+    requirements: tuple[Requirement, ...] = ()  #: rules that parameters keep, whatever their values are
+
+    @property
+    def bare(self) -> bool:
+        """Whether there are no bodies: a Lagrangian, or equations, came instead."""
+        return self.lagrangian is not None or self.given is not None
+
+    def problem(self, path: str, message: str, remedy: str = "", code: str = "") -> Problem:
+        """A problem at a dotted path, with the file and line the path or its nearest parent came from."""
+        return Problem(path, message, remedy, *place_of(path, self.lines), code)
+
+    def missing_values(self) -> list[Problem]:
+        """A problem for each parameter without a value."""
+        return [
+            self.problem(
+                f"parameters.{p.name}",
+                "has no value",
+                f"give it one where it is declared: parameters: {{{p.name}: VALUE}} in a file, "
+                f'm.parameter("{p.name}", VALUE) or parameters= in Python; or by --set {p.name}=VALUE, of verbs that '
+                "have --set",
+                "EG-MISSING",
+            )
+            for p in self.parameters
+            if p.value is None
+        ]
+
+    def require_values(self) -> None:
+        """Raise ModelError unless every parameter has a value."""
+        problems = self.missing_values()
+        if problems:
+            raise ModelError(problems)

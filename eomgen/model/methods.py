@@ -1,0 +1,247 @@
+"""A type of element -> the method of Model that adds one, documented.
+
+Arguments, defaults and their documentation are those of the type's keys, so that Python and model files cannot differ.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from inspect import Parameter, Signature
+from typing import Any, NamedTuple, TypeVar, cast
+
+from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.element_type import ElementType
+from ..elements.joints import JOINTS
+from ..elements.kinds import Field, Law, items
+from ..errors import UsageError, at_odds, ill_typed, no_such
+from .handles import ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
+from .names import nearest
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+#: Section -> what its methods return.
+_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
+_WIDTH = 108  #: of the text of a method's documentation
+
+
+class Argument(NamedTuple):
+    """An argument of a method: the key that it gives, and how."""
+
+    name: str
+    key: str
+    kind: str
+    annotation: str
+    default: Any
+    doc: str
+
+
+def arguments_of(found: ElementType) -> list[Argument]:
+    """The arguments of the method that adds an element, after its name; ``*between`` is called so."""
+    made: list[Argument] = []
+    for key, field in found.keys.items():
+        made += _arguments(found, key, field, any(one.default is not Parameter.empty for one in made))
+    star = [one for one in made if one.name.startswith("*")]
+    return star + [one for one in made if not one.name.startswith("*")]
+
+
+def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[Argument]:
+    kind, annotation = field.described, field.annotation
+    doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
+    default: Any = field.default if type(field.default) in (int, float) else None
+    if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
+        doc = f"{doc} Default: {str(field.default).lower()}."
+    anywhere = {"joint", "between"} <= {*found.one_of}
+    if field.required and (anywhere or not later):  # what follows *between is given by its keyword
+        default = Parameter.empty
+    if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
+        on = "A joint or coordinate if value is one number, a body or marker if it is three."
+        return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
+    if anywhere and key in ("joint", "between"):
+        if key == "joint":
+            return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
+        return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
+    if field.required and field.joins:
+        return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in found.ends]
+    return [Argument(key, key, kind, annotation, default, doc)]
+
+
+def signature_of(found: ElementType) -> Signature:
+    """The signature of the method.
+
+    Raises
+    ------
+    UsageError
+        Two keys would have arguments of one name.
+    """
+    every = arguments_of(found)
+    names = ["self", "name", *(one.name.lstrip("*") for one in every)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UsageError(
+            f"type {found.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends",
+            code="EG-NAME-TAKEN",
+        )
+    made = [Parameter("self", Parameter.POSITIONAL_ONLY), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
+    way: Any = Parameter.POSITIONAL_OR_KEYWORD
+    for one in every:
+        if one.name.startswith("*"):
+            made.append(Parameter(one.name[1:], Parameter.VAR_POSITIONAL, annotation=one.annotation))
+            way = Parameter.KEYWORD_ONLY
+        else:
+            made.append(Parameter(one.name, way, default=one.default, annotation=one.annotation))
+    return Signature(made)
+
+
+def documentation_of(section: str, found: ElementType) -> str:
+    """The documentation of the method, in the manner of NumPy."""
+    summary, _, more = found.doc.partition(".  ")
+    lines = textwrap.wrap(f"Add {summary.removesuffix('.')}.", _WIDTH)
+    if found.one_of and not any(one.name in ("on", "*between") for one in arguments_of(found)):
+        more = f"{more}  Give exactly one of {', '.join(found.one_of)}.".strip()
+    lines += ["", *textwrap.wrap(more, _WIDTH)] if more else []
+    lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
+    every, skip = arguments_of(found), False
+    for k, one in enumerate(every):
+        if skip:
+            skip = False
+            continue
+        names = one.name
+        if k + 1 < len(every) and every[k + 1].key == one.key:
+            names, skip = f"{one.name}, {every[k + 1].name}", True
+        needed = found.keys[one.key].required or one.name in ("on", "*between")
+        lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
+        lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return "\n".join(lines + (["", "Returns", "-------", _HANDLES[section].__name__] if section in _HANDLES else []))
+
+
+def method_of(section: str, found: ElementType) -> Callable[..., Any]:
+    """The method that adds an element of a type to its section of a description; of a joint, it returns the handle."""
+    signature, every = signature_of(found), arguments_of(found)
+    allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
+    required = [one.name for one in every if one.default is Parameter.empty]
+    anywhere = any(one.name == "*between" for one in every)
+
+    def add(self: Described, /, *args: Any, **keys: Any) -> Any:
+        check_keywords(found.name, keys, allowed)
+        if anywhere:
+            args = _take_value(required, args, keys)
+        try:
+            bound = signature.bind(self, *args, **keys).arguments
+        except TypeError as error:
+            twin = f"joint_{found.name}" if section == "forces" else ""
+            more = f"; on the coordinate of a joint use {twin}" if hasattr(type(self), twin or "-") else ""
+            raise TypeError(f"{found.name}() {error}{more}") from None
+        kept = {key: value for key, value in bound.items() if value is not None or key in found.ends}
+        given = {key: value for key, value in kept.items() if key not in ("self", "name")}
+        values = {"type": found.name, **_entry(self, found, bound["name"], given)}
+        entry = self._add(section, bound["name"], values)
+        handle = _HANDLES.get(section)
+        return None if handle is None else handle(self, entry)
+
+    add.__name__, add.__qualname__, add.__module__ = found.name, f"Model.{found.name}", "eomgen.api.model"
+    add.__doc__ = documentation_of(section, found)
+    add.__signature__ = signature  # type: ignore[attr-defined]
+    add.__annotations__ = {}
+    return add
+
+
+def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, Any]) -> tuple[Any, ...]:
+    """The required value may follow what the element acts on without its keyword, which is given here."""
+    missing = [name for name in required if name not in keys]
+    places = args if "name" in keys else args[1:]
+    if (
+        len(missing) == 1
+        and len(places) > ("joint" not in keys)
+        and not isinstance(places[-1], (JointHandle, MarkerHandle))
+    ):
+        keys[missing[0]] = places[-1]
+        return args[:-1]
+    return args
+
+
+def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """What a model file would write."""
+    entry, refer = dict[str, Any](), References(model)
+    if "on" in given and "on" not in found.keys:
+        on = given.pop("on")
+        several = items(given.get("value")) is not None
+        given["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
+    first, second = found.ends
+    if first in given and first not in found.keys:
+        key = next(key for key, field in found.keys.items() if field.joins)
+        entry[key] = found.keys[key].reference([given.pop(first), given.pop(second)], refer)
+    elif {"joint", "between"} <= {*found.one_of}:
+        entry |= _where(refer, given.pop("between", ()), given.pop("joint", None))
+    law = given.pop("law", None) if isinstance(found.keys.get("law"), Law) else None
+    if law is not None:
+        given = {**given, **_law(found, name, law, given)}
+    for key, field in found.keys.items():
+        if key in given and not _is_default(given[key], field):
+            if isinstance(given[key], JointHandle) and key in found.remedies:
+                told = f"{given[key]!r} is not a marker; {found.remedies[key]}"
+                raise ill_typed(f"{found.name} {name!r} acts at a marker, and {told}")
+            entry[key] = field.reference(given[key], refer)
+    return {key: value for key, value in entry.items() if value is not None}
+
+
+def _law(found: ElementType, name: Any, law: Any, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The keys of a law that is given as a mapping."""
+    if not isinstance(law, Mapping):
+        raise ill_typed(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
+    check_keywords(
+        f"the law of {found.name}", dict(law), [key for key in found.keys if not isinstance(found.keys[key], Law)]
+    )
+    twice = sorted(law.keys() & given.keys())
+    if twice:
+        raise at_odds(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
+    return law
+
+
+def _is_default(value: Any, field: Field) -> bool:
+    """Whether a number that is given says no more than what holds anyway."""
+    numbers = type(value) in (int, float) and type(field.default) in (int, float)
+    return numbers and bool(value == field.default)
+
+
+def _where(refer: References, between: Sequence[Any], joint: Any) -> dict[str, Any]:
+    if joint is not None and not between:
+        return {"joint": refer.joint(joint)}
+    between = items(between) or ()
+    if joint is None and len(between) == 1:
+        return {"joint": refer.joint(between[0])}
+    if joint is None and len(between) == 2:
+        return {"between": [refer.marker(marker) for marker in between]}
+    raise ill_typed("give one joint or two markers first, and then the values by keyword")
+
+
+# -- keywords ----------------------------------------------------------------------------------------------------------
+def checked_keywords(method: Method) -> Method:
+    """A method that raises UsageError for a keyword it does not have, naming those it has."""
+    parameters = list(inspect.signature(method).parameters.values())[1:]
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return method
+    allowed = [p.name for p in parameters if p.kind is not p.VAR_POSITIONAL]
+
+    @functools.wraps(method)
+    def checked(*args: Any, **keys: Any) -> Any:
+        check_keywords(method.__name__, keys, allowed)
+        return method(*args, **keys)
+
+    return cast("Method", checked)
+
+
+def keywords_of(function: Callable[..., Any]) -> list[str]:
+    """Arguments of a function that are given by keyword only."""
+    parameters = inspect.signature(function).parameters.values()
+    return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+
+
+def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> None:
+    """Raise UsageError for the first keyword that a method does not have."""
+    for key in given:
+        if key not in allowed:
+            if name in JOINTS and key in SWITCHING:
+                raise no_such(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")
+            raise no_such(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")

@@ -1,0 +1,827 @@
+"""Python calls -> Description -> Mechanism."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Self
+
+from ..base.names import hint
+from ..elements.constraints import CONSTRAINTS
+from ..elements.forces import FORCES
+from ..elements.joints import JOINTS
+from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
+from .build_functions import PythonTwin
+from .build_mechanism import build
+from .components import Component, Instance, add_instance, claim, component_of, named_attachments
+from .description import GROUND_NAME, SECTIONS, Description, Faults, items
+from .element_methods import ElementMethods
+from .fields import fields_of
+from .handles import (
+    BodyHandle,
+    Described,
+    InstanceHandle,
+    JointHandle,
+    MarkerHandle,
+    Names,
+    References,
+    Settings,
+    Triple,
+    placed_markers,
+)
+from .methods import check_keywords, checked_keywords, keywords_of
+from .names import fault_of_name
+from .quantities import COM
+from .sympy_face import function, named, names_of, one_or_several, require_name, symbol
+from .write_yaml import plain, plain_description, yaml_text
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+Value = Any  # a number, a text or a SymPy expression
+Vector = Sequence[Any]
+
+
+class Builder(ElementMethods):
+    """What a :class:`~..api.model.Model` is told: methods that add to its description."""
+
+    def __init__(
+        self, name: str, gravity: Vector | None = None, doc: str = "", *, check_inertia: bool | str = True
+    ) -> None:
+        values: dict[str, Any] = {"name": name}
+        if gravity is not None:
+            values["gravity"] = gravity
+        if not isinstance(doc, str) or doc:
+            values["doc"] = doc
+        if check_inertia is not True:
+            values["check_inertia"] = check_inertia
+        self._start(Description(values=values))
+        self._note_line("name", "gravity")
+
+    def _start(self, description: Description) -> None:
+        self._description = description
+        for key in ("initial", "guess", "simulation"):
+            if isinstance(description.values.get(key, {}), dict):
+                description.values[key] = Settings(description.values.get(key, {}))
+        independent = description.values.get("independent", [])
+        if isinstance(independent, list | tuple):
+            description.values["independent"] = Names(independent)
+
+    @classmethod
+    def from_description(cls, description: Description) -> Self:
+        """Make a model from a description, as the readers of model files do."""
+        model = cls.__new__(cls)
+        model._start(description)
+        if not description.lines:  # of no file
+            model._note_line(*description.values, *SECTIONS)
+        return model
+
+    @classmethod
+    def from_lagrangian(
+        cls,
+        name: str,
+        L: Any,
+        coordinates: Sequence[Any],
+        forces: Sequence[Any] | Mapping[Any, Any] | None = None,
+        dissipation: Any = None,
+        constraints: Sequence[Any] = (),
+        parameters: Mapping[Any, Any] | None = None,
+        inputs: Mapping[Any, Any] | None = None,
+        latex: Mapping[Any, str] | None = None,
+    ) -> Self:
+        """Make a model from a Lagrangian; see :func:`eomgen.model.lagrangian.describe_lagrangian`."""
+        from .lagrangian import describe_lagrangian
+        from .sympy_text import SympyNames
+
+        coordinates = one_or_several(coordinates)
+        given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
+        names = SympyNames(given, coordinates)
+        return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*given, names.latex(latex)]))))
+
+    @classmethod
+    def from_equations(
+        cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
+    ) -> Self:
+        """Make a model from equations M v' = f; see :func:`eomgen.model.given_equations.describe_equations`."""
+        from .given_equations import describe_equations
+        from .sympy_text import SympyNames
+
+        check_keywords("from_equations", further, keywords_of(describe_equations))
+        coordinates = one_or_several(coordinates)
+        names = SympyNames([coordinates, mass_matrix, forcing, further], coordinates)
+        further = names.put(further) | {"latex": names.latex(further.get("latex"))}
+        return cls.from_description(
+            names.noted(describe_equations(name, *names.put([coordinates, mass_matrix, forcing]), **further))
+        )
+
+    # -- quantities -----------------------------------------------------------------------------------------------
+    def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
+        """Declare a parameter: a constant that can change between runs.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        value : number, optional
+            Needed to compile, not to derive.
+        unit : str, optional
+            Unit of the value, such as ``"mm"`` or ``"N*m/rad"``; the value is converted to SI units.
+        doc : str, optional
+            For display.
+        latex : str, optional
+            How formulas and plots print it, such as ``"m_{c}"``; from its name unless given.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        self._give("parameters", name, value=value, unit=unit, doc=doc, latex=latex)
+        return symbol(name)
+
+    def input(
+        self,
+        name: str,
+        value: Value = 0.0,
+        unit: str = "",
+        doc: str = "",
+        signal: Value | None = None,
+        latex: str = "",
+    ) -> Any:
+        """Declare an input, a quantity that is given over time; ``value`` is used as long as a call gives none.
+
+        ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
+        calls of the module's own functions still take ``value``.  ``unit``, ``doc`` and ``latex`` are those
+        of :meth:`parameter`.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        self._give("inputs", name, value=value, unit=unit, doc=doc, latex=latex, signal=signal)
+        return symbol(name)
+
+    def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:
+        """Declare an output: a named result of the model.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; it may repeat a coordinate if the expression is that coordinate.
+        expression : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, their rates, the motion of markers and other outputs.
+        unit : str, optional
+            Unit in which the result is given; without one it is in SI units.
+        doc : str, optional
+            For display.
+        latex : str, optional
+            How formulas and plots print it, in LaTeX; from its name unless given.
+        """
+        self._give("outputs", name, expression=expression, unit=unit, doc=doc, latex=latex)
+
+    def event(
+        self,
+        name: str,
+        expression: Value,
+        terminal: bool | int = False,
+        direction: int = 0,
+        reset: Mapping[Any, Value] | None = None,
+        restitution: Value | None = None,
+        doc: str = "",
+        friction: Value | None = None,
+        slip: str | Sequence[str] | None = None,
+    ) -> None:
+        """Declare an event: runs find the time where an expression becomes zero, and can stop or reset the state there.
+
+        Parameters
+        ----------
+        name : str
+            Identifier, for ``Trajectory.t_events[name]``.
+        expression : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, velocities, the position and velocity of markers, and outputs that
+            need no accelerations.
+        terminal : bool or int
+            End the run there; a number: when it has happened so often.
+        direction : {0, 1, -1}
+            Both ways, only where it rises, only where it falls.
+        reset : mapping of coordinates and velocities to expressions, optional
+            New values, all from the state right before.  Positions and velocities are brought back onto the
+            constraints afterwards.
+        restitution : float, optional
+            The expression is a gap between bodies; where it closes an impact opens it again, this much slower (0 to
+            1; Newton's law), with impulses that obey all joints.
+        doc : str, optional
+        friction : float, optional
+            Beside a restitution: the coefficient of Coulomb friction in the impact.
+        slip : str or sequence of str, optional
+            Beside friction: the output that is the sliding velocity, linear in the velocities; in space two outputs,
+            along directions at right angles.
+        """
+        self._give(
+            "events", name, expression=expression, terminal=terminal, direction=direction,
+            reset=None if isinstance(reset, dict) and not reset else reset,
+            restitution=restitution, doc=doc, friction=friction, slip=slip,
+        )  # fmt: skip
+
+    def _give(self, section: str, name: str, **given: Any) -> None:
+        """Append an entry with what is neither None nor its default; arrays, which compare by parts, are none."""
+        fields, values = fields_of(section, {}), dict[str, Any]()
+        for key, value in given.items():
+            default = "" if fields[key].default is None else fields[key].default
+            plain = isinstance(value, str | int) and not isinstance(default, float)
+            if value is not None and not (plain and value == default):
+                values[key] = value
+        self._add(section, name, values)
+
+    def coordinate(self, name: str) -> Any:
+        """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
+        return symbol(name)
+
+    @property
+    def t(self) -> Any:
+        """The time, as a SymPy symbol."""
+        return symbol("t")
+
+    @property
+    def kinetic_energy(self) -> Any:
+        """The kinetic energy of the mechanism, as a SymPy symbol for outputs."""
+        return symbol("kinetic_energy")
+
+    @property
+    def potential_energy(self) -> Any:
+        """The potential energy of gravity and springs, as a SymPy symbol for outputs."""
+        return symbol("potential_energy")
+
+    # -- states and functions -----------------------------------------------------------------------------------------
+
+    def state(
+        self, name: str, rate: Any = None, initial: Any = 0.0, unit: str = "", doc: str = "", latex: str = ""
+    ) -> Any:
+        """Declare a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; its rate is ``<name>_dot``.
+        rate : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, their rates, states, positions and velocities of markers, outputs
+            of these and quantities of force elements.
+        initial : number, str or SymPy expression, optional
+            Where runs begin, 0 unless given; of parameters, if an expression.
+        unit, doc, latex : str, optional
+            Those of :meth:`parameter`; an initial value that is a number has this unit.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        self._give("states", name, rate=rate, initial=initial, unit=unit, doc=doc, latex=latex)
+        return symbol(name)
+
+    def sampled(
+        self, name: str, value: Any = None, period: Any = None, *, offset: Any = 0.0, initial: Any = 0.0,
+        unit: str = "", doc: str = "", latex: str = "",
+    ) -> Any:  # fmt: skip
+        """Declare a state that is held, and renewed at the times offset + k period: what a digital controller gives.
+
+        States of one period and offset are renewed together, in the order of their declaration; each takes those
+        before it at their new values.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; ``<name>_samples`` counts the samples and ``<name>_sampled`` is the event, for the first state
+            of each period and offset.
+        value : number, str or SymPy expression
+            The new value, of what the rate of a :meth:`state` may depend on.  Without one the state keeps its value,
+            unless a run gives a function for it: ``simulate(controllers={name: f})``.
+        period : number, str or SymPy expression
+            Time from one sampling time to the next (s), of parameters, if an expression.
+        offset : number, str or SymPy expression, optional
+            A sampling time (s), 0 unless given.
+        initial : number, str or SymPy expression, optional
+            The value before the first sampling time.
+        unit, doc, latex : str, optional
+            Those of :meth:`state`.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        given = {"sampled": value, "period": period, "offset": offset, "initial": initial}
+        self._give("states", name, **given, unit=unit, doc=doc, latex=latex)
+        return symbol(name)
+
+    @checked_keywords
+    def table(
+        self,
+        name: str,
+        x: Any,
+        y: Any,
+        z: Any = None,
+        kind: str | None = None,
+        extrapolation: str | None = None,
+    ) -> Any:
+        """Declare a smooth function through the points of a table.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        x : sequence of floats
+            Points, strictly increasing.
+        y : sequence of floats
+            Values at the points; with ``z``, points along the second argument.
+        z : (len(x), len(y)) array, optional
+            Values of a function of two arguments on a grid.
+        kind : {"cubic", "natural", "periodic", "monotone"}, optional
+            ``cubic`` (default) and ``natural`` are splines with continuous curvature, with not-a-knot ends and with
+            ends without curvature; ``periodic`` likewise, repeating with the period ``x[-1] - x[0]``, where the last
+            value is the first; ``monotone`` (PCHIP) has a continuous slope and never overshoots.  A grid takes
+            ``cubic`` or ``natural``.
+        extrapolation : {"linear", "constant"}, optional
+            Beyond the points: on with the slope of the end (default), or with its value (the slope then jumps).
+
+        Returns
+        -------
+        sympy.Function
+            Call it on SymPy expressions; in texts write ``name(...)``.
+        """
+        x, y, z = (list(points) if isinstance(points, range) else points for points in (x, y, z))
+        given = {"x": x, "y": y, "z": z, "kind": kind, "extrapolation": extrapolation}
+        return self._function("table", name, given)
+
+    @checked_keywords
+    def native(
+        self,
+        name: str,
+        source: str | PathLike[str],
+        function: str | None = None,
+        arguments: int | None = None,
+        derivatives: Sequence[str | None] | None = None,
+        second_derivatives: Sequence[str | None] | None = None,
+        python: Callable[..., Any] | str | PathLike[str] | None = None,
+        python_derivatives: Sequence[Callable[..., Any] | None] | None = None,
+        python_second_derivatives: Sequence[Callable[..., Any] | None] | None = None,
+    ) -> Any:
+        """Declare a function written in C; its source is compiled with the model and goes into exported packages.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        source : str or path
+            C file that defines the functions named, each ``double f(double, ...)``; it includes nothing but system
+            headers, and its other functions are static.
+        function : str, optional
+            C function of the value, ``name`` unless given.
+        arguments : int, optional
+            Their number; that of the derivatives unless given, or 1.
+        derivatives : sequence of str or None, optional
+            C functions of the derivative along each argument; a missing one is a central difference.
+        second_derivatives : sequence of str or None, optional
+            Those along arguments 1 1, 1 2, ..., 2 2, ...; a missing one is a central difference of a first one.
+        python : callable or path, optional
+            The same in Python, for what is evaluated without C: constraints, masses, target ``numpy``.  A callable
+            takes floats, one point at a time (a NumPy ufunc: arrays); a file has functions of the same names as the C
+            source.
+        python_derivatives, python_second_derivatives : sequence of callable or None, optional
+            As ``derivatives`` and ``second_derivatives``, if ``python`` is a callable.
+
+        Returns
+        -------
+        sympy.Function
+        """
+        twin: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
+        further: list[Any] = [
+            items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)
+        ]
+        if None in further:
+            raise ill_typed(f"native {name}: python_derivatives must be lists of functions")
+        if twin is not None and not isinstance(twin, str):
+            twin = PythonTwin(twin, *further)
+        elif any(further):
+            raise incomplete(
+                "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
+            )
+        given = {
+            "source": str(source),
+            "function": function,
+            "arguments": arguments,
+            "derivatives": derivatives,
+            "second_derivatives": second_derivatives,
+            "python": twin,
+        }
+        return self._function("native", name, given)
+
+    def _function(self, type_name: str, name: str, keys: dict[str, Any]) -> Any:
+        given = {key: value for key, value in keys.items() if value is not None}
+        self._add("functions", name, {"type": type_name, **given})
+        return function(name)
+
+    # -- bodies ---------------------------------------------------------------------------------------------------
+    @property
+    def ground(self) -> BodyHandle:
+        """The ground, which has markers like a body."""
+        return self._body_handle(GROUND_NAME)
+
+    @property
+    def bodies(self) -> dict[str, BodyHandle]:
+        """Handles of all bodies, by name."""
+        names = (entry.name for entry in self._description.sections["bodies"])
+        return {name: self._body_handle(name) for name in names if name != GROUND_NAME}
+
+    @property
+    def joints(self) -> dict[str, JointHandle]:
+        """Handles of all joints, by name."""
+        return {entry.name: JointHandle(self, entry) for entry in self._description.sections["joints"]}
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """SymPy symbols of all parameters, by name."""
+        return {entry.name: symbol(entry.name) for entry in self._description.sections["parameters"]}
+
+    def _body_handle(self, name: str) -> BodyHandle:
+        entries = self._description.sections["bodies"]
+        return BodyHandle(self, name, next((entry for entry in entries if entry.name == name), None))
+
+    def body(
+        self,
+        name: str,
+        mass: Any = None,
+        com: Sequence[Any] | None = None,
+        inertia: Any = None,
+        *,
+        principal: Sequence[Any] | None = None,
+        first_moment: Sequence[Any] | None = None,
+        about: Any = None,
+        axes: Sequence[Any] | None = None,
+        solids: Sequence[Mapping[str, Any]] | None = None,
+        points: Sequence[Mapping[str, Any]] | None = None,
+        check_inertia: bool | str | None = None,
+        markers: Mapping[str, Any] | None = None,
+        display: Sequence[Mapping[str, Any]] | None = None,
+    ) -> BodyHandle:
+        """Add a rigid body.
+
+        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in the equations.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        mass : number, str or SymPy expression
+            Mass (kg); 0 for a body without mass.
+        com : sequence of three, optional
+            Centre of mass in body axes (m); the origin unless given.
+        inertia : sequence of three, 3 x 3 tensor or mapping, optional
+            About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
+            with the tensor's own sign; what is missing is 0.  One moment alone is that of a body moving in a plane.
+        principal : sequence of three, optional
+            Principal moments (kg m^2) instead of ``inertia``, along ``axes``.
+        first_moment : sequence of three, optional
+            m c about the body's origin (kg m) instead of ``com``.
+        about : {'com', 'origin'}, name of a marker of the body, or sequence of three, optional
+            The point that ``inertia`` or ``principal`` is about; a marker gives its axes too.
+        axes : sequence of three, optional
+            Fixed-axis roll, pitch, yaw (rad) of the axes that ``inertia`` or ``principal`` is written in.
+        solids : sequence of mappings, optional
+            Solids of uniform density, from which mass, centre of mass and inertia follow:
+            ``{"type": "box", "size": (a, b, c), "density": rho, "at": (x, y, z), "rpy": (r, p, y)}``; the types are
+            box, cylinder, tube, sphere, rod, cone, ellipsoid and mesh (an STL file); ``"subtract": True`` makes a hole.
+        points : sequence of mappings, optional
+            Point masses to add: ``{"mass": m, "at": (x, y, z)}``.
+        check_inertia : {'error', 'note', 'off'} or bool, optional
+            Whether a mass and inertia that no rigid body can have is refused, noted (``note``) or taken in silence
+            (``off``, False); the model's own setting unless given.
+        markers : mapping, optional
+            Named markers, as in the model file: a position ``{"tip": (l, 0, 0)}`` (m, body axes), or a mapping of
+            ``at``, ``rpy``, ``axes`` and ``matrix`` as :meth:`.BodyHandle.marker` takes them.  Each is known as
+            ``body.name`` everywhere.
+        display : sequence of mappings, optional
+            Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
+
+        Returns
+        -------
+        BodyHandle
+        """
+        given = {
+            "mass": mass,
+            "com": com,
+            "inertia": inertia,
+            "principal": principal,
+            "first_moment": first_moment,
+            "about": about,
+            "axes": axes,
+            "solids": solids,
+            "points": points,
+            "check_inertia": check_inertia,
+            "markers": placed_markers(markers),
+            "display": display,
+        }
+        values = {key: value for key, value in given.items() if value is not None}
+        return BodyHandle(self, name, self._add("bodies", name, values))
+
+    @property
+    def check_inertia(self) -> bool | str:
+        """What happens to a mass and inertia that no rigid body can have: error (True), note or off (False)."""
+        given: bool | str = self._description.values.get("check_inertia", True)
+        return given
+
+    @check_inertia.setter
+    def check_inertia(self, check: bool | str) -> None:
+        self._description.values["check_inertia"] = check
+
+    # -- components ---------------------------------------------------------------------------------------------------
+    def attachment(self, name: str) -> MarkerHandle:
+        """Declare a name for a marker of the model to which this one is added as a component; see :meth:`add`.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+
+        Returns
+        -------
+        MarkerHandle
+            For joints, forces and outputs, like a marker of a body.
+        """
+        require_name("attachment", name)
+        self._description.values["attachments"] = [*self._description.values.get("attachments", ()), name]
+        return MarkerHandle(self, name)
+
+    def add(
+        self,
+        component: Any,
+        /,
+        prefix: str = "",
+        at: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        inputs: Mapping[str, Any] | None = None,
+        **values: Any,
+    ) -> InstanceHandle:
+        """Add all parts of another model (bodies, joints, forces, ...) with a prefix before their names.
+
+        The component is copied: later changes of it do not change this model.  Its gravity, independent
+        coordinates and settings of simulations are not used.
+
+        Parameters
+        ----------
+        component : Model or path
+            A model, or the name of a model file.
+        prefix : str, optional
+            Put before every name of the component; ``leg1_`` makes ``leg1_hip`` of ``hip``; ``leg1.hip`` means it too.
+        at : marker, or mapping of names to markers, optional
+            For each :meth:`attachment` the marker of this model in its place.  One marker alone stands for the only
+            attachment; where there is none, for the component's ground.
+        parameters, inputs, **values
+            Values of its parameters and inputs.  A number makes it a parameter of this model with that value, so does
+            none; an expression of this model's parameters takes its place.  A number is in the component's unit, or in
+            that of a mapping: ``l={"value": 500, "unit": "mm"}``.
+
+        Returns
+        -------
+        InstanceHandle
+
+        Raises
+        ------
+        UsageError
+            The component has no such parameter, input or attachment, or one is missing.
+        ModelError
+            The file of the component has faults.
+        """
+        part = _component(component)
+        if prefix and fault_of_name(prefix):
+            raise UsageError(
+                f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores", code="EG-NAME-FORM"
+            )
+        groups = {"parameters": parameters or {}, "inputs": inputs or {}, "": values}
+        for what, group in groups.items():
+            if not isinstance(group, Mapping):
+                raise ill_typed(f"add {part.name}: {what} must be a mapping of names to values, not {group!r}")
+        given = [name for group in groups.values() for name in group]
+        if twice := sorted({name for name in given if given.count(name) > 1}):
+            raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
+        numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
+        description = self._description
+        made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
+        made.values, made.instances = dict(description.values), dict(description.instances)
+        made.sections = {section: list(entries) for section, entries in description.sections.items()}
+        made.sections["bodies"] = [replace(entry, values=dict(entry.values)) for entry in made.sections["bodies"]]
+        faults = Faults(Description())
+        named = named_attachments(part, self._references(at), "at", faults.add)
+        name = prefix.rstrip("_") or part.name
+        instance = Instance(name, prefix, named or {}, numbers)
+        if named is not None and claim(made, instance, "prefix", faults.add):
+            add_instance(made, part, instance, "add", faults)
+        if faults:
+            told = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
+            raise UsageError(f"add {part.name}: {told}", code=faults.problems[0].code)
+        description.lines, description.origins, description.instances = made.lines, made.origins, made.instances
+        for section, entries in made.sections.items():
+            known = description.sections[section]
+            for old, new in zip(known, entries, strict=False):  # handles hold the entries
+                old.values = new.values
+            known += entries[len(known) :]
+        for key in ("initial", "guess"):
+            if key in made.values and made.values[key] is not description.values.get(key):
+                description.values[key] = made.values[key]
+        return InstanceHandle(self, name, prefix)
+
+    def _references(self, at: Any) -> Any:
+        if isinstance(at, Mapping) and "body" not in at:
+            return {name: plain(References(self).marker(marker)) for name, marker in at.items()}
+        return None if at is None else plain(References(self).marker(at))
+
+    # -- sums over the mechanism --------------------------------------------------------------------------------------
+    @property
+    def total_energy(self) -> Any:
+        """Kinetic and potential energy together (J)."""
+        return symbol("total_energy")
+
+    @property
+    def total_mass(self) -> Any:
+        """Mass of all bodies (kg)."""
+        return symbol("total_mass")
+
+    @property
+    def center_of_mass(self) -> MarkerHandle:
+        """The centre of mass of all bodies: its ``.position``, ``.velocity`` and ``.acceleration`` in ground axes."""
+        return MarkerHandle(self, COM)
+
+    @property
+    def momentum(self) -> Triple:
+        """Linear momentum of all bodies in ground axes (kg m/s)."""
+        return symbol("momentum_x"), symbol("momentum_y"), symbol("momentum_z")
+
+    def angular_momentum(self, about: Any = COM) -> Triple:
+        """Angular momentum of all bodies in ground axes (kg m^2/s).
+
+        Parameters
+        ----------
+        about : body, marker or their name, optional
+            The point; the centre of mass of all bodies unless given.  ``m.ground`` is the origin of ground.  A moving
+            point counts where it is, and velocities are those relative to ground.
+        """
+        label = self._label(about)
+        x, y, z = (symbol(f"angular_momentum_{axis}({label})") for axis in "xyz")
+        return x, y, z
+
+    def inertia_about(self, about: Any = COM) -> tuple[Triple, Triple, Triple]:
+        """Inertia of all bodies in ground axes (kg m^2), rows of a symmetric tensor.
+
+        Parameters
+        ----------
+        about : body, marker or their name, optional
+            The point; the centre of mass of all bodies unless given.
+        """
+        label = self._label(about)
+        xx, yy, zz, xy, xz, yz = (symbol(f"inertia_{e}({label})") for e in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+
+    @staticmethod
+    def _label(about: Any) -> str:
+        if isinstance(about, MarkerHandle):
+            about.note()
+            return about.label
+        return str(about)
+
+    # -- settings -------------------------------------------------------------------------------------------------
+    @property
+    def gravity(self) -> Any:
+        """Acceleration of gravity in ground axes (m/s^2), three values; assign others to change it."""
+        return self._description.values.get("gravity", (0, 0, 0))
+
+    @gravity.setter
+    def gravity(self, acceleration: Vector) -> None:
+        self._description.values["gravity"] = acceleration
+
+    @property
+    def initial(self) -> Any:
+        """Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``."""
+        return self._description.values["initial"]
+
+    @initial.setter
+    def initial(self, values: Mapping[Any, Any]) -> None:
+        self._description.values["initial"] = Settings(named("initial", values))
+
+    @property
+    def guess(self) -> Any:
+        """Rough values of coordinates from which the loops are closed: ``m.guess(phi=1.2)``."""
+        return self._description.values["guess"]
+
+    @guess.setter
+    def guess(self, values: Mapping[Any, Any]) -> None:
+        self._description.values["guess"] = Settings(named("guess", values))
+
+    @property
+    def independent(self) -> Any:
+        """Independent coordinates of a mechanism with loops: ``m.independent("theta")``, or assign a list."""
+        return self._description.values["independent"]
+
+    @independent.setter
+    def independent(self, names: Sequence[Any]) -> None:
+        self._description.values["independent"] = Names(names_of("independent", names, "a coordinate"))
+
+    @property
+    def simulation(self) -> Any:
+        """Defaults of a simulation: ``m.simulation(end=5, rtol=1e-9)``."""
+        return self._description.values["simulation"]
+
+    @simulation.setter
+    def simulation(self, values: Mapping[str, Any]) -> None:
+        self._description.values["simulation"] = Settings(named("simulation", values))
+
+    # -- what comes next ------------------------------------------------------------------------------------------
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on what an import left out or changed, and on accepted doubtful values, one sentence each."""
+        return tuple(self._description.notes)
+
+    @property
+    def renamed(self) -> dict[str, dict[str, str]]:
+        """Names that an import changed: section -> name in the file, or in SymPy -> name in the model."""
+        return self._description.renamed
+
+    def mechanism(self) -> Mechanism:
+        """Check the model and translate it to one expression graph.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        ModelError
+            The model has faults; ``.problems`` lists all of them.
+        """
+        return build(self._description)
+
+    def to_yaml(self) -> str:
+        """The model as the text of a model file."""
+        return yaml_text(self._description)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model to a model file; if writing fails, a file that already exists stays unchanged."""
+        from ..base.files import write_whole
+
+        write_whole(path, self.to_yaml())
+
+    # -- display --------------------------------------------------------------------------------------------------
+    if not TYPE_CHECKING:  # type checkers know all attributes
+
+        def __getattr__(self, name: str) -> Any:
+            if not name.startswith("_"):
+                method = self._method(name)
+                if method is not None:
+                    return method
+            raise UnavailableError(f"a Model has no attribute {name!r}; {self._near(name)}")
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Set what a Model knows; another name would be set without any effect, so it is refused."""
+            if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
+                raise UnavailableError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
+            super().__setattr__(name, value)
+
+    def _near(self, name: str) -> str:
+        """A suggestion for a name that does not exist."""
+        known = (*dir(type(self)), *JOINTS, *FORCES, *CONSTRAINTS)
+        return hint(name, [n for n in known if not n.startswith("_")]) or (
+            f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"
+        )
+
+    def _counts(self) -> str:
+        counts = ((section, len(self._description.sections[section])) for section in SECTIONS)
+        return ", ".join(f"{number} {_SINGULAR[s] if number == 1 else s}" for s, number in counts if number)
+
+    def __repr__(self) -> str:
+        kinds = {"lagrangian": "Lagrangian", "equations": "given equations"}
+        kind = "".join(word for key, word in kinds.items() if self._description.values.get(key) is not None)
+        return f"<Model {self.name}: {', '.join(part for part in (kind, self._counts()) if part) or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        from .display import model_html
+
+        return model_html(self._description)
+
+
+_SINGULAR = {section: {"bodies": "body"}.get(section, section[:-1]) for section in SECTIONS}
+
+
+def _component(given: Any) -> Component:
+    """A component of a Model, or of the file of one."""
+    faults = Faults(Description())
+    if isinstance(given, str | os.PathLike):
+        from .yaml_file import describe_yaml_file
+
+        description = describe_yaml_file(given)
+    elif isinstance(given, Described):
+        description = plain_description(given.description)
+    else:
+        raise ill_typed(f"{given!r} is not a component; give a Model, or the name of a model file")
+    name = str(description.values.get("name", "component"))
+    part = component_of(description, name, f"components.{name}.", faults.add)
+    for problem in (*description.problems, *faults.problems):
+        raise UsageError(f"add {name}: {problem}", code=problem.code)
+    return part

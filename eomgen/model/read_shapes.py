@@ -1,0 +1,276 @@
+"""A list of mappings {shape, on, sizes} -> the shapes, one for each marker."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from typing import Any
+
+from ..base.value_rules import BELOW, OUTLINE, RISING, SPROCKET, Flaw, sense_of_outline
+from ..contact.fields import PLACES
+from ..contact.profiles import half_gap, half_tooth
+from ..contact.shapes import ContactShape
+from ..contact.states import (
+    BED,
+    CORNERS,
+    MOST_PAIRS,
+    POINTS,
+    SHAPE_FIELDS,
+    TEETH,
+    ContactShapes,
+    cells_of_bed,
+    points_of_plate,
+    teeth_of_sprocket,
+)
+from ..elements import kinds
+from ..expr.core import Expr
+from ..expr.shown import quoted, shown
+from .build_functions import read_table
+from .checks import check_keys
+from .description import items
+from .names import nearest
+from .values import Reader
+
+SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
+
+
+def positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
+    """Require a number greater than 0, or 0 too."""
+    reader.requirements.positive(path, x, or_zero)
+
+
+def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
+    """Depth and points, clockwise, of an outline whose corners are known, counterclockwise."""
+    points = list(zip(corners[::2], corners[1::2], strict=True))[::-1]
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+        if all(x.value is not None for x in corners):
+            depth = reader.graph.apply("min", depth, half_gap(numbers))
+    elif all(x.value is not None for x in corners):
+        depth = reader.graph.constant(half_gap(numbers))
+    else:
+        reader.faults.missing(f"{path}.depth", "points with parameters do not tell it; give a length")
+        depth = reader.stand_in
+    return (depth, *(x for point in points for x in point))
+
+
+def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
+    teeth = teeth_of_sprocket(given)
+    if teeth is None:
+        reader.faults.add(
+            f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
+        )
+        return ()
+    keys = ("pitch", "seat", "tip_radius")
+    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
+    for key, x in zip(keys, sizes, strict=True):
+        positive(reader, f"{path}.{key}", x)
+    sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
+    if reader.faults.under(path) or reader.requirements.judge(path, SPROCKET, sizes, (teeth,)):
+        return ()
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+    else:
+        depth = half_tooth(teeth, *sizes)
+    return (depth, reader.graph.constant(float(teeth)), *sizes)
+
+
+EDGES = 0.05  #: radius of the edges of a cuboid unless given, as a part of its least length
+
+
+def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
+    """The shapes of a group; None if anything is wrong with them, which is noted."""
+    listed = [value] if isinstance(value, Mapping) else items(value)
+    if listed is None:
+        reader.wrong(path, value, ContactShapes)
+        return None
+    if not listed:
+        remedy = "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
+        reader.faults.add(path, "has no shapes", remedy, "EG-MISSING")
+        return None
+    found: list[ContactShape] = []
+    for k, given in enumerate(listed):
+        found += _read(reader, f"{path}[{k}]", given)
+    return None if reader.faults.under(path) else tuple(found)
+
+
+def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, ContactShapes)
+        return []
+    kind = given.get("shape")
+    if not isinstance(kind, str) or kind not in SHAPE_FIELDS:
+        message = "is missing" if kind is None else f"no shape {quoted(kind)}"
+        reader.faults.add(f"{path}.shape", message, nearest(shown(kind), SHAPE_FIELDS, "shapes"), "EG-CHOICE")
+        return []
+    check_keys(path, given, SHAPE_FIELDS[kind], reader.faults)
+    if reader.faults.under(path):
+        return []
+    on = given["on"]
+    many = items(on)
+    if many is not None and not many:
+        reader.faults.add(f"{path}.on", "names no marker", "give a body or a marker, or a list of them", "EG-MISSING")
+    places = [(f"{path}.on", on)] if many is None else [(f"{path}.on[{k}]", one) for k, one in enumerate(many)]
+    markers = [reader.marker(place, one) for place, one in places]
+    sizes = _sizes(reader, path, kind, given)
+    return [] if sizes is None else [ContactShape(kind, marker, sizes) for marker in markers if marker is not None]
+
+
+def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tuple[Expr, ...] | None:
+    if kind in ("half_plane", "half_space"):
+        return ()
+    if kind == "box":
+        size = _several(reader, f"{path}.size", given["size"], 2)
+        if size is None:
+            return None
+        for k, x in enumerate(size):
+            positive(reader, f"{path}.size[{k}]", x)
+        x, y = 0.5 * size[0], 0.5 * size[1]
+        return (-x, -y, x, -y, x, y, -x, y)
+    if kind == "polygon":
+        return _corners(reader, f"{path}.points", given["points"])
+    if kind in ("outline", "smooth_outline"):
+        corners = _corners(reader, f"{path}.points", given["points"], False)
+        return None if corners is None else outline_sizes(reader, path, given, corners)
+    if kind == "sprocket":
+        return sprocket_sizes(reader, path, given)
+    if kind in ("profile", "smooth_profile"):
+        return _profile(reader, path, given, 2 if kind == "profile" else 3)
+    if kind in ("ellipsoid", "cuboid"):
+        key = "semi_axes" if kind == "ellipsoid" else "size"
+        lengths = _several(reader, f"{path}.{key}", given[key], 3)
+        for k, x in enumerate(lengths or ()):
+            positive(reader, f"{path}.{key}[{k}]", x)
+        return (
+            None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+        )
+    if kind == "height_field":
+        return _height(reader, path, given)
+    if kind == BED:
+        return _bed(reader, path, given)
+    if kind == "plate":
+        return _plate(reader, path, given)
+    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
+    sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
+    for name, x in zip(names, sizes, strict=True):
+        if name in given:
+            positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
+    return tuple(sizes)
+
+
+def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] | None:
+    """The height of a field, as an expression or a table of its own."""
+    local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
+    table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
+    if "height" in given:
+        for key in table:
+            reader.faults.add(f"{path}.{key}", "stands beside height", "give height, or x, y and z", "EG-CONFLICT")
+        return (reader.expression(f"{path}.height", given["height"], local=local),)
+    if missing := [key for key in ("x", "y", "z") if key not in table]:
+        remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
+        reader.faults.add(f"{path}.{missing[0]}", "is missing, and there is no height", remedy, "EG-MISSING")
+        return None
+    taken = {f.name for f in (*reader.graph.functions.values(), *(f for f, _ in reader.graph.calls.values()))}
+    name = re.sub(r"\W+", "_", path).strip("_")
+    while name in taken:
+        name += "_"
+    function = read_table(reader, name, path, table)
+    if function is None:
+        return None
+    places = [local[axis].id for axis in ("x", "y")]
+    return (Expr(reader.graph, reader.graph.call(function, (0, 0), places)),)
+
+
+def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
+    """The radius of the edges of a cuboid."""
+    least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
+    if "edge_radius" not in given:
+        return (EDGES * least,)
+    radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
+    positive(reader, f"{path}.edge_radius", radius)
+    told = ("is {:g}", "must be less than half of its least length, {1:g}")
+    reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], told)
+    return (radius,)
+
+
+def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length, width and number of points of a plate."""
+    sizes = [reader.expression(f"{path}.{name}", given[name]) for name in ("length", "width")]
+    for name, x in zip(("length", "width"), sizes, strict=True):
+        positive(reader, f"{path}.{name}", x)
+    count = points_of_plate(given)
+    if count is None:
+        remedy = f"give a whole number from 1 to {POINTS}"
+        reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy, "EG-RANGE")
+    return (*sizes, reader.graph.constant(float(count or 1)))
+
+
+def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length and number of cells of a bed."""
+    length = reader.expression(f"{path}.length", given["length"])
+    positive(reader, f"{path}.length", length)
+    count = cells_of_bed(given)
+    if count is None:
+        reader.faults.add(
+            f"{path}.cells", f"is {shown(given['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}", "EG-RANGE"
+        )
+    return (length, reader.graph.constant(float(count or 1)))
+
+
+def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
+    listed = items(value)
+    if listed is None or len(listed) != count:
+        reader.wrong(path, value, kinds.Two if count == 2 else kinds.Vector)
+        return None
+    return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
+
+
+def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
+    """Depth and points of a profile, from left to right."""
+    listed, place = items(given["points"]), f"{path}.points"
+    if listed is None or len(listed) < least:
+        reader.faults.add(place, "is no profile", f"give {least} or more points [x, y] from left to right", "EG-TYPE")
+        return None
+    read = [_several(reader, f"{place}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(point[0], point[1]) for point in read if point is not None]
+    if len(points) < len(read):
+        return None
+    for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
+        if reader.requirements.judge(f"{place}[{k + 1}]", RISING, [a, b]):
+            return None
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+    else:
+        depth = 0.1 * (points[-1][0] - points[0][0])
+    return (depth, *(x for point in points for x in point))
+
+
+def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tuple[Expr, ...] | None:
+    """Corners of an outline, counterclockwise."""
+    listed = items(value)
+    if listed is None or not 3 <= len(listed) <= CORNERS:
+        reader.faults.add(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]", "EG-TYPE")
+        return None
+    corners = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(corner[0], corner[1]) for corner in corners if corner is not None]
+    if len(points) < len(corners):
+        return None
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    sense = sense_of_outline(numbers, convex) if len(numbers) == len(points) else 1
+    if isinstance(sense, Flaw):
+        reader.faults.add(path + sense.key, sense.message, sense.remedy, "EG-RANGE")
+        return None
+    reader.requirements.keep(path, OUTLINE, [x for point in points for x in point], (convex, sense))
+    if sense < 0:
+        points.reverse()
+    return tuple(x for point in points for x in point)

@@ -1,0 +1,423 @@
+"""Numbers, texts and SymPy as the user gave them -> graph expressions, frames and markers.
+
+Every method notes what is wrong with a value as a fault at its path and returns a stand-in, so that one pass over a
+description finds all of its problems.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from ..base.files import usable_name
+from ..base.limits.numbers import PERPENDICULAR
+from ..base.names import hint
+from ..base.texts import WHOLE, join_surrogates, lone_surrogate
+from ..base.value_rules import ROTATION, word_of_check
+from ..elements import kinds
+from ..elements.element_type import Found
+from ..elements.frames import GROUND, Frame, Marker
+from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
+from ..errors import ExpressionError
+from ..expr import vectors as vec
+from ..expr.core import Expr, Graph
+from ..expr.shown import quoted, shown
+from ..expr.vectors import Mat3, Vec3
+from .checks import check_keys
+from .description import GROUND_NAME, Description, Faults, items, label_of
+from .expressions import parse
+from .mechanism import Body
+from .names import nearest
+from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
+from .quantities import Named, Quantity
+from .requirements import Requirements
+from .scope import Namespace, Scope
+from .sympy_face import is_sympy, lower_sympy, name_of
+from .units import Unit
+
+_A = {"length": "a length", "angle": "an angle"}
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a plain real number (truth values are not), or one in an array of no axes."""
+    if getattr(value, "shape", None) == () and hasattr(value, "dtype"):
+        return bool(value.dtype.kind in "iuf")
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+class Reader:
+    """Reads values of one description into one graph.
+
+    Attributes
+    ----------
+    bodies : dict of str to int
+        Index of each body; ground has :data:`~eomgen.elements.frames.GROUND`.
+    markers : dict of str to Marker
+        Named markers (``rod.tip``) and the bodies' own frames (``rod``).
+    quantities : dict of str to Quantity
+        Motions of markers that expressions use.
+    """
+
+    def __init__(self, graph: Graph, names: Namespace, faults: Faults, description: Description) -> None:
+        self.graph, self.names, self.faults, self.description = graph, names, faults, description
+        self.identity = vec.identity(graph)
+        self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
+        self.markers: dict[str, Marker] = {}
+        self.quantities: dict[str, Quantity] = {}
+        self.asked: dict[Named, str] = {}  # what force elements do, and where that is used first
+        self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
+        self.stand_in = graph.symbol("?")
+        self.requirements = Requirements(faults)  # with the declared values of parameters
+        self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
+        self.latex: dict[str, str] = {}  # by name, where it is given
+        self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
+        self.shapes: Callable[[str, Any], Any] = lambda path, value: None  # of contacts between groups
+        self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
+        self.mass_data: Sequence[Body] = ()  # bodies whose masses are read
+
+    def ask(self, quantity: Named, path: str) -> None:
+        """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
+        if quantity.carried:
+            self._ask_reaction(quantity)
+            self.asked.setdefault(quantity, path)
+            return
+        names = [str(entry.name) for entry in self.description.sections["forces"]]
+        if quantity.of not in names:
+            raise ExpressionError(
+                f"no force element {quantity.of!r}",
+                0,
+                nearest(quantity.of, names, "elements"),
+                code="EG-NAME-UNKNOWN",
+            )
+        for label in (quantity.on, quantity.axes):
+            if label:
+                self.moving(label)
+        self.asked.setdefault(quantity, path)
+
+    def _ask_reaction(self, quantity: Named) -> None:
+        """Refuse the reaction of an unknown joint, or the multiplier of an unknown element."""
+        places = ("joints",) if quantity.part else ("constraints", "joints")
+        names = [str(entry.name) for place in places for entry in self.description.sections[place]]
+        if quantity.owner not in names:
+            message = f"no {'joint' if quantity.part else 'constraint or joint'} {quantity.owner!r}"
+            raise ExpressionError(message, 0, nearest(quantity.owner, names, "known"), code="EG-NAME-UNKNOWN")
+        if quantity.axes:
+            self.moving(quantity.axes)
+
+    def known(self, expression: Expr) -> float | None:
+        """The value of an expression at the declared values of parameters, None if they do not tell."""
+        found = self.requirements.known([expression])
+        return None if found is None else float(found[0])
+
+    def wrong(self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE") -> None:
+        """Note that a value is not of a kind."""
+        if value is None:
+            self.faults.add(path, "has no value", f"give {kind.says}", "EG-MISSING")
+        else:
+            self.faults.add(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
+
+    def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
+        """Note keys that a table does not know, and required ones that are missing."""
+        check_keys(path, values, fields, self.faults)
+
+    def check_names(self, path: str, given: Iterable[Any], names: Sequence[str]) -> None:
+        """Note names that are none of these."""
+        for name in given:
+            if name not in names:
+                remedy = nearest(str(name), names, "allowed")
+                self.faults.add(f"{path}.{name}", "unknown key", remedy, "EG-NAME-UNKNOWN")
+
+    # -- scalars --------------------------------------------------------------------------------------------------
+    def expression(
+        self,
+        path: str,
+        value: Any,
+        level: int = CONSTANT,
+        local: Mapping[str, Expr] | None = None,
+        exclusive: bool = False,
+    ) -> Expr:
+        """A scalar: a number, a text or a SymPy expression.
+
+        Names in ``local`` come before those of the model; with ``exclusive`` a name must not be both.
+        """
+        found = self._expression(path, value, level, local, exclusive)
+        if found.value is None:
+            self.expressions.append((path, found, local or {}))
+        return found
+
+    def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
+        asked = (self.moving, self.quantities, self.output, self.ask)
+        scope = Scope(self.graph, self.names, path, level, *asked, local, exclusive)
+        try:
+            if isinstance(value, str):
+                return parse(value, self.graph, scope.resolve, scope.locate if level >= LAW else None)
+            if is_sympy(value):
+                return lower_sympy(self.graph, value, scope.resolve)
+            if is_number(value):
+                return self.graph.constant(float(value))
+        except ExpressionError as error:
+            if not self.names.explains(error):
+                self.faults.add(path, error.place(), error.remedy, error.code)
+            return self.stand_in
+        except OverflowError:
+            self.faults.add(path, f"{quoted(value)} is not a finite number", code="EG-NUMBER")
+            return self.stand_in
+        self.wrong(path, value, kinds.Scalar)
+        return self.stand_in
+
+    def number(self, path: str, value: Any, positive: bool = False) -> float | None:
+        """A number; a text or SymPy expression without names counts as one."""
+        kind = kinds.PositiveNumber if positive else kinds.Number
+        result = value
+        if isinstance(value, str) or is_sympy(value):
+            result = self.expression(path, value, NUMBER).value
+        try:
+            finite = is_number(result) and math.isfinite(result)
+        except OverflowError:  # a whole number of hundreds of digits
+            finite = False
+        if not finite or (positive and result <= 0):
+            if not self.faults.under(path):
+                self.wrong(path, value, kind, "EG-RANGE" if finite else "EG-TYPE")
+            return None
+        return float(result)
+
+    def text(self, path: str, value: Any) -> str:
+        """A text, pairs of surrogates as the characters that they mean."""
+        if not isinstance(value, str):
+            self.wrong(path, value, kinds.Text)
+            return ""
+        half = lone_surrogate(value)
+        if half:
+            self.faults.add(path, f"contains {half}, which is half of a character pair", WHOLE, "EG-TYPE")
+            return ""
+        return join_surrogates(value)
+
+    def file(self, path: str, value: Any) -> str | None:
+        """The name of a file; None where no file can have it."""
+        if not isinstance(value, str | os.PathLike):
+            self.wrong(path, value, kinds.File)
+            return None
+        name = usable_name(value)
+        if name is None:
+            message = f"{value!r:.200} is empty, or contains a character that file names cannot have"
+            self.faults.add(path, message, "give another name", "EG-FILE")
+        return name
+
+    def flag(self, path: str, value: Any) -> bool:
+        """True or false; True when it is neither."""
+        if isinstance(value, bool):
+            return value
+        self.wrong(path, value, kinds.Flag)
+        return True
+
+    def check_word(self, path: str, value: Any) -> str:
+        """What becomes of an impossible inertia: error, note or off; true and false mean error and off."""
+        word = word_of_check(value)
+        if word is None:
+            self.wrong(path, value, kinds.Check)
+        return word or "error"
+
+    def choice(self, path: str, value: Any, field: kinds.Field) -> str:
+        """One of the words of a field; the default when it is another."""
+        if isinstance(value, str) and value in field.choices:
+            return value
+        shown = list(field.choices)
+        remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
+        self.faults.add(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
+        return str(field.default)
+
+    # -- vectors and matrices -------------------------------------------------------------------------------------
+    def vector(self, path: str, value: Any, level: int = CONSTANT) -> Vec3:
+        """Three scalars."""
+        parts = items(value)
+        if parts is None or len(parts) != 3:
+            self.wrong(path, value, kinds.Vector)
+            return (self.stand_in,) * 3
+        x, y, z = (self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts))
+        return (x, y, z)
+
+    # -- frames and markers ---------------------------------------------------------------------------------------
+    def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
+        """A placement in a body from ``at`` and ``rpy``, in the axes of the place ``on``."""
+        at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
+        given = [key for key in ("rpy", "axes", "matrix") if key in values]
+        if len(given) > 1:
+            self.faults.add(
+                f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT"
+            )
+        turn, key = self.identity, given[0] if given else ""
+        if key == "rpy":
+            turn = rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"]))
+        elif key:
+            turn = (self.turn_of_axes if key == "axes" else self.turn_of_matrix)(f"{path}.{key}", values[key])
+        frame = Frame(turn, at)
+        return self.named_frame(f"{path}.on", values["on"]) @ frame if "on" in values else frame
+
+    def turn_of_axes(self, path: str, value: Any) -> Mat3:
+        """The rotation whose columns are a frame's axes, two of which are given."""
+        if not isinstance(value, Mapping) or len(value) != 2 or not {*value} <= {*"xyz"}:
+            self.wrong(path, value, kinds.FrameAxes)
+            return self.identity
+        (first, a), (second, b) = ((key, self.axis(f"{path}.{key}", one)[2]) for key, one in value.items())
+        if self.faults.under(path):
+            return self.identity
+        if abs(sum(x * y for x, y in zip(a, b, strict=True))) > PERPENDICULAR:
+            remedy = "correct one of them"
+            self.faults.add(path, f"the directions of {first} and {second} are not at right angles", remedy, "EG-RANGE")
+            return self.identity
+        columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
+        return turn_matrix(self.graph, columns)
+
+    def turn_of_matrix(self, path: str, value: Any) -> Mat3:
+        """A rotation matrix of numbers and expressions, as far as declared values tell orthogonal and right-handed."""
+        rows = [items(row) for row in items(value) or ()]
+        if len(rows) != 3 or any(row is None or len(row) != 3 for row in rows):
+            self.wrong(path, value, kinds.Matrix)
+            return self.identity
+        x, y, z = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
+        self.requirements.judge(path, ROTATION, [*x, *y, *z])
+        return (x, y, z)
+
+    def moving(self, label: str) -> Marker:
+        """The marker of a label in an expression; raises ExpressionError if there is none."""
+        found = self.markers.get(label)
+        if found is None and label in self.description.motions:
+            found = self.marker(label, self.description.motions[label])
+        if found is None:
+            raise ExpressionError(*self.unknown_marker(label), code="EG-NAME-UNKNOWN")
+        return found
+
+    def unknown_marker(self, label: str) -> tuple[str, int, str]:
+        """Message, column (none) and remedy for a marker that does not exist."""
+        body, dot, name = label.partition(".")
+        if body in self.bodies and dot:
+            own = [key.split(".", 1)[1] for key in self.markers if key.startswith(body + ".")]
+            near = hint(name, own)
+            have = ", ".join(own) or "none"
+            return f"{body!r} has no marker {name!r}", 0, " ".join(x for x in (near, f"its markers: {have}") if x)
+        return f"no body {body!r}", 0, nearest(body, self.bodies, "bodies")
+
+    def marker(self, path: str, value: Any) -> Marker | None:
+        """A marker from a reference: ``rod``, ``rod.tip``, ``ground`` or a mapping of body, at, rpy."""
+        if isinstance(value, str):
+            found = self.markers.get(value)
+            body = value.partition(".")[0]
+            if found is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
+                message, _, remedy = self.unknown_marker(value)
+                self.faults.add(path, message, remedy, "EG-NAME-UNKNOWN")
+            return found
+        if not isinstance(value, Mapping):
+            self.wrong(path, value, kinds.MarkerReference)
+            return None
+        self.check_keys(path, value, PLACED)
+        if "body" not in value:
+            return None
+        body = value["body"]
+        if not isinstance(body, str) or body not in self.bodies:
+            self.faults.add(
+                f"{path}.body",
+                f"no body {quoted(body)}",
+                nearest(shown(body), self.bodies, "bodies"),
+                "EG-NAME-UNKNOWN",
+            )
+            return None
+        return Marker(self.bodies[body], self.frame(path, value), label_of(value))
+
+    def named_frame(self, path: str, value: Any) -> Frame:
+        """The placement of a named marker: a position, or a mapping of at and rpy."""
+        if isinstance(value, Mapping):
+            self.check_keys(path, value, MARKER)
+            return self.frame(path, value)
+        return Frame(self.identity, self.vector(path, value))
+
+    def pair(self, path: str, value: Any) -> tuple[Marker, Marker] | None:
+        """Two markers; None if either is unknown."""
+        parts = items(value)
+        if parts is None or len(parts) != 2:
+            self.wrong(path, value, kinds.Pair)
+            return None
+        first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
+        return None if first is None or second is None else (first, second)
+
+    def axes(self, path: str, value: Any) -> Columns:
+        """Columns of the turn that brings x and y to two directions at right angles."""
+        parts = items(value)
+        if parts is None or len(parts) != 2:
+            self.wrong(path, value, kinds.TwoAxes)
+            return TURNS["z"]
+        x, y = (self.axis(f"{path}[{k}]", part)[2] for k, part in enumerate(parts))
+        if self.faults.under(path):
+            return TURNS["z"]
+        if abs(sum(a * b for a, b in zip(x, y, strict=True))) > PERPENDICULAR:
+            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {kinds.TwoAxes.says}", "EG-RANGE")
+            return TURNS["z"]
+        return axes_columns(x, y)
+
+    def axis(self, path: str, value: Any) -> Columns:
+        """Columns of the turn that brings an axis to z."""
+        if isinstance(value, str):
+            if value in TURNS:
+                return TURNS[value]
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
+            return TURNS["z"]
+        parts = items(value)
+        if parts is None or len(parts) != 3:
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
+            return TURNS["z"]
+        x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
+        if x is None or y is None or z is None:
+            return TURNS["z"]
+        columns = axis_columns((x, y, z))
+        if columns is None:
+            self.faults.add(path, "the axis has no length", f"allowed: {kinds.Axis.says}", "EG-RANGE")
+            return TURNS["z"]
+        return columns
+
+    # -- bodies, coordinates and shapes -------------------------------------------------------------------------------
+    def body(self, path: str, value: Any) -> tuple[int, Body] | None:
+        """The index of a body, and its mass."""
+        own = {body.name: k for k, body in enumerate(self.mass_data)}
+        if isinstance(value, str) and value in own:
+            return own[value], self.mass_data[own[value]]
+        if value is not None and not self.faults.under(f"bodies.{value}"):
+            remedy = nearest(shown(value), own, "bodies")
+            self.faults.add(path, f"no body {quoted(value)}", remedy, "EG-NAME-UNKNOWN")
+        return None
+
+    def coordinate(self, path: str, value: Any, measure: str = "") -> Found | None:
+        """The coordinate meant by the name of a joint of one degree, or by its own; of a measure, if one is asked for.
+
+        None, and a fault, if there is none.
+        """
+        faults, given = self.faults, name_of(value)
+        own = next((j for j in self.joints if j.entry.name == given), None)
+        home = next((j for j in self.joints if given in j.coordinates), None)
+        if own is not None and home is not None and own is not home:
+            remedy = "rename one of them"
+            faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
+            return None
+        if own is not None and home is None and len(own.coordinates) != 1:
+            names = ", ".join(own.coordinates) or "none"
+            message = f"joint {quoted(given)} has {len(own.coordinates)} coordinates"
+            faults.add(path, message, f"name one of them: {names}", "EG-REFERENCE")
+            return None
+        joint = home or own
+        if joint is not None:
+            name = str(given) if home is not None else joint.coordinates[0]
+            kind = joint.joint.coordinates[joint.coordinates.index(name)].kind
+            if measure and kind != measure:
+                message = f"the coordinate {name!r} is {_A[kind]}"
+                faults.add(path, message, f"name a coordinate that is {_A[measure]}", "EG-REFERENCE")
+                return None
+            return Found(name, kind, joint.entry.name)
+        if isinstance(given, str) and self.names.kinds.get(given) == "coordinate":
+            return Found(given, "angle", None)
+        if not faults.under(f"joints.{given}"):  # else the joint itself is at fault, which is noted already
+            known = [j.entry.name for j in self.joints]
+            known += [c for c in self.names.of("coordinate") if c not in known]
+            remedy = nearest(shown(given), known, "joints and coordinates")
+            faults.add(path, f"no joint {quoted(given)}", remedy, "EG-NAME-UNKNOWN")
+        return None

@@ -1,0 +1,388 @@
+"""What a user gives as values of many runs, or as a grid of values -> Cases, a column for each run."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.algebra import Array
+from ...base.names import place_of_marker
+from ...base.value_rules import read_count
+from ...errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
+from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
+from ..initial import Initial
+from ..kernels import Kernels
+from ..refusals import require_switched
+from ..runs.events import at_next_samples, require_agreement
+from ..runs.run_arguments import find_state
+from ..start_values import silent, values_at, warn_of_fixed
+from ..trajectory import last_state
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+    from ..inputs import Forcing
+    from ..layout import Layout
+
+
+# -- grids -------------------------------------------------------------------------------------------------------------
+
+
+Groups = tuple[Any, Any, Any]
+
+
+def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
+    """Initial values, parameters and inputs with the columns of a grid: every combination, the last name fastest.
+
+    Parameters
+    ----------
+    module : BoundModel
+    grid : mapping
+        Values by the name of a parameter, an input, a coordinate, a rate or an output: a list, or (low, high, count).
+    groups : tuple
+        Initial values, parameters and inputs beside the grid, by name.
+
+    Raises
+    ------
+    UsageError
+        A name that is not there, or given twice; a group that is an array.
+    """
+    require_mapping("grid", grid)
+    grid = without_dots(grid, module.layout.instances)
+    if not grid:
+        raise incomplete("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
+    layout = module.layout
+    states = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y)
+    check_names("parameter, input, coordinate or rate", grid, (*module.p_names, *module.u_names, *states))
+    for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
+        if given is not None and not isinstance(given, Mapping):
+            raise incomplete(f"{what} must be given by name beside a grid")
+        if twice := sorted({*grid} & {*without_dots(given or {}, layout.instances)}):
+            raise at_odds(f"grid: {', '.join(twice)} is given in {what} too; give it once")
+    axes = grid_axes(grid)
+    count = math.prod(map(len, axes.values()))
+    require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
+    columns = [column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")]
+    initial, parameters, inputs = (dict(given or {}) for given in groups)
+    for name, column in zip(grid, columns, strict=True):
+        home = parameters if name in module.p_names else inputs if name in module.u_names else initial
+        home[name] = column
+    return initial, parameters, inputs
+
+
+def grid_axes(grid: Mapping[str, Any]) -> dict[str, Array]:
+    """The values of each name of a grid."""
+    return {name: np.asarray(read_axis(f"grid {name}", values)) for name, values in grid.items()}
+
+
+# -- cases -------------------------------------------------------------------------------------------------------------
+
+
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+UNASSEMBLED = -111  #: status of a run whose initial values could not be assembled
+
+
+@dataclass(frozen=True)
+class Cases:
+    """What differs between runs, and what does not.
+
+    Attributes
+    ----------
+    count : int
+        Number of runs, k.
+    p, u : (n_p,), (n_u,) or (n_p, k), (n_u, k) arrays
+    states : (n_x, k) array or None
+        Initial states, not yet projected.
+    values : dict of str to float or (k,) array
+        Named initial values where there are no states.
+    """
+
+    count: int
+    p: Array
+    u: Array
+    states: Array | None
+    values: dict[str, Any]
+
+    def part(self, start: int, stop: int) -> Cases:
+        """The runs from `start` to before `stop`."""
+        values = {name: x[start:stop] if np.ndim(x) else x for name, x in self.values.items()}
+        states = None if self.states is None else self.states[:, start:stop]
+        p, u = (a if a.ndim == 1 else a[:, start:stop] for a in (self.p, self.u))
+        return Cases(min(stop, self.count) - start, p, u, states, values)
+
+    @property
+    def differ(self) -> bool:
+        """Whether anything differs between the runs."""
+        values = () if self.states is not None else self.values.values()
+        return self.p.ndim > 1 or self.u.ndim > 1 or self.states is not None or any(np.ndim(x) for x in values)
+
+    def alike(self, layout: Layout) -> list[list[int]]:
+        """The runs by what of their parameters and inputs decides where they can start."""
+        p, u = self.p, self.u
+        if not any(place_of_marker(n) or layout.plain(n) in layout.y for n in (*self.values, *layout.initial_outputs)):
+            p, u = p[layout.start_parameters], u[layout.constraint_inputs]
+        if p.ndim == u.ndim == 1:
+            return [list(range(self.count))] * (self.count > 0)
+        rows = np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)])
+        groups: dict[bytes, list[int]] = {}
+        for k, row in enumerate(np.ascontiguousarray(rows.T)):
+            groups.setdefault(row.tobytes(), []).append(k)
+        return list(groups.values())
+
+    def column(self, k: int) -> dict[str, Any]:
+        """Parameters and inputs of one run, as ``Module.bind`` takes them."""
+        given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
+        return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
+
+    def digest(self) -> str:
+        """SHA-256 of all of it."""
+        found = hashlib.sha256(str(self.count).encode())
+        for array in (self.p, self.u, self.states):
+            found.update(b"none" if array is None else repr(array.shape).encode() + np.ascontiguousarray(array).data)
+        for name, value in sorted(self.values.items()):
+            found.update(name.encode() + np.ascontiguousarray(value, dtype=float).data)
+        return found.hexdigest()
+
+
+def collect_cases(
+    module: BoundModel,
+    initial: Mapping[str, Any] | ArrayLike | None,
+    parameters: Mapping[str, Any] | ArrayLike | None,
+    inputs: Mapping[str, Any] | ArrayLike | None,
+    count: int | None,
+) -> Cases:
+    """Bring initial values, parameters and inputs together.
+
+    Parameters
+    ----------
+    module : BoundModel
+    initial : mapping of str to float or (k,), or (n_x,) or (n_x, k) array, optional
+    parameters : mapping of str to float or (k,), or (n_p,) or (n_p, k) array, optional
+    inputs : mapping of str to float or (k,), or (n_u,) or (n_u, k) array, optional
+        Constant over time.
+    count : int, optional
+        Number of runs, where nothing given tells it.
+
+    Raises
+    ------
+    UsageError
+        Unknown names, values that are not finite, and lengths that differ, all named.
+    """
+    lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
+    p = _bound("parameter", module, parameters, lengths)
+    u = _bound("input", module, inputs, lengths)
+    states, values = None, {}
+    if isinstance(initial, Mapping):
+        layout = module.layout
+        initial = without_dots(initial, layout.instances)
+        values = {str(name): _numbers(f"initial {name}", x, lengths) for name, x in initial.items()}
+        known = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y, *filter(place_of_marker, values))
+        check_names("coordinate or rate", values, known)
+        with suppress(AssemblyError):  # of values, which differ between runs
+            Initial(module.kernels, 0.0, values).sort(dict.fromkeys(values, 0.0))  # names that no run can take
+    elif initial is not None:
+        states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)
+    _require_one_length(lengths)
+    k = next(iter(lengths.values()), 1)
+    if states is None:
+        declared = (*module.layout.initial, *module.layout.initial_outputs)
+        warn_of_fixed(module.layout, p, [name for name in declared if name not in values])
+    require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
+    if states is not None and states.ndim == 1:
+        states = np.repeat(states[:, None], k, axis=1)
+    return Cases(k, p, u, states, values)
+
+
+def assemble_states(
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, Mask, list[str]]:
+    """The initial states of all runs, on the constraints.
+
+    Parameters
+    ----------
+    module : BoundModel
+    cases : Cases
+    t : float
+        Time of the start (s).
+    forcing_of : callable
+        The inputs of a run by its number.
+
+    Returns
+    -------
+    x : (n_x, k) array
+        NaN for a run that cannot be assembled.
+    failed : (k,) bool array
+    words : list of str
+        Why, for each of these in order.
+    """
+    with silent():  # for all runs, when their cases were collected
+        x, reasons = _assemble_all(module, cases, t, forcing_of)
+    if module.metadata.get("clocks"):
+        for k in set(range(cases.count)) - reasons.keys():
+            x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
+    if module.metadata.get("switched"):
+        _refuse_disagreement(module, cases, t, x, reasons)
+    failed = np.array([k in reasons for k in range(cases.count)], dtype=bool)
+    return x, failed, [reasons[k] for k in sorted(reasons)]
+
+
+def _refuse_disagreement(module: BoundModel, cases: Cases, t: float, x: Array, reasons: dict[int, str]) -> None:
+    """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
+    layout, by_name = module.layout, cases.states is None and bool(module.metadata.get("held_rows"))
+    for k in set(range(cases.count)) - reasons.keys():
+        try:
+            require_switched(layout, x[layout.n_x - layout.n_states :, k])
+            if by_name:
+                require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
+        except UsageError as error:
+            reasons[k], x[:, k] = str(error), np.nan
+
+
+@np.errstate(all="ignore")
+def _assemble_all(
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, dict[int, str]]:
+    """The states (n_x, k), and why runs have none; what several runs have in common is solved for once."""
+    free = not module.n_rows and not module.layout.space
+    if cases.states is not None and free:
+        return np.array(cases.states), {}
+    if cases.states is None and _is_free(module, cases, free):
+        return _assemble_entries(module, cases, t)
+    x, reasons = np.full((module.n_x, cases.count), np.nan), dict[int, str]()
+    led = forcing_of(0).constrained
+
+    def assemble(columns: list[int]) -> None:
+        try:
+            if led:
+                x[:, columns] = _assemble_led(module, cases, columns[0], t, forcing_of(columns[0]))[:, None]
+            elif cases.states is not None:
+                x[:, columns] = module.project(cases.states[:, columns], t=t, **cases.column(columns[0]))
+            else:
+                x[:, columns] = _assemble_named(module, cases, columns, t)
+        except EomgenError as error:
+            if len(columns) == cases.count and not (led or cases.differ):
+                raise
+            if len(columns) == 1:
+                reasons[columns[0]] = str(error)
+            for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
+                assemble([k])
+
+    for columns in [[k] for k in range(cases.count)] if led else cases.alike(module.layout):
+        assemble(columns)
+    return x, reasons
+
+
+def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array, dict[int, str]]:
+    """The states where each named value is an entry of them, whatever the others are."""
+    late = {name: value for name, value in values_at(module.layout, cases.p).items() if np.ndim(value)}
+    values = late | cases.values
+    scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in values.items()}
+    shared: dict[str, Any] = {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
+    x = np.repeat(module.x0(scalars, t=t, **shared)[:, None], cases.count, axis=1)
+    for name, value in values.items():
+        if np.ndim(value):
+            x[module.x_names.index(name)] = value
+    unknown = {  # of what follows from parameters
+        k: f"{module.x_names[int(np.argmin(np.isfinite(x[:, k])))]} is no number at the start"
+        for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist()
+    }
+    return x, unknown
+
+
+def _assemble_named(module: BoundModel, cases: Cases, columns: list[int], t: float) -> Array:
+    """The states of runs that differ, as far as starts can tell, in their named values alone."""
+    kernels = Kernels(module.core, module.layout, **cases.column(columns[0]))
+    initial = Initial(kernels, t, cases.values)
+    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
+             for k in columns]  # fmt: skip
+    alike: dict[tuple[float, ...], list[int]] = {}
+    for i, one in enumerate(given):
+        alike.setdefault(tuple(one.positions.values()), []).append(i)
+    x = np.empty((module.n_x, len(columns)))
+    for places in alike.values():
+        first = given[places[0]]
+        q = initial.assembled(first.positions)
+        rates = {name: np.array([given[i].rates[name] for i in places]) for name in first.rates}
+        v = initial.velocities(q, rates if first.positions or rates else None)
+        x[: module.n_q, places] = q[:, None]
+        x[module.n_q :, places] = v if v.ndim > 1 else v[:, None]
+    return x
+
+
+def _assemble_led(module: BoundModel, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
+    """The state of one run whose constraints depend on inputs that vary."""
+    values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
+    given = values if cases.states is None else cases.states[:, k]
+    return find_state(module.rebound(**cases.column(k)), given, t, forcing)
+
+
+def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
+    """Whether named initial values are entries of the state, whatever the others are."""
+    layout = module.layout
+    return free and not (layout.loops or layout.initial_outputs) and all(n in layout.x for n in cases.values)
+
+
+def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
+    """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
+    if given is None:
+        return module.p if what == "parameter" else module.u
+    found = _read_bound(what, module, given, lengths)
+    if what == "parameter":
+        module.layout.require_allowed(found)
+    return found
+
+
+def _read_bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
+    layout = module.layout
+    names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
+    if not isinstance(given, Mapping):
+        return _columns(f"{what}s", given, names, lengths)
+    given = without_dots(given, layout.instances)
+    check_names(what, given, names)
+    values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in given.items()}
+    _require_one_length(lengths)
+    k = next((len(x) for x in values.values() if np.ndim(x)), None)
+    result = base.copy() if k is None else np.repeat(base[:, None], k, axis=1)
+    for name, value in values.items():
+        result[names.index(name)] = value
+    return result
+
+
+def _require_one_length(lengths: Mapping[str, int]) -> None:
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
+        raise ill_shaped(f"every (k,) and (n, k) array must have the same number of runs k, not {told}")
+
+
+def _columns(what: str, given: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
+    array = _floats(what, given)
+    if array.ndim not in (1, 2) or array.shape[0] != len(names):
+        told = ", ".join(names) or "none"
+        raise ill_shaped(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{told}], not {array.shape}")
+    if array.ndim == 2:
+        lengths[what] = array.shape[1]
+    return array
+
+
+def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
+    array = _floats(what, given)
+    if array.ndim > 1:
+        raise ill_shaped(f"{what} must be a number or have shape (k,), not {array.shape}")
+    if array.ndim:
+        lengths[what] = len(array)
+    return array if array.ndim else float(array)
+
+
+def _floats(what: str, given: Any) -> Array:
+    array = np.array(read_numbers(what, given))
+    if not np.isfinite(array).all():
+        first = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise no_number(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
+    return array

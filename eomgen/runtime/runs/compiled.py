@@ -1,0 +1,312 @@
+"""The module's own steppers: whether a run takes them, its arguments, single steps, classes for SciPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from math import inf
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.algebra import Array
+from ...base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
+from ...errors import UnavailableError, UsageError, cannot, ill_shaped
+from ..argument_checks import check_names, fitting, read_plain, read_vector, require
+from ..inputs import Forcing
+from ..late import eager
+from ..refusals import require_support
+from .events import Events
+from .integrate import require_one
+from .run_arguments import IMPLICIT, check_tolerances, declare, longest_step, own_step
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+
+OPTIONS = ("rtol", "atol", "max_step", "first_step")
+
+
+def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
+    """Whether a run needs nothing but the module's own steppers.
+
+    Raises
+    ------
+    UsageError
+        Method Taylor where it cannot be: nobody else has it.
+    """
+    core: Any = module.core
+    there = isinstance(method, str) and method in core.methods
+    if isinstance(method, str) and method == "Taylor":
+        if not there:
+            raise cannot(no_series(module))
+        if not forcing.stepwise:
+            raise cannot(
+                "method Taylor takes only inputs that are constant between corners: numbers, and tables with "
+                'interpolation "zero-order"; for other inputs use DOP853'
+            )
+    return there and not forcing.foreign
+
+
+def no_series(module: BoundModel) -> str:
+    """Why a module has no Taylor method."""
+    why = module.metadata.get("no_series", "its module was compiled without one, as with target='numpy'")
+    return (
+        f"{module.name} has no Taylor series: {why}; the method works for open chains of bodies whose equations are "
+        "smooth and not too long; use DOP853"
+    )
+
+
+def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
+    """Tolerances and step limits as steppers take them.
+
+    Parameters
+    ----------
+    n : int
+        Number of states.
+    span : float
+        Length of the run (s), the longest first step.
+    options : mapping
+        rtol, atol (a number or n of them), max_step, first_step.
+    checked : bool
+        Whether they have been checked and completed already.
+
+    Raises
+    ------
+    UsageError
+        An unknown option or a value that cannot be.
+    """
+    check_names("option of simulate", options, OPTIONS)
+    given = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
+    limits = {"max_step": given.get("max_step", inf), "first_step": given.get("first_step", 0.0)}
+    atol = np.empty(n)
+    atol[:] = given["atol"]
+    return {"rtol": require_one(given["rtol"]), "atol": atol, **limits}
+
+
+# -- arguments of plain runs -------------------------------------------------------------------------------------------
+
+# A run over a given span takes them from here, unless it has inputs, events, steps or options of its own.
+
+
+MANY = 16  #: sets of arguments that are kept for a module
+SIMPLE = frozenset((str, float, type(None)))  #: types of the arguments by which a run is found again
+
+
+class Settled(NamedTuple):
+    """What holds for every run with the same arguments; none of it is changed by a run."""
+
+    forcing: Forcing  #: of no inputs, with the module's own values
+    watched: Events
+    title: str  #: the method
+    end: float  #: by default (s)
+    settings: dict[str, Any]  #: rtol and atol, checked
+    shared: bool  #: whether runs that bind no values change nothing of the forcing: no rates, no sampled states
+
+
+def settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
+    """What holds for a run in compiled code without inputs; None where the arguments must be read one by one."""
+    key = (method, rtol, atol)
+    if not ((method is None and rtol is None and atol is None) or SIMPLE.issuperset(map(type, key))):
+        return None
+    known = module._settled
+    if key in known:
+        found: Settled | None = known[key]
+        return found
+    try:
+        found = _settle(module, method, rtol, atol)
+    except UsageError:  # told where the arguments are read
+        return None
+    if len(known) >= MANY:
+        known.clear()
+    known[key] = found
+    return found
+
+
+def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
+    named, step = own_step(module, method, None)
+    unusual = step is not None or "rigid_only" in module.metadata or "contact_shapes" in module.metadata
+    if unusual or named in ("kinematic", "moreau", "RK4") or (named is None and not module.layout.n_dof):
+        return None
+    declared = declare(module)
+    title = declared["method"] if method is None else method
+    forcing = Forcing(module.layout, None)
+    if forcing.values or title == "RK4" or longest_step(module, title) or not can_run(module, title, forcing):
+        return None
+    forcing.attach(module)
+    given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}
+    settings = check_tolerances(module.n_x, float("inf"), given)
+    shared = not (module.layout.input_rates or module.metadata.get("clocks") or module.metadata.get("switched"))
+    return Settled(forcing, Events(module.layout, None), str(title), float(declared["end"]), settings, shared)
+
+
+# -- classes of solvers ------------------------------------------------------------------------------------------------
+
+
+def find_solver(module: BoundModel, name: str) -> Any:
+    """The stepper of a module by name."""
+    require_support(module.layout, "methods of SciPy", f"method {name}")
+    core: Any = eager(module.core)
+    if name in core.methods:
+        return solver_class(core, name)
+    if name == "Taylor":
+        raise UnavailableError(no_series(module))
+    return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
+
+
+@cache
+def solver_class(core: Any, name: str) -> Any:
+    """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
+
+    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
+    Jacobian than the module's, it is SciPy's own; SciPy has no Taylor.  A failed evaluation shortens the step.
+
+    Parameters
+    ----------
+    core : Core
+        Of a module with compiled steppers.
+    name : {'DOP853', 'RK45', 'Radau', 'Taylor'}
+
+    Raises
+    ------
+    MissingDependencyError
+        SciPy is not installed.
+    UsageError
+        From the class: Taylor for another function than the module's ``rhs``.
+    """
+    scipy = require("scipy.integrate", "scipy", f"method {name}")
+    own: Any = getattr(scipy, name, _only_for_modules)
+    rhs = core.timed
+
+    class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
+        """A compiled stepper."""
+
+        def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
+            jac = options.get("jac")
+            known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
+            mine = isinstance(fun, rhs) and fun.name == "rhs" and fun.context.model is core
+            if mine and known and options.get("jac_sparsity") is None:
+                return super().__new__(cls)
+            if callable(jac):
+                options["jac"] = lambda t, x: jac(t, x.copy())
+            return own(lambda t, x: fun(t, x.copy()), *args, **options)  # a function may change what it is given
+
+        def __init__(
+            self,
+            fun: Any,
+            t0: float,
+            y0: Array,
+            t_bound: float,
+            max_step: float = np.inf,
+            rtol: float = SCIPY_RTOL,
+            atol: Any = SCIPY_ATOL,
+            vectorized: bool = False,
+            first_step: float | None = None,
+            **extraneous: Any,
+        ) -> None:
+            super().__init__(fun, t0, y0, t_bound, vectorized)
+            for key in IMPLICIT if name == "Radau" else ():  # the model's own Jacobian, or none
+                extraneous.pop(key, None)
+            options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
+            settings = stepper_options(self.n, abs(t_bound - t0), options)
+            self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
+
+        @property
+        def nfev(self) -> int:
+            """Evaluations of the right-hand side so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.evaluations)
+
+        @nfev.setter
+        def nfev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def njev(self) -> int:
+            """Evaluations of the Jacobian so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.differentiations)
+
+        @njev.setter
+        def njev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def nlu(self) -> int:
+            """Matrices factored so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.factorizations)
+
+        @nlu.setter
+        def nlu(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        def _step_impl(self) -> tuple[bool, str | None]:
+            stepper = self._stepper
+            if not stepper.step():
+                return False, self.TOO_SMALL_STEP
+            self.t, self.y = stepper.t, stepper.state()
+            return True, None
+
+        def _dense_output_impl(self) -> Any:
+            return self._stepper.interpolant()  # callable like a DenseOutput, with t_old, t, t_min, t_max
+
+    Solver.__name__ = Solver.__qualname__ = name
+    return Solver
+
+
+def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
+    """In place of a class that SciPy does not have."""
+    raise cannot("method Taylor can integrate only the rhs of its module, with constant inputs")
+
+
+def step(
+    module: BoundModel, /, t: float, x: ArrayLike, h: float, u: ArrayLike | None = None, out: Array | None = None
+) -> Array:
+    """Take one Runge-Kutta step (order 4) of size h, for real time: every step takes the same work.
+
+    Parameters
+    ----------
+    t, h : float
+        Time and size of the step (s).
+    x : (n_x,) array
+    u : (n_u,) array or mapping of names, optional
+        Inputs, held over the step; those bound by default.
+    out : (n_x,) array, optional
+        Takes the result; it may be x.
+
+    Returns
+    -------
+    (n_x,) array
+        The state at t + h; loops drift at the order of the step, see :meth:`project`.
+
+    Raises
+    ------
+    UsageError
+        Wrong shapes or values, or events of the model reset its state, which a step does not watch.
+    EvaluationError
+        An evaluation of the equations failed.
+    """
+    require_support(module.layout, "step")
+    if module.layout.n_events and Events(module.layout, None).resets:
+        raise cannot(
+            f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"
+        )
+    core: Any = eager(module.core)
+    u = module.kernels.fail.vector("u", u, module.u)
+    status, result = core.march(module.kernels.context, t, h, x, u, out, ill_shaped)
+    if status == 0:
+        return np.asarray(result)
+    # once more in Python to tell which of the four evaluations failed
+    t, h, start = read_plain("t", t), read_plain("h", h), read_vector("x", x, module.n_x)
+    if out is not None:
+        fitting(out, start.shape)
+    k = [module.rhs(t, start, u=u)]
+    with np.errstate(all="ignore"):  # what overflows is told by the next evaluation
+        for part in (0.5, 0.5, 1.0):
+            k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
+        after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    if out is None:
+        return np.asarray(after)
+    out[...] = after
+    return out

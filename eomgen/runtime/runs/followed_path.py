@@ -1,0 +1,678 @@
+"""The motion of prescribed coordinates is followed as a curve, through singular positions too.
+
+The system is C(q, t) = 0 with y(q) = the led values, as many as there are degrees of freedom (Haug, Computer Aided
+Kinematics and Dynamics of Mechanical Systems, ch. 3): its scaled Jacobian K = [C_q; y_q] has full column rank but at
+singular positions, where the led coordinates do not determine the motion.
+
+At a singular position Newton's iteration fails and beside it digits are lost, though the branch that is followed runs
+through smoothly.  Hermite's polynomial through two good points on either side has both; its error falls with the
+eighth power of their distance (Stoer and Bulirsch, Introduction to Numerical Analysis, sec. 2.1.5).
+
+At a singular position a motion is possible while the led coordinates (and the drivers) stand still.  Either the branch
+goes on through it, beside others (a change point: the sign of det K changes), or the led coordinates turn back there (a
+stop: a dead centre of theirs, the end of the mechanism's reach).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...base import algebra
+from ...base.algebra import Array
+from ...base.limits.analyses import ALIGNED, BLOCKED, EXTREME, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
+from ...base.limits.analyses import ASTRAY as ASTRAY_ACROSS
+from ...base.numeric.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
+from ...base.numeric.continuation import ASTRAY, Continuation, Point, Tangent, interpolate
+from ...base.numeric.projection import largest
+from ...base.numeric.roots import SECTIONS, find_least, find_root
+from ...base.numeric.scales import Scales
+from ...errors import EomgenError
+from ..kernels import constraint_system
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+
+
+# -- prescribed coordinates --------------------------------------------------------------------------------------------
+
+
+STEPS = 25  #: Newton steps
+
+
+class DrivenCoordinates:
+    """Solves for the motion of a module that is led by some of its coordinates.
+
+    Parameters
+    ----------
+    module : BoundModel
+        With parameters and inputs bound.
+    led : sequence of str
+        Coordinates of the tree or of cut joints, as many as degrees of freedom.
+    """
+
+    def __init__(self, module: BoundModel, led: Sequence[str]) -> None:
+        self.module, self.led = module, tuple(led)
+        self.layout = layout = module.layout
+        self.scales = layout.scales
+        kernels = module.kernels
+        self.system: ConstraintSystem = constraint_system(kernels)
+        self._rate = kernels.state("velocity_constraints", nan=True)
+        known = layout.rank and "kinematics" in kernels.core.names
+        self._kinematics = kernels.state("kinematics", nan=True) if known else None
+        self._loops = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        chosen = [layout.velocity_labels[i] for i in layout.independent]
+        #: whether the compiled kernel leads the same coordinates
+        self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)
+        wanted = self.system.wanted(dict.fromkeys(led, 0.0), self.led)
+        nothing = WantedValues(lambda q: (np.empty(0), np.empty((0, layout.n_v))), np.empty(0), np.empty(0), [], [])
+        self._wanted = nothing if wanted is None else wanted
+        self.led_scales, self.wraps = self._wanted.scales, np.array(self._wanted.angles, dtype=bool)
+        self._zero = np.zeros(layout.n_v)
+        independent = layout.rows if layout.rank else np.empty(0, dtype=np.intp)
+        self._square = np.concatenate([independent, layout.n_c + np.arange(len(led))]).astype(np.intp)
+
+    # positions
+
+    def led_values(self, q: Array, t: float) -> Array:
+        """y (k,) at a position."""
+        return self.system.at(t).measure(self.led, q)[0]
+
+    def equations(self, t: float, y: Array) -> WantedValues:
+        """The led coordinates as equations."""
+        measure = self.system.at(t).measure
+        return self._wanted._replace(evaluate=lambda q: measure(self.led, q), values=y)
+
+    def closure(self, t: float, y: Array) -> ClosureSystem:
+        """The constraints and the led coordinates, all of them as equations."""
+        return ClosureSystem(self.system.at(t).position, self.scales, np.ones(self.layout.n_v), self.equations(t, y))
+
+    def matrix(self, q: Array, t: float) -> Array:
+        """K (n_c + k, n_v), scaled."""
+        return self.closure(t, self._wanted.values).evaluate(q)[1]
+
+    def position(self, t: float, y: Array, guess: Array) -> Array | None:
+        """The closed position (n_q,) next to a guess; None if Newton's iteration finds none."""
+        if self.direct:
+            assert self._kinematics is not None
+            still = np.zeros(2 * len(y))
+            q = self._kinematics(np.concatenate([y, still, guess]), t=t)[: self.layout.n_q]
+            return q if np.isfinite(q).all() else None
+        q, residual = close(self.closure(t, y), guess, STEPS, damping=None)
+        return q if closed(residual) else None
+
+    # motion
+
+    def right(self, q: Array, t: float, t1: float, y1: Array) -> Array:
+        """Scaled right-hand side of K v = [-C_t t1; y1] where dt/ds = t1 and dy/ds = y1."""
+        C_t = np.zeros(self.layout.n_c)
+        if t1 and self.layout.n_c:
+            C_t = self._rate(np.concatenate([q, self._zero]), t=t)
+        return np.concatenate([-t1 * self.scales.residual(C_t), y1 / self.led_scales])
+
+    def tangent(self, t: float, q: Array, t1: float, y1: Array) -> Tangent:
+        """dq/ds where dt/ds = t1 and dy/ds = y1."""
+        K = self.matrix(q, t)
+        if not len(q):  # nothing moves, and no singular value says so
+            return Tangent(q, 1.0, 1.0, q, np.zeros(len(K)))
+        U, S, V = algebra.svd(K, full_matrices=False)
+        right = U.T @ self.right(q, t, t1, y1)
+        small = NULL * S[0]
+        rate = V.T @ np.divide(right, S, out=np.zeros_like(S), where=small < S)
+        square = K[self._square]
+        sign = float(np.linalg.slogdet(square)[0]) if len(square) == len(V) else 1.0
+        return Tangent(self.scales.q * rate, float(S[-1] / S[0]), sign, V[-1], U[:, -1])
+
+    def determinant(self, t: float, q: Array) -> float:
+        """Signed volume of the independent rows of K; it changes its sign where the motion may branch."""
+        K = self.matrix(q, t)[self._square]
+        return float(np.linalg.det(K)) if K.shape[0] == K.shape[1] else float("nan")
+
+    def motion(self, t: float, q: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
+        """v, a (n_v,) in real time at a closed position, where y' = y1 and y'' = y2; NaN where they are not defined."""
+        layout = self.layout
+        n_q, n = layout.n_q, layout.n_v
+        if self.direct:
+            assert self._kinematics is not None
+            found = self._kinematics(np.concatenate([self.led_values(q, t), y1, y2, q]), t=t)
+            return found[n_q : n_q + n], found[n_q + n :]
+        K = self.matrix(q, t)
+        v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
+        a = self._some_acceleration(t, q, v)
+        loops = () if self._loops is None else self._loops(q, v, a, t=t)[2]
+        own = dict(zip((*layout.velocity_labels, *layout.loops), (*a, *loops), strict=True))
+        gap = y2 - np.array([own[name] for name in self.led])
+        right = np.concatenate([np.zeros(layout.n_c), gap / self.led_scales])
+        a = a + self.scales.q * algebra.lstsq(K, right, rcond=NULL)
+        return v, a
+
+    def motions(self, t: Array, y: Array, y1: Array, y2: Array, guesses: Array) -> tuple[Array, Array, Array]:
+        """q, v, a (n, k) of many points from guesses (n_q, k); NaN where none is found.  For ``direct`` only."""
+        assert self._kinematics is not None
+        found = self._kinematics(np.concatenate([y, y1, y2, guesses]), t=t)
+        n_q, n = self.layout.n_q, self.layout.n_v
+        return found[:n_q], found[n_q : n_q + n], found[n_q + n :]
+
+    def _some_acceleration(self, t: float, q: Array, v: Array) -> Array:
+        """An acceleration that fits the constraints, whatever the led coordinates do."""
+        layout = self.layout
+        if self._kinematics is None:
+            return np.zeros(layout.n_v)
+        chosen = layout.independent
+        if len(layout.independent_q) == len(chosen):
+            x = np.concatenate([q[layout.independent_q], v[chosen], np.zeros(len(chosen)), q])
+            a = self._kinematics(x, t=t)[layout.n_q + layout.n_v :]
+            if np.isfinite(a).all():
+                return a
+        try:  # the compiled partition is singular here; any dynamics will do
+            return self.module.rhs(t, np.concatenate([q, v]))[layout.n_q :]
+        except EomgenError:
+            return np.full(layout.n_v, np.nan)
+
+
+class DrivenPath(NamedTuple):
+    """A straight path of a driven mechanism: t and the led values are linear in s."""
+
+    driven: DrivenCoordinates
+    t: float
+    y: Array
+    t1: float  #: dt/ds
+    y1: Array  #: dy/ds
+
+    @property
+    def scales(self) -> Scales:
+        """The scales of positions."""
+        return self.driven.scales
+
+    def at(self, s: float) -> tuple[float, Array]:
+        """Time and led values."""
+        return self.t + s * self.t1, self.y + s * self.y1
+
+    def beyond(self, s: float) -> DrivenPath:
+        """The rest of the path from s on."""
+        return DrivenPath(self.driven, *self.at(s), self.t1, self.y1)
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position of the path."""
+        return self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess."""
+        q = self.driven.position(*self.at(s), guess)
+        return None if q is None else Point(s, q, self.tangent(s, q))
+
+
+class DrivenContinuation(Continuation):
+    """A continuation along such a path."""
+
+    curve: DrivenPath
+
+
+# -- across a change point ---------------------------------------------------------------------------------------------
+
+
+REACH = 0.05  #: scaled motion from the middle of an interpolant to its inner supports
+
+
+class ChangePointInterpolant:
+    """A polynomial through points of a continuation.
+
+    Parameters
+    ----------
+    supports : sequence of Point
+        In order of s.
+    scales : Scales
+    """
+
+    def __init__(self, supports: Sequence[Point], scales: Scales) -> None:
+        self.supports, self.scales = supports, scales
+        self.nodes = np.repeat([p.s for p in supports], 2)
+        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in supports])
+        self.coefficients = divided(self.nodes, np.repeat([p.q for p in supports], 2, axis=0), slopes)
+
+    def covers(self, s: float) -> bool:
+        """Whether s lies between the outer supports."""
+        return bool(self.nodes[0] <= s <= self.nodes[-1])
+
+    def at(self, s: float) -> tuple[Array, Array, Array]:
+        """q (n_q,), dq/ds and its derivative as velocities (n_v,)."""
+        q, first, second = newton(self.nodes, self.coefficients, s)
+        space = self.scales.space
+        if space is None:
+            return q, first, second
+        return space.normalised(q), space.velocities(q, first), space.velocities(q, second)
+
+
+def divided(nodes: Array, values: Array, slopes: Array) -> Array:
+    """Divided differences of values at nodes, each of which comes twice and has one slope."""
+    table = np.array(values, dtype=float)
+    result = [table[0]]
+    for order in range(1, len(nodes)):
+        gap = nodes[order:] - nodes[:-order]
+        fresh = np.empty((len(gap), table.shape[1]))
+        for i, width in enumerate(gap):
+            fresh[i] = slopes[i // 2] if width == 0.0 else (table[i + 1] - table[i]) / width
+        table = fresh
+        result.append(table[0])
+    return np.array(result)
+
+
+def newton(nodes: Array, coefficients: Array, s: float) -> tuple[Array, Array, Array]:
+    """Newton's form by Horner's rule: value, first and second derivative."""
+    value = np.array(coefficients[-1])
+    first, second = np.zeros_like(value), np.zeros_like(value)
+    for k in range(len(coefficients) - 2, -1, -1):
+        x = s - nodes[k]
+        second = second * x + 2.0 * first
+        first = first * x + value
+        value = value * x + coefficients[k]
+    return value, first, second
+
+
+def build_interpolant(
+    continuation: DrivenContinuation, before: Point, after: Point, middle: float
+) -> ChangePointInterpolant | None:
+    """An interpolant over s = middle from good points about it; None where a side is missing.
+
+    Parameters
+    ----------
+    continuation : Continuation
+    before, after : Point
+        Good points of one smooth branch, on either side of ``middle``.
+    """
+    scales = continuation.scales
+    rate = max(largest(before.tangent.rate / scales.q), largest(after.tangent.rate / scales.q))
+    if rate == 0.0 or not before.s < middle < after.s:
+        return None
+    reach = REACH / rate
+    rough = ChangePointInterpolant([before, after], scales)
+    supports = []
+    for part in (-2.0, -1.0, 1.0, 2.0):
+        s = middle + part * reach
+        guess = rough.at(s)[0] if rough.covers(s) else _guess_along(continuation, rough, s)
+        found = None if guess is None else continuation.curve.solve(s, guess)
+        if found is None:
+            return None
+        supports.append(found)
+    interpolant = ChangePointInterpolant(supports, scales)
+    for near in (before, after):  # one branch, or several?
+        if interpolant.covers(near.s) and largest(scales.distance(interpolant.at(near.s)[0], near.q)) > ASTRAY_ACROSS:
+            return None
+    return interpolant
+
+
+def _guess_along(continuation: DrivenContinuation, rough: ChangePointInterpolant, s: float) -> Array | None:
+    """A guess outside a rough interpolant, from the nearest points of the continuation or on from an end."""
+    scales = continuation.scales
+    near = min((*continuation.points, *rough.supports), key=lambda p: abs(p.s - s))
+    return scales.move(near.q, near.tangent.rate * (s - near.s) / scales.q)
+
+
+# -- singular positions ------------------------------------------------------------------------------------------------
+
+
+LOW = 0.03  #: quality below which a minimum is looked into
+SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
+NARROW = 0.02  #: scaled motion to which a change of sign is narrowed by steps
+
+
+class Singular(NamedTuple):
+    """A singular position.
+
+    Attributes
+    ----------
+    kind : {'change point', 'stop'}
+    t : float
+        Time (s).
+    values : dict
+        Led coordinate -> its value there.
+    q : (n_q,) array
+    moving : tuple of str
+        Coordinates that can move while the led ones stand still.
+    joints : tuple of str
+        Joints and constraints whose equations do not hold that motion.
+    """
+
+    kind: str
+    t: float
+    values: Mapping[str, float]
+    q: Array
+    moving: tuple[str, ...]
+    joints: tuple[str, ...]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """All but the position."""
+        return {name: value for name, value in self._asdict().items() if name != "q"}
+
+    def __str__(self) -> str:
+        place = ", ".join([f"{name} = {value:.9g}" for name, value in self.values.items()] or [f"t = {self.t:.9g} s"])
+        if self.kind == "stop":
+            what = f"{', '.join(self.values) or 'the drivers'} can go no further"
+        else:
+            what = "the motion may branch"
+        joints = f" (joints {', '.join(self.joints)})" if self.joints else ""
+        return f"{self.kind} at {place}: {what}; {', '.join(self.moving)} can still move{joints}"
+
+
+def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tangent: Tangent) -> Singular:
+    """Put names to a singular position."""
+    layout = driven.layout
+    free = np.abs(tangent.free)
+    moving = tuple(layout.velocity_labels[i] for i in np.flatnonzero(free >= SHARE * free.max()))
+    held = np.abs(tangent.rows[: layout.n_c])
+    labels = [layout.constraint_labels[i] for i in np.flatnonzero(held >= SHARE * np.abs(tangent.rows).max())]
+    joints = tuple(dict.fromkeys(label.partition(".")[0] for label in labels))
+    values = dict(zip(driven.led, driven.led_values(q, t).tolist(), strict=True))
+    return Singular(kind, t, values, q, moving, joints)
+
+
+def cross(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
+    """The interpolant over a change of sign between two points, and where det K = 0 on it; None if there is none."""
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
+    for _ in range(60):
+        if largest(scales.distance(after.q, before.q)) <= NARROW:
+            break
+        middle = 0.5 * (before.s + after.s)
+        found = path.solve(middle, ChangePointInterpolant([before, after], scales).at(middle)[0])
+        if found is None or found.tangent.quality < SINGULAR:
+            break
+        before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
+    rough = ChangePointInterpolant([before, after], scales)
+    middle = _root(continuation, rough, before.s, after.s)
+    interpolant = build_interpolant(continuation, before, after, middle)
+    if interpolant is None:
+        return None
+    low, high = interpolant.supports[1].s, interpolant.supports[2].s
+    middle = _root(continuation, interpolant, low, high)
+    t = path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
+    return (interpolant, middle) if quality < SINGULAR else None
+
+
+def _root(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+    """Where det K changes its sign on an interpolant; where it does not, the nearest to singular."""
+
+    def value(s: float) -> float:
+        return continuation.curve.driven.determinant(continuation.curve.at(s)[0], interpolant.at(s)[0])
+
+    f_low, f_high = value(low), value(high)
+    if not f_low * f_high < 0.0:
+        return _worst(continuation, interpolant, low, high)
+    return find_root(value, low, high, f_low, f_high)
+
+
+def _worst(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+    """Where an interpolant is nearest to singular, by golden section."""
+
+    def quality(s: float) -> float:
+        return continuation.curve.tangent(s, interpolant.at(s)[0]).quality
+
+    return find_least(quality, low, high, (high - low) * 0.6**SECTIONS)
+
+
+def find_stop(continuation: DrivenContinuation, last: Point) -> tuple[float, Point]:
+    """The stop of a blocked continuation, s and the position there, to full precision where one coordinate is led.
+
+    There the path is followed by the coordinate that still moves, w: s(w) has its extreme at the stop.
+    """
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
+    y1, t1 = path.y1, path.t1
+    tangent = last.tangent
+    if t1 or np.count_nonzero(y1) != 1:
+        return last.s, last
+    k = int(np.flatnonzero(y1)[0])
+    free = tangent.free
+    order = [int(i) for i in np.argsort(-np.abs(free)) if driven.layout.velocity_labels[i] in driven.layout.q]
+    for i in order[:1]:
+        name = driven.layout.velocity_labels[i]
+        if name in driven.led:
+            break
+        led = (*driven.led[:k], name, *driven.led[k + 1 :])
+        other = DrivenCoordinates(driven.module, led)
+        t = path.t
+        q = last.q
+        for _ in range(30):  # dy/dw = 0 by secant steps, w the scaled value of the free coordinate
+            y = other.led_values(q, t)
+            step = _to_extreme(other, driven, k, t, q)
+            if step is None or not abs(step) < 1.0:
+                return last.s, last
+            y[k] += step * other.led_scales[k]
+            found = other.position(t, y, scales.move(q, step * _along(other, k, t, q)))
+            if found is None:
+                return last.s, last
+            q = found
+            if abs(step) < BLOCKED:
+                break
+        s = float((driven.led_values(q, t)[k] - path.y[k]) / y1[k])
+        if abs(s - last.s) * abs(y1[k]) / driven.led_scales[k] < UNJUDGED:
+            return s, Point(s, q, driven.tangent(t, q, 0.0, y1))
+    return last.s, last
+
+
+def _along(other: DrivenCoordinates, k: int, t: float, q: Array) -> Array:
+    unit = np.zeros(len(other.led))
+    unit[k] = other.led_scales[k]
+    return other.tangent(t, q, 0.0, unit).rate / other.scales.q
+
+
+def _to_extreme(other: DrivenCoordinates, driven: DrivenCoordinates, k: int, t: float, q: Array) -> float | None:
+    """Newton's step in w to where dy_k/dw = 0, by a central difference of dy_k/dw."""
+    h = EXTREME
+
+    def slope(q: Array) -> float:
+        row = driven.matrix(q, t)[driven.layout.n_c + k]
+        return float(row @ _along(other, k, t, q))
+
+    y = other.led_values(q, t)
+    slopes = []
+    for part in (-h, h):
+        ahead = np.array(y)
+        ahead[k] += part * other.led_scales[k]
+        found = other.position(t, ahead, other.scales.move(q, part * _along(other, k, t, q)))
+        if found is None:
+            return None
+        slopes.append(slope(found))
+    curvature = (slopes[1] - slopes[0]) / (2.0 * h)
+    return -slope(q) / curvature if curvature else None
+
+
+def touch(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
+    """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
+    for _ in range(60):
+        if largest(scales.distance(after.q, before.q)) <= NARROW:
+            break
+        rough = ChangePointInterpolant([before, after], scales)
+        third = (after.s - before.s) / 3.0
+        found = [path.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
+        one, other = found
+        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
+            break
+        before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
+    interpolant = build_interpolant(continuation, before, after, 0.5 * (before.s + after.s))
+    if interpolant is None:
+        return None
+    middle = _worst(continuation, interpolant, interpolant.supports[1].s, interpolant.supports[2].s)
+    t = path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
+    return (interpolant, middle) if quality < SINGULAR else None
+
+
+def find_change_points(
+    continuation: DrivenContinuation,
+) -> tuple[list[tuple[ChangePointInterpolant, float]], list[Singular]]:
+    """Interpolants over the change points of a continuation, and the change points themselves, in order."""
+    path = continuation.curve
+    leapt = {id(before) for before, _ in continuation.leaps}
+    points = continuation.points
+    crossings: list[tuple[ChangePointInterpolant, float]] = []
+    for k in range(len(points) - 1):
+        before, after = points[k], points[k + 1]
+        here = None
+        if id(before) in leapt or before.tangent.sign != after.tangent.sign:
+            here = cross(continuation, _good(points, before, after) if id(before) in leapt else before, after)
+        elif k + 2 < len(points) and _dips(points[k : k + 3]):
+            here = touch(continuation, before, points[k + 2])
+        if here is not None:
+            crossings.append(here)
+    found = []
+    for interpolant, middle in crossings:
+        q = interpolant.at(middle)[0]
+        found.append(name_singular(path.driven, "change point", path.at(middle)[0], q, path.tangent(middle, q)))
+    return crossings, found
+
+
+def _dips(points: Sequence[Point]) -> bool:
+    """Whether the quality has a low minimum at the second of three points, without a change of sign."""
+    first, middle, last = (p.tangent for p in points)
+    low = middle.quality < LOW and middle.quality < first.quality and middle.quality <= last.quality
+    return low and first.sign == middle.sign == last.sign
+
+
+def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
+    """The last point before a leap that is not too near to the singular position."""
+    width = after.s - before.s
+    return next(
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > 0.01 * LEAPS[0]),
+        points[0],
+    )
+
+
+# -- the path ----------------------------------------------------------------------------------------------------------
+
+
+class FollowedPath:
+    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is known to be smooth.
+
+    ``extent`` is that of :class:`~...base.numeric.continuation.Continuation`.
+
+    Attributes
+    ----------
+    reached : float
+        The last s that can be reached.
+    stop : Singular or None
+        What is there, if it is before the end.
+    singular : list of Singular
+        Change points on the way.
+    """
+
+    def __init__(self, path: DrivenPath, start: Array, end: float, known: float = 0.0, extent: float = 0.0) -> None:
+        self.path, self.end = path, end
+        self.driven = driven = path.driven
+        self.continuation = continuation = DrivenContinuation(path, start, extent)
+        whole = continuation.to(end, known)
+        self.interpolants, self.singular = find_change_points(continuation)
+        self.stop: Singular | None = None
+        self.reached = end
+        if not whole:
+            self.reached, last = find_stop(continuation, continuation.points[-1])
+            self.stop = name_singular(driven, "stop", path.at(self.reached)[0], last.q, last.tangent)
+        self.nodes = np.array([p.s for p in continuation.points])
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it came to its end without a stop, a change point or a leap."""
+        return not (self.stop or self.singular or self.interpolants or self.continuation.leaps)
+
+    def holds(self, s: float) -> bool:
+        """Whether s can be reached."""
+        return bool(s <= self.reached + SAME * max(1.0, self.end))
+
+    def position(self, s: float) -> Array:
+        """q (n_q,) at a parameter that can be reached."""
+        return self.motion(np.array([s]), None)[0][:, 0]
+
+    def motion(self, s: Array, rates: tuple[Array, Array] | None) -> tuple[Array, Array, Array]:
+        """q, v, a (n, k) at parameters s (k,).
+
+        Parameters
+        ----------
+        s : (k,) array
+        rates : two (n_led, k) arrays, optional
+            y' and y'' over time; those of the path itself by default, with s as the time where t stands still.
+        """
+        y1, y2 = self._rates(len(s)) if rates is None else rates
+        layout = self.driven.layout
+        q, v, a = (np.empty((n, len(s))) for n in (layout.n_q, layout.n_v, layout.n_v))
+        guesses = interpolate(self.continuation.points, self.driven.scales, s)
+        odd = np.ones(len(s), dtype=bool)
+        if self.driven.direct:
+            t, y = self._along(s)
+            q[:], v[:], a[:] = self.driven.motions(t, y, y1, y2, guesses)
+            scales = self.driven.scales
+            if scales.space is None:
+                with np.errstate(invalid="ignore"):
+                    odd = ~(np.abs((q - guesses) / scales.q[:, None]).max(axis=0) <= ASTRAY)
+                for interpolant, _ in self.interpolants:
+                    odd |= (interpolant.supports[1].s < s) & (s < interpolant.supports[2].s)
+                odd |= s >= self._edge
+        for j in np.flatnonzero(odd):
+            found = q[:, j], v[:, j], a[:, j]
+            q[:, j], v[:, j], a[:, j] = self._one(float(s[j]), guesses[:, j], y1[:, j], y2[:, j], found)
+        return q, v, a
+
+    @property
+    def _edge(self) -> float:
+        """The parameter from which on the position is that of the stop."""
+        return np.inf if self.stop is None else self.reached - SAME * max(1.0, self.end)
+
+    def _rates(self, k: int) -> tuple[Array, Array]:
+        rate = self.path.y1 / (self.path.t1 or 1.0)
+        return np.repeat(rate[:, None], k, axis=1), np.zeros((len(rate), k))
+
+    def _along(self, s: Array) -> tuple[Array, Array]:
+        return self.path.t + s * self.path.t1, self.path.y[:, None] + self.path.y1[:, None] * s
+
+    def _neighbours(self, s: float) -> tuple[Point, Point]:
+        points = self.continuation.points
+        k = min(max(int(np.searchsorted(self.nodes, s)), 1), len(points) - 1)
+        return points[k - 1], points[k]
+
+    def _one(
+        self, s: float, guess: Array, y1: Array, y2: Array, found: tuple[Array, Array, Array]
+    ) -> tuple[Array, Array, Array]:
+        """The motion at one parameter; ``found`` is that of the compiled kernel, if it leads the same coordinates."""
+        driven, scales = self.driven, self.driven.scales
+        if self.stop is not None and s >= self._edge:
+            nothing = np.full(len(scales.q), np.nan)
+            return self.stop.q, nothing, nothing
+        t = self.path.at(s)[0]
+        interpolant = next((b for b, _ in self.interpolants if b.supports[1].s < s < b.supports[2].s), None)
+        if interpolant is not None and driven.tangent(t, interpolant.at(s)[0], 0.0, self.path.y1).quality < POOR:
+            return self._interpolated(interpolant, s, y1, y2)
+        q, v, a = found
+        if not driven.direct or not np.isfinite(q).all() or largest(scales.distance(q, guess)) > ASTRAY:
+            q = self._closer(s, guess)
+            v, a = driven.motion(t, q, y1, y2)
+        return q, v, a
+
+    def _closer(self, s: float, guess: Array) -> Array:
+        """The position next to a guess, followed to from the nearest point if Newton's iteration goes astray."""
+        driven, scales = self.driven, self.driven.scales
+        found = driven.position(*self.path.at(s), guess)
+        if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
+            return found
+        before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
+        short = DrivenContinuation(self.path.beyond(before.s), before.q)
+        short.to(s - before.s)
+        return short.points[-1].q
+
+    def _interpolated(
+        self, interpolant: ChangePointInterpolant, s: float, y1: Array, y2: Array
+    ) -> tuple[Array, Array, Array]:
+        """The motion at or beside a change point, where it must run along the path."""
+        q, first, second = interpolant.at(s)
+        t1, path = self.path.t1, self.path.y1
+        nothing = np.full_like(first, np.nan)
+        if t1:
+            if np.allclose(y1, path / t1, rtol=ALIGNED, atol=0.0) and not y2.any():
+                return q, first / t1, second / t1**2
+            return q, nothing, nothing
+        k = int(np.argmax(np.abs(path / self.driven.led_scales)))
+        speed, gain = y1[k] / path[k], y2[k] / path[k]
+        if np.allclose(y1, speed * path, rtol=ALIGNED) and np.allclose(y2, gain * path, rtol=ALIGNED):
+            return q, speed * first, speed**2 * second + gain * first
+        return q, nothing, nothing

@@ -1,0 +1,385 @@
+"""A run in which every closing gap is an event whose reset is an impact -> a trajectory with impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.algebra import Array
+from ...base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
+from ...base.value_rules import read_count
+from ...errors import SimulationError, cannot, no_such, off_range
+from ..columns import Columns, Residuals, describe, units_of
+from ..inputs import Forcing
+from ..refusals import require_support
+from ..trajectory import Span, Start, Trajectory
+from .events import WAIT, Events, RunEvent
+from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
+from .run_arguments import find_state, set_up
+from .simulate import simulate
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+    from ..protocols import Source
+
+
+# -- the trajectory ----------------------------------------------------------------------------------------------------
+
+
+class ImpactRun(Trajectory):
+    """A motion with impacts: a :class:`~..trajectory.Trajectory` that has two points at each impact.
+
+    Attributes
+    ----------
+    t : (n_t,) array
+        Times (s); each impact has two, the same one before and after.
+    x : (n_x, n_t) array
+    impacts : list of (float, Impact)
+    t_events, x_events : lists
+        Times and states before the impacts of each gap, also by name: ``run.t_events["gap"]``.
+    ended : {'end', 'impacts', 'rest', 'event'}
+        Why it ended: the span is over; as many impacts as allowed; a gap that is pressed together and no longer opens
+        (bodies that stay in contact need a joint or a contact force); an event of the model that ends runs.
+    """
+
+    impacts: list[tuple[float, Impact]]
+    breaks: list[int]
+    ended: str
+
+    @classmethod
+    def of(
+        cls, parts: tuple[Any, ...], impacts: Sequence[tuple[float, Impact]], breaks: Sequence[int], ended: str
+    ) -> ImpactRun:
+        """Make the run from the parts of a Trajectory and the impacts."""
+        run = cls(*parts)
+        run.impacts, run.breaks, run.ended = list(impacts), list(breaks), ended
+        return run
+
+    def __repr__(self) -> str:
+        return (
+            f"<ImpactRun of {self.name}: {len(self.t)} points, t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, {self.count}>"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        _, parts = super().__reduce__()
+        return type(self).of, (parts, self.impacts, self.breaks, self.ended)
+
+    @property
+    def count(self) -> str:
+        """The number of impacts and the reason for the end, as a text."""
+        reasons = {
+            "end": "",
+            "impacts": "; as many as allowed (most=)",
+            "rest": "; a gap stays closed",
+            "event": "; an event ended it",
+        }
+        return f"{len(self.impacts)} impact{'s' * (len(self.impacts) != 1)}{reasons[self.ended]}"
+
+    @property
+    def pieces(self) -> list[Trajectory]:
+        """The trajectories between impacts."""
+        ends = [0, *self.breaks, len(self.t)]
+        found = []
+        for a, b in pairwise(ends):
+            header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
+            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self.columns, a, b), header))
+        return found
+
+
+class TrajectoryPart:
+    """Columns from one point of a run to another."""
+
+    def __init__(self, whole: Source, first: int, last: int) -> None:
+        self.whole, self.names, self.range = whole, whole.names, slice(first, last)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.whole[name][self.range]
+
+    @property
+    def has_energies(self) -> bool:
+        return self.whole.has_energies
+
+    @property
+    def energies(self) -> Array:
+        return self.whole.energies[:, self.range]
+
+
+# -- gaps as events ----------------------------------------------------------------------------------------------------
+
+
+AT_REST = 0.1  #: part of the size at which gaps count as closed by which one that stays closed may fall
+ENDLESS = 10**9  #: impacts in a row
+IDLE = 50  #: starts in a row that bring no time
+
+
+class GapEvents(Events):
+    """The events of one run: those of the model that end it or reset its state, and gaps that fall to 0.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    restitutions : mapping of str to float
+    rough : mapping
+        As from :func:`~.impact.check_friction`.
+    most : int
+        Impacts after which the run ends.
+    end : float
+        Of the run (s).
+
+    Attributes
+    ----------
+    impacts : list of (float, Impact)
+    ended : str
+        Why the run is over; empty while it is not, or where it has to begin anew beside a gap that stays closed.
+    over : bool
+        Whether the integration ends here.
+    """
+
+    def __init__(self, gaps: Gaps, restitutions: Mapping[str, float], rough: Rough, most: int, end: float) -> None:
+        super().__init__(gaps.layout, _ending(gaps.module))
+        self.gaps, self.restitutions, self.rough, self.most, self.end = gaps, restitutions, rough, most, end
+        self.limits = allowance(gaps.layout, gaps.names, TOUCHING)
+        self.impacts: list[tuple[float, Impact]] = []
+        self.fastest, self.ended, self.over = 0.0, "", False
+        self._first, self._known, self._values = len(self.names), (np.nan, b""), np.zeros(len(gaps.names))
+        for i, name in enumerate(gaps.names):
+            self.functions.append(RunEvent(partial(self._value, i), name, 0, -1, WAIT))
+            self.names.append(name)
+        self._lift = np.zeros(len(gaps.names))
+
+    def begin(self, t: float, x: Array) -> Array:
+        """The state (n_x,) at the start, after an impact of gaps that are closed there."""
+        values = self.gaps.values(t, x)
+        low = values < -np.maximum(self.limits, allowance(self.gaps.layout, self.gaps.names, BEYOND))
+        for i in np.flatnonzero(low):
+            raise off_range(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
+        return self._impact_of(t, x, values <= self.limits)
+
+    def arm(self, t: float, x: Array) -> None:
+        """Begin at a state: gaps that are closed there close again when they have opened, or fall further."""
+        values, allowed = self.gaps.values(t, x), AT_REST * self.limits
+        resting = (values <= allowed) & (self.gaps.rates(t, x) <= 0.0)
+        self._lift = np.where(values < STARTED * self.limits, values, 0.0)
+        self._lift[resting] = (values - allowed)[resting]
+        self.over = False
+
+    def encode(self) -> dict[str, Any]:
+        """As the loop takes them; impacts may follow each other as fast as they do."""
+        return {**(super().encode() or {}), "crowd": ENDLESS}
+
+    def _value(self, i: int, t: float, x: Array) -> float:
+        """A gap; all of them are asked for in turn."""
+        key = (t, x.tobytes())
+        if key != self._known:
+            self._known, self._values = key, self.gaps.values(t, x) - self._lift
+        return float(self._values[i])
+
+    def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
+        """The state after events at time t."""
+        own = [i for i in fired if i < self._first]
+        x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action != WAIT])
+        closed = self.gaps.values(t, x) <= self.limits
+        closed[[i - self._first for i in fired if i >= self._first]] = True
+        x = self._impact_of(t, x, closed)  # before the model's own impact of the same gap, which then finds it opening
+        return super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
+
+    def crowded(self, t: float, count: int) -> SimulationError:
+        """The error for gaps that close without an impact."""
+        return SimulationError(
+            f"the gap {', '.join(self.gaps.names)} closes again and again at t = {t:.6g} s without an impact",
+            code="EG-EVENT",
+        )
+
+    def _impact_of(self, t: float, x: Array, closed: NDArray[np.bool_]) -> Array:
+        """The state after an impact of closed gaps, if one closes."""
+        if closed.any():
+            chosen = {name: e for (name, e), one in zip(self.restitutions.items(), closed, strict=True) if one}
+            rough = {name: self.rough[name] for name in chosen if name in self.rough}
+            impact = strike_run(self.gaps, t, x, chosen, rough)
+            if (impact.impulses > 0.0).any():
+                self.impacts.append((t, impact))
+                self.fastest = max(self.fastest, float(np.abs(impact.rates_before).max()))
+                x = impact.x
+        slow = self._slow(t, x, closed)
+        if slow.any() and self._pressed(t, x, slow):
+            self.ended = "rest"
+        elif len(self.impacts) >= self.most:
+            self.ended = "impacts"
+        self.over = bool(self.ended) or bool(slow.any())
+        return x
+
+    def _slow(self, t: float, x: Array, closed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Closed gaps (n,) that do not open."""
+        if not closed.any() or t >= self.end:
+            return np.zeros_like(closed)
+        layout = self.gaps.layout
+        speed = layout.scales.speed(x[layout.n_q :]) * max(1.0, layout.length)
+        return np.asarray(closed & (self.gaps.rates(t, x) <= max(RESTING * self.fastest, STILL * speed)))
+
+    def _pressed(self, t: float, x: Array, slow: NDArray[np.bool_]) -> bool:
+        """Whether one of these gaps is pressed together, so that it would not stay 0 by itself."""
+        x_rate = self.gaps.module.rhs(t, x, u=self.gaps.inputs(t, x))
+        ahead, behind = (self.gaps.rates(t + h, x + h * x_rate) for h in (MOMENT, -MOMENT))
+        pressed = (ahead - behind) / (2.0 * MOMENT)
+        return bool((slow & (0.5 * pressed * (self.end - t) ** 2 < -self.limits)).any())
+
+
+def _ending(module: BoundModel) -> list[str]:
+    """The model's events that end a run."""
+    declared = module.layout.metadata.get("events") or []
+    for event in declared:
+        if int(event.get("terminal") or 0) > 1:
+            raise cannot(
+                f"event {event['name']} ends a run after {event['terminal']} times, and simulate_impacts cannot "
+                "count them; give the gaps as events with restitution, and use simulate"
+            )
+    return [str(event["name"]) for event in declared if event.get("terminal")]
+
+
+# -- the run -----------------------------------------------------------------------------------------------------------
+
+
+def simulate_impacts(
+    module: BoundModel,
+    /,
+    span: Span,
+    gaps: Mapping[str, float],
+    initial: Start = None,
+    parameters: Any = None,
+    inputs: Mapping[str, Any] | None = None,
+    *,
+    friction: Mapping[str, tuple[float, str | Sequence[str]]] | None = None,
+    most: int = 1000,
+    **options: Any,
+) -> ImpactRun:
+    """Integrate the equations of motion, with an impact whenever a gap closes.
+
+    Parameters
+    ----------
+    span : (float, float) or float
+        Start and end (s), forward in time.
+    gaps : mapping of str to float
+        As for :meth:`impact`.
+    initial, parameters, inputs : optional
+        As for ``simulate``.
+    friction : mapping, optional
+        As for :meth:`impact`.
+    most : int
+        Number of impacts after which the run ends: impacts accumulate as a body comes to rest.
+    **options
+        method, rtol, atol, max_step, first_step, as for ``simulate``.
+
+    Returns
+    -------
+    ImpactRun
+        A trajectory (``run["theta"]``, ``run.at(t)``, ``run.save(path)`` ...) with both states at each impact, and
+        ``impacts`` (time, Impact), ``pieces``, the trajectories between impacts, and ``ended``: 'end'; 'rest', a
+        closed gap is pressed together; 'impacts', there were ``most``; 'event', an event of the model.
+
+    Raises
+    ------
+    UsageError
+        A gap is negative at the start, a name is unknown, or the mechanism has no degree of freedom.
+    SimulationError, AssemblyError, MissingDependencyError
+        As for ``simulate``; also where a gap is found negative without an impact before.
+    """
+    require_support(module.layout, "simulate_impacts")
+    for key in ("events", "t_eval", "dense_output"):
+        if key in options:
+            raise no_such(
+                f"simulate_impacts has no {key}=; use t_events of the run that it returns, and at(t) for any times"
+            )
+    most = read_count("most, the number of impacts,", most, 1)
+    found, _ = check_gaps(module.layout, gaps)
+    rough = check_friction(module.layout, friction, found)
+    if not module.layout.n_dof:
+        raise cannot(
+            f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
+        )
+    bound, forcing, start, end = set_up(module, span, parameters, inputs)
+    if end < start:
+        raise cannot(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
+    forcing.begin(start, end)
+    events = GapEvents(Gaps(bound, tuple(found), forcing if forcing else None), found, rough, most, end)
+    before = find_state(bound, initial, start, forcing)
+    first = events.begin(start, before)
+    parts: list[Trajectory] = []
+    t, x = np.array([start]), first[:, None]
+    idle = 0
+    while not events.ended and t[-1] < end:
+        began = float(t[-1])
+        events.arm(began, x[:, -1])
+        part = simulate(bound, (began, end), x[:, -1], None, inputs, events=events, dense_output=True, **options)
+        parts.append(part)
+        fresh = np.append(False, (np.diff(part.t) != 0.0) | (np.diff(part.x, axis=1) != 0.0).any(axis=0))
+        t, x = np.append(t, part.t[fresh]), np.hstack([x, part.x[:, fresh]])
+        idle = 0 if t[-1] > began else idle + 1
+        if idle > IDLE:
+            raise events.crowded(began, idle)
+        if not events.over:
+            break
+    if events.impacts and events.impacts[0][0] == start:
+        t, x = np.append(start, t), np.hstack([before[:, None], x])
+    ended = events.ended or ("event" if t[-1] < end else "end")
+    return _record(bound, forcing, events, t, x, parts, ended)
+
+
+def _record(
+    module: BoundModel, forcing: Forcing, events: GapEvents, t: Array, x: Array, parts: Sequence[Trajectory], ended: str
+) -> ImpactRun:
+    """All of it as one trajectory."""
+    gaps = events.gaps
+    _refuse_beyond(gaps, t, x)
+    columns = Columns(module, t, x, forcing.sample(t, x))
+    off = np.max([[*part.residuals] for part in parts] or [[*Residuals()]], axis=0)
+    header: dict[str, Any] = {
+        **describe(module),
+        **({key: parts[-1].metadata[key] for key in ("method", "rtol", "atol")} if parts else {}),
+        "span": [float(t[0]), float(t[-1])],
+        "status": 0 if ended == "end" else 1,
+        **{key: sum(getattr(part, key) for part in parts) for key in ("nfev", "njev", "nlu")},
+        "residuals": dict(zip(Residuals._fields, off.tolist(), strict=True)),
+        "event_names": list(gaps.names),
+        "units": units_of(module, columns.names),
+    }
+    hits: dict[str, list[tuple[float, Array]]] = {name: [] for name in gaps.names}
+    for time, impact in events.impacts:
+        for name, impulse in zip(impact.names, impact.impulses, strict=True):
+            if impulse > 0.0:
+                hits[name].append((time, impact.before))
+    t_events = [np.array([time for time, _ in of]) for of in hits.values()]
+    x_events = [np.array([before for _, before in of]).reshape(-1, len(x)).T for of in hits.values()]
+    times = {time for time, _ in events.impacts}
+    breaks = [k for k in range(1, len(t)) if t[k] == t[k - 1] and float(t[k]) in times]
+    ends = np.array([float(part.t[-1]) for part in parts])
+    only = x[:, :1]
+
+    def sample(times: Array) -> Trajectory:
+        which = np.searchsorted(ends, times)
+        states = np.repeat(only, len(times), axis=1)
+        for k in np.unique(which[which < len(parts)]):
+            states[:, which == k] = parts[k].at(times[which == k]).x
+        return Trajectory(times, states, Columns(module, times, states, forcing.sample(times, states)), header)
+
+    made = ImpactRun.of((t, x, columns, header, t_events, x_events, sample), events.impacts, breaks, ended)
+    made.message = made.count
+    return made
+
+
+def _refuse_beyond(gaps: Gaps, t: Array, x: Array) -> None:
+    """Refuse to hand out states beyond a wall."""
+    values = gaps.values(t, x)
+    beyond = values < -allowance(gaps.layout, gaps.names, BEYOND)[:, None]
+    if beyond.any():
+        k = int(np.flatnonzero(beyond.any(axis=0))[0])
+        i = int(np.flatnonzero(beyond[:, k])[0])
+        raise SimulationError(
+            f"the gap {gaps.names[i]} is {values[i, k]:.6g} at t = {t[k]:.6g} s without an impact before: "
+            "it jumps there, or it closes and opens within one step; give max_step",
+            code="EG-EVENT",
+        )

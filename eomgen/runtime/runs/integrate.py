@@ -1,0 +1,293 @@
+"""Right-hand side, method, corners of the inputs -> times, states and events, by the loop in C.
+
+The steps are those of the module's own steppers, in C too, or of a class with the calls of SciPy's OdeSolver.  The rest
+is one text for all (eomgen/native/steppers/loop.c): no step passes over a corner of tabulated inputs, events are zeros
+within a step, and a run goes on from what a reset made of its state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import nullcontext
+from functools import partial
+from math import inf
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ...base.algebra import Array
+from ...errors import SimulationError, ill_shaped, no_choice
+from ..argument_checks import require, unknown
+from ..inputs import Forcing
+from .events import warn_of_unknown
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+    from .bound_run import Progress
+
+KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
+METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+NAMES = (*METHODS, "Taylor", "RK4", "moreau", "kinematic")  #: all that simulate knows
+
+
+class Solution(NamedTuple):
+    """What an integration came to."""
+
+    t: Array  #: (n_t,)
+    x: Array  #: (n_x, n_t)
+    t_events: list[Array]
+    x_events: list[Array]  #: (n_x, k) for each event
+    dense: Callable[[Array], Array] | None
+    status: int  #: SciPy's: 0 end reached, 1 terminal event, -1 failed
+    message: str
+    counts: dict[str, int]
+    ends: tuple[float, float]  #: first and last time reached
+    steps: tuple[Array, Array] | None = None  #: (k,), (n_x, k) of every step, where others are stored; k = 0: too many
+    finite: bool = False  #: whether the states are known to be finite
+
+
+class Joined:
+    """Dense output of a run: that of each step, up to where the next one goes on."""
+
+    def __init__(self, pieces: Sequence[tuple[float, Callable[[Array], Array]]], forward: bool) -> None:
+        self.ends = np.array([end for end, _ in pieces])
+        self.parts = [part for _, part in pieces]
+        self.sign = 1.0 if forward else -1.0
+
+    def __call__(self, t: Array) -> Array:
+        """States (n_x, k) at times (k,)."""
+        at = np.asarray(t, dtype=float)
+        which = np.minimum(np.searchsorted(self.sign * self.ends, self.sign * at), len(self.parts) - 1)
+        order = np.argsort(which, kind="stable")
+        result: Array | None = None
+        for places in np.split(order, np.flatnonzero(np.diff(which[order])) + 1):
+            block = np.asarray(self.parts[int(which[places[0]])](at[places]))
+            result = np.empty((block.shape[0], len(at))) if result is None else result
+            result[:, places] = block
+        return np.empty((0, 0)) if result is None else result
+
+
+def choose_solver(method: Any) -> Any:
+    """SciPy's class for a name, or the OdeSolver subclass itself."""
+    scipy = require("scipy.integrate", "scipy", "simulate")
+    if isinstance(method, str):
+        if method not in METHODS:
+            raise unknown("method", method, NAMES)
+        return getattr(scipy, method)
+    if isinstance(method, type) and issubclass(method, scipy.OdeSolver):
+        return method
+    raise no_choice(f"method must be one of {', '.join(METHODS)}, or a subclass of OdeSolver, not {method!r}")
+
+
+def check_options(solver: Any, options: Collection[str], own: Collection[str]) -> None:
+    """Refuse options that one of SciPy's own methods would only warn about.
+
+    Parameters
+    ----------
+    solver : OdeSolver subclass
+        One that is not SciPy's may take anything.
+    options : names
+    own : names
+        Options of ``simulate`` itself, to suggest.
+
+    Raises
+    ------
+    UsageError
+    """
+    from inspect import signature
+
+    if not solver.__module__.startswith("scipy."):
+        return
+    taken = [*signature(solver.__init__).parameters]
+    allowed = [name for name in taken if name not in ("self", "fun", "t0", "y0", "t_bound", "extraneous")]
+    for name in options:
+        if name not in allowed:
+            raise unknown(f"option of simulate with {solver.__name__}", name, [*own, *allowed])
+
+
+def takes_jacobian(solver: Any) -> bool:
+    """Whether a solver class has an argument ``jac``."""
+    from inspect import signature
+
+    return "jac" in signature(solver.__init__).parameters
+
+
+ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
+STATUS = {ENDED: 0, TERMINAL: 1}  #: SciPy's
+TOO_SMALL = "Required step size is less than spacing between numbers."
+MESSAGES = {
+    ENDED: "The solver successfully reached the end of the integration interval.",
+    TERMINAL: "A termination event occurred.",
+    STOPPED: "The run was interrupted.",
+    RESET_FAILED: "The state after an event cannot be evaluated, or cannot be brought onto the constraints.",
+}
+
+
+class Watched(Protocol):
+    """Events of a run, as :class:`~.events.Events` has them."""
+
+    names: list[str]
+    over: bool  #: whether the last reset ended the run
+
+    def __len__(self) -> int: ...
+
+    def encode(self) -> dict[str, Any] | None:
+        """As the loop takes them."""
+
+    def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
+        """The state after events that happened at time t."""
+
+    def crowded(self, t: float, count: int) -> SimulationError:
+        """The error for resets that never end."""
+
+
+def integrate(
+    module: BoundModel,
+    forcing: Forcing,
+    nodes: Sequence[float],
+    x0: Array,
+    method: Any,
+    t_eval: Array | None,
+    dense: bool,
+    options: Mapping[str, Any],
+    events: Watched | None = None,
+    watch: Progress | None = None,
+    look: Callable[[float, Array, int], None] | None = None,
+    rates: Callable[[float, Array], Array] | None = None,
+) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
+    """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
+
+    Parameters
+    ----------
+    module : BoundModel
+    forcing : Forcing
+    nodes : sequence of float
+    x0 : (n,) array
+        A state of the module; by a solver in Python others may follow it.
+    method : str or OdeSolver subclass
+        One of the module's own methods, or a class of solvers.
+    t_eval : (n_t,) array, optional
+    dense : bool
+    options : mapping
+        Of the method.
+    events : Events, optional
+    watch : Progress, optional
+        Told the time by the module's own methods.
+    look : callable, optional
+        Told time, state and number of further steps.
+    rates : callable, optional
+        f(t, x) of a solver in Python.
+
+    Returns
+    -------
+    Solution
+    (status, t, x) or None
+        The last evaluation that failed, of the module's own methods.
+    exception or None
+        What stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
+
+    Raises
+    ------
+    ZenoError
+        Resets follow each other ever faster, or lead nowhere.
+    """
+    core: Any = module.core
+    start, end = nodes[0], nodes[-1]
+    events = events if events is not None and len(events) else None
+    plan: dict[str, Any] = {
+        "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
+        "trail": KEPT if module.layout.rank else 0, "watch": None if watch is None else watch.look, "stall_check": look,
+    }  # fmt: skip
+    if isinstance(method, str):
+        steps = (
+            require_one(options["rtol"]),
+            options["atol"],
+            options.get("max_step", inf),
+            options.get("first_step", 0.0),
+        )
+        run = core.run(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
+    else:
+        plan |= {"make": partial(_make, method, rates, forcing, nodes, dict(options)), "rates": rates}
+        plan["inputs"] = forcing if forcing else None
+        run = core.called("called", module.kernels.context, start, x0, end, 0.0, 0.0, inf, 0.0, (), plan)
+    status, raised = 0, None
+    quiet = nullcontext() if isinstance(method, str) else np.errstate(all="ignore")  # NaN of a failure shortens a step
+    try:
+        with quiet:
+            status = run.proceed()
+            while status in (WAITING, RESET_FAILED) and events is not None:
+                later = (k for k, at in enumerate(nodes[1:-1]) if (at - run.t) * (end - start) >= 0.0)
+                k = next(later, len(nodes) - 2)
+                forcing.enter(nodes[k], nodes[k + 1])  # as the loop has it
+                after = events.reset(module, forcing, run.t, run.state(), run.fired())
+                if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
+                    break
+                jumped = run.jump(after)
+                status = TERMINAL if events.over else jumped or run.proceed()
+    except KeyboardInterrupt as interrupt:  # in a reset
+        status, raised = STOPPED, interrupt
+    finally:
+        if forcing:
+            forcing.enter(start, end)  # who asks for inputs from here on asks for those of the whole run
+    times, states, notes = run.outcome()
+    raised = run.raised if raised is None else raised
+    if events is not None and raised is None:
+        warn_of_unknown([events.names[i] for i in run.unknown()])
+    if status == ZENO and events is not None:
+        raise events.crowded(run.t, run.resets)
+    t_events, x_events = [], []
+    if events is not None:
+        which = notes[:, 0]
+        t_events = [notes[which == i, 1] for i in range(len(events))]
+        x_events = [np.ascontiguousarray(notes[which == i, 2:].T) for i in range(len(events))]
+    counts = {"nfev": run.evaluations, "njev": run.differentiations, "nlu": run.factorizations}
+    trail = None if (trail := run.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T))
+    between: Any = run.dense() if dense else None
+    if between and not isinstance(method, str):
+        between = Joined(between, end >= start)
+    message = MESSAGES.get(status, getattr(run, "message", "") or TOO_SMALL)
+    solution = Solution(
+        times, states, t_events, x_events, between or None, STATUS.get(status, -1), message, counts,
+        (start, run.t), trail, run.finite,
+    )  # fmt: skip
+    return solution, run.failure, raised
+
+
+def _make(
+    solver: Any, rates: Any, forcing: Forcing, nodes: Sequence[float], options: dict[str, Any], t: float, x: Array,
+    end: float,
+) -> Any:  # fmt: skip
+    """A solver from a state to the next node."""
+    k = [*nodes].index(end, 1)
+    forcing.enter(nodes[k - 1], nodes[k])
+    if options.get("first_step") is not None:
+        options = {**options, "first_step": min(options["first_step"], abs(end - t))}
+    if callable(jac := options.get("jac")):
+        # both the function and the solver may change the state that they are given
+        options = {**options, "jac": lambda t, x: jac(t, x.copy())}
+    made = solver(rates, t, x.copy(), end, **options)
+    if np.isnan(getattr(made, "h_abs", 0.0)):  # with atol = 0 and a state of 0; SciPy would divide it for ever
+        options = {**options, "first_step": min(abs(end - t), options.get("max_step", np.inf))}
+        made = solver(rates, t, x.copy(), end, **options)
+    return made
+
+
+def require_one(rtol: Any) -> float:
+    """A relative tolerance as compiled methods take it, or a UsageError."""
+    if not isinstance(rtol, float):
+        raise ill_shaped(f"rtol must be one number for a compiled method, not of shape {rtol.shape}")
+    return rtol
+
+
+def require_end(solution: Solution, end: float) -> None:
+    """Refuse a run that tells of its end without having come there; no run may end early in silence.
+
+    Raises
+    ------
+    SimulationError
+    """
+    if solution.status == 0 and solution.ends[1] != end:
+        raise SimulationError(
+            f"the integrator reports the end, t = {end:.6g} s, but stopped at t = {solution.ends[1]:.6g} s; this is "
+            "a fault of the integrator (of eomgen, unless the method is your own); run in parts, or use another method"
+        )

@@ -1,0 +1,651 @@
+"""A Module, times and prescribed coordinates -> positions, velocities and accelerations over the range, without forces.
+
+Masses and forces play no part.  The range is followed from the initial position, so that the mechanism stays on its
+branch; positions between the points of the continuation are then solved from cubic guesses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.algebra import Array
+from ...base.limits.analyses import ALIGNED, SINGULAR, SLACK
+from ...base.limits.constraints import CONTRADICTION, EXACT, UNMOVED
+from ...base.numeric.assembly import close
+from ...base.numeric.projection import largest
+from ...base.texts import shown
+from ...errors import (
+    TO_BE_FINITE,
+    AssemblyError,
+    PartitionError,
+    cannot,
+    ill_chosen,
+    ill_placed,
+    ill_shaped,
+    incomplete,
+    no_number,
+    too_large,
+)
+from ..argument_checks import read_flag, read_number, read_numbers, require_room, unknown
+from ..columns import Columns, Residuals, describe, units_of
+from ..refusals import require_support
+from ..trajectory import Start, Trajectory, last_state
+from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+    from ..initial import Initial
+
+
+# -- the result --------------------------------------------------------------------------------------------------------
+
+
+METHOD = "kinematic"
+
+
+class MotionColumns(Columns):
+    """Columns of a motion whose accelerations are known, and come from no force.  NaN where it is not defined."""
+
+    def __init__(
+        self, module: BoundModel, t: Array, x: Array, u: Array, a: Array, passed: tuple[Any, ...] | None = None
+    ) -> None:
+        super().__init__(module, t, x, u)
+        self.a, self._between = a, passed
+
+    def _passed(self) -> Any:
+        return self._between
+
+    @cached_property
+    def slopes(self) -> Array:
+        """x' (n_x, n_t)."""
+        n_q = self.module.n_q
+        q, v = self.x[:n_q], self.x[n_q:]
+        space = self.module.layout.space
+        return np.concatenate([v if space is None else space.rates(q, v), self.a])
+
+    def _outputs(self) -> Array:
+        module, n_q = self.module, self.module.n_q
+        if not module.metadata.get("output_accelerations", True):
+            kernel = module.kernels.timed("outputs", nan=True)
+            return kernel(self.t, self.x, u=self._varying())
+        motion = module.kernels.motion("motion_outputs")
+        return motion(self.x[:n_q], self.x[n_q:], self.a, u=self._varying(), t=self.t)
+
+    @cached_property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (3, n_t)."""
+        T, V = self.module.kernels.state("energy", nan=True)(self.x, u=self._varying(), t=self.t)
+        return np.array([T, V, T + V])
+
+
+class KinematicAnalysis(Trajectory):
+    """The motion over a range of time or of prescribed coordinates, as a :class:`~..trajectory.Trajectory`.
+
+    Attributes
+    ----------
+    q, v, a : (n_q, n_t), (n_v, n_t), (n_v, n_t) arrays
+        Velocities and accelerations are NaN where the prescribed coordinates do not determine them.
+    led : tuple of str
+        The prescribed coordinates; none if drivers alone move the mechanism.
+    singular : list of Singular
+        Singular positions met, in order.
+    stop : Singular or None
+        Where the range ended early.
+    complete : bool
+        Whether the whole range was reached.
+    """
+
+    def __init__(
+        self,
+        module: BoundModel,
+        motion: tuple[Array, Array, Array, Array],
+        columns: MotionColumns,
+        header: dict[str, Any],
+        found: Sequence[Singular],
+        stop: Singular | None,
+        led: tuple[str, ...],
+        **rest: Any,
+    ) -> None:
+        t, _, _, self.a = motion
+        super().__init__(t, columns.x, columns, header, **rest)
+        self._module = module
+        self.singular, self.stop, self.led = list(found), stop, led
+
+    @property
+    def complete(self) -> bool:
+        """Whether the whole range was reached."""
+        return self.stop is None
+
+    def turning_points(self, name: str) -> list[tuple[float, float]]:
+        """Dead centres of a coordinate: (time, value) where its rate changes sign.
+
+        Between two points of the range the coordinate is taken as the cubic through its values and rates there.
+
+        Parameters
+        ----------
+        name : str
+            A column that has a rate, ``name_dot``.
+
+        Raises
+        ------
+        UsageError
+            The time is constant in the range, or the column has no rate.
+        """
+        if name + "_dot" not in self.names:
+            raise cannot(f"{name!r} has no rate among the columns")
+        if len(self.t) < 2 or not np.diff(self.t).any():
+            raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
+        y, rate = self[name], self[name + "_dot"]
+        found = []
+        for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):
+            h = self.t[k + 1] - self.t[k]
+            d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
+            cubic = np.array([d0 + d1 - 2 * dy, 3 * dy - 2 * d0 - d1, d0, y[k]])
+            roots = np.roots(np.polyder(cubic)) if cubic[:3].any() else np.zeros(1)
+            inside = [
+                float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < SLACK and -SLACK <= r.real <= 1 + SLACK
+            ]
+            if inside:
+                x = min(inside, key=lambda r: abs(r - d0 / (d0 - d1)) if d0 != d1 else r)
+                found.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))
+        return found
+
+    def __repr__(self) -> str:
+        over = (
+            f"of {', '.join(self.led)}"
+            if self.led
+            else f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s"
+            if self.t.size
+            else ""
+        )
+        end = "" if self.stop is None else f", ends early: {self.stop}"
+        return f"<KinematicAnalysis of {self.name}: {len(self)} points {over}{end}>"
+
+
+def keep(
+    driven: DrivenCoordinates,
+    t: Array,
+    parts: Sequence[tuple[Array, Array, Array]],
+    found: Sequence[Singular],
+    stop: Singular | None,
+    asked: int,
+    led: tuple[str, ...],
+    *,
+    u: Array | None = None,
+    header: Mapping[str, Any] | None = None,
+    passed: tuple[Any, ...] | None = None,
+    **rest: Any,
+) -> KinematicAnalysis:
+    """Put an analysis together from its pieces; ``asked`` points were asked for.
+
+    ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``passed`` what was
+    passed besides these points, as columns take it, ``rest`` what a Trajectory takes.
+    """
+    module = driven.module
+    q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
+    x = np.concatenate([q, v])
+    if u is None:
+        u = np.repeat(module.u[:, None], len(t), axis=1)
+    columns = MotionColumns(module, t, x, u, a, passed)
+    complete = describe(module) | {
+        "method": METHOD,
+        "rtol": None,
+        "atol": None,
+        "span": [float(t[0]), float(t[-1])] if t.size else [],
+        "led": list(led),
+        "singular": [str(s) for s in found],
+        "status": 0 if stop is None else -1,
+        "message": "the whole range" if stop is None else f"{len(t)} of {asked} points: {stop}",
+        "residuals": residuals(module, t, x)._asdict(),
+        "units": units_of(module, columns.names),
+        **(header or {}),
+    }
+    return KinematicAnalysis(module, (t, q, v, a), columns, complete, found, stop, led, **rest)
+
+
+def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
+    """How well the constraints are kept, all rows, where the motion is defined."""
+    n = module.n_q
+    if not module.n_rows or not t.size:
+        return Residuals()
+    position = largest(module.constraints.every(x[:n], t=t))
+    fine = np.isfinite(x).all(axis=0)
+    rate = module.kernels.state("velocity_constraints")(x[:, fine], t=t[fine]) if fine.any() else np.empty(0)
+    return Residuals(position, largest(rate), position, largest(rate))
+
+
+# -- what is known of the range ----------------------------------------------------------------------------------------
+
+
+class KnownRange:
+    """What of a range to and fro on one line was followed already.
+
+    Parameters
+    ----------
+    t : (n,) array
+    y : (k, n) array
+        Led values.
+    """
+
+    def __init__(self, t: Array, y: Array) -> None:
+        moving = [row for row in (t, *y) if np.ptp(row)]
+        #: values of the only coordinate that moves, or of the time, or None
+        self.values = moving[0] if len(moving) == 1 else None
+        self.low = self.high = 0.0 if self.values is None else float(self.values[0])
+
+    def known(self, first: int, last: int) -> float:
+        """The part of the way between two points, from the first on, that was followed and is smooth."""
+        if self.values is None or not self.low <= self.values[first] <= self.high:
+            return 0.0
+        start, end = float(self.values[first]), float(self.values[last])
+        inside = min(max(end, self.low), self.high) - start
+        return inside / (end - start) if end != start else 0.0
+
+    def note(self, first: int, last: int, smooth: bool) -> None:
+        """Take note of a way; after one that is not smooth nothing is known any more."""
+        if self.values is None:
+            return
+        ends = float(self.values[first]), float(self.values[last])
+        self.low, self.high = min(self.low, *ends), max(self.high, *ends)
+        if not smooth:
+            self.values = None
+
+
+# -- where the loops do not close --------------------------------------------------------------------------------------
+
+
+def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> str:
+    """The largest gap that is left when all equations are met as well as they can be.
+
+    Parameters
+    ----------
+    driven : DrivenCoordinates
+    t : float
+    y : (n_led,) array
+        Values of the led coordinates.
+    near : (n_q,) array
+        A closed position beside it.
+    """
+    layout, scales = driven.layout, driven.scales
+    system, led = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
+    with np.errstate(all="ignore"):  # coordinates of the tree are held exactly, so that the gap opens at a joint
+        q, _ = close(system.closure(led), system.with_values(near, led))
+    position = system.position
+    C = position(q)[0]
+    if not C.size:
+        return "beyond it, all joints close"
+    gaps = np.abs(scales.residual(C))
+    undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
+    if undefined.any():
+        owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
+        what = f"no finite value: {TO_BE_FINITE}"
+        return f"beyond it, at t = {t:.6g} s, {', '.join(owners)} has {what}"
+    place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
+    if not gaps.max() > CONTRADICTION:
+        return f"beyond it, at {place}, the loops close again: a driver's value jumps, or is out of reach in between"
+    joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
+    if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
+        worst = joints[int(np.argmax(gaps[joints]))]
+    else:
+        worst = int(np.argmax(gaps))
+    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    return f"beyond it, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
+
+
+# -- the analysis ------------------------------------------------------------------------------------------------------
+
+
+LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 turns
+
+
+class Range(NamedTuple):
+    """What is asked for: n points."""
+
+    t: Array  #: (n,)
+    names: tuple[str, ...]  #: of the led coordinates
+    y: Array  #: (n_led, n)
+    y1: Array  #: their rates
+    y2: Array
+
+
+def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
+    """Sort names into led coordinates, their rates and accelerations.
+
+    Raises
+    ------
+    UsageError
+    """
+    layout = module.layout
+    coordinates = layout.q + layout.loops
+    known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
+    for name in named:
+        if name not in known:
+            raise unknown("coordinate or rate", name, known)
+    names = tuple(name for name in named if name in coordinates)
+    for name in named:
+        base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)
+        if name not in names and base not in names:
+            raise incomplete(f"{name} is given without values of {base}; give both")
+    arrays = {name: _column(name, value) for name, value in named.items()}
+    if t is not None:
+        arrays["t"] = _column("t", t)
+    sizes = {name: x.size for name, x in arrays.items() if x.ndim}
+    if not sizes:
+        raise incomplete("there is no range: give times t, or values of a coordinate, as an array")
+    if len(set(sizes.values())) > 1:
+        raise ill_shaped(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
+    n = next(iter(sizes.values()))
+    require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
+
+    def stack(suffix: str) -> Array:
+        rows = [np.broadcast_to(arrays.get(name + suffix, np.zeros(())), n) for name in names]
+        return np.array(rows, dtype=float).reshape(len(names), n)
+
+    times = np.broadcast_to(arrays.get("t", np.zeros(())), n)
+    y, y1 = stack(""), stack("_dot")
+    for k, name in enumerate(names):
+        if np.ptp(times) and np.ptp(y[k]) and name + "_dot" not in named:
+            raise incomplete(f"{name} varies with t: give {name}_dot too (and {name}_ddot, unless it is 0)")
+    return Range(np.array(times), names, y, y1, stack("_ddot"))
+
+
+def _column(name: str, value: Any) -> Array:
+    array = read_numbers(name, value)
+    require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
+    if array.ndim > 1 or not array.size or not np.isfinite(array).all():
+        raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
+    return array
+
+
+def kinematic_analysis(
+    module: BoundModel,
+    /,
+    t: ArrayLike | None = None,
+    initial: Start = None,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    partial: bool = False,
+    **led: ArrayLike,
+) -> KinematicAnalysis:
+    """Compute positions, velocities and accelerations over a range of time or of coordinates, without forces.
+
+    The range is followed from the initial position in small steps, so the mechanism stays on its branch, even through
+    change points, where branches meet.
+
+    Parameters
+    ----------
+    t : (n,) array or float, optional
+        Times (s), for drivers; 0 by default.
+    initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
+        Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
+        declared initial position at t = 0 by default, from where it is followed to the first point; if that is a
+        dead centre of the led coordinates, the branch is the one found next to it.
+    parameters, inputs : optional
+        As for :meth:`bind`.
+    partial : bool
+        Return the part of the range that can be reached instead of raising an error.
+    **led : (n,) arrays or floats
+        Values of the prescribed coordinates, of the tree or of cut joints, at most as many as degrees of freedom;
+        the others stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
+
+    Returns
+    -------
+    KinematicAnalysis
+
+    Raises
+    ------
+    PartitionError
+        The range cannot be followed to its end (``.reached`` holds the part before), or its start is singular.
+    AssemblyError
+        The initial values do not fit the loops and drivers.
+    UsageError
+        Unknown names, wrong shapes, too many coordinates led.
+    """
+    require_support(module.layout, "kinematic_analysis")
+    asked = read_range(module, t, led)
+    if parameters is not None or inputs is not None:
+        module = module.bind(parameters, inputs)
+    return analyse(module, asked, initial, partial)
+
+
+def analyse(module: BoundModel, asked: Range, initial: Start, partial: bool) -> KinematicAnalysis:
+    """Follow the range from the initial position."""
+    if module.layout.n_h < module.layout.n_c:
+        module.layout.require_minimal_form()
+    partial = read_flag("partial", partial)
+    t0, y0 = float(asked.t[0]), asked.y[:, 0]
+    start_t, q = start_from(module, initial, t0)
+    try:
+        names = complete(module, q, start_t, asked.names)
+    except PartitionError:
+        if initial is not None or not asked.names:
+            raise
+        # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
+        start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
+        names = complete(module, q, start_t, asked.names)
+    driven = DrivenCoordinates(module, names)
+    further = driven.led_values(q, start_t)[len(asked.names) :]
+    start_y = driven.led_values(q, start_t)
+    led = len(asked.names)
+    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as asked for
+        start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
+    rest = np.repeat(further[:, None], len(asked.t), axis=1)
+    still = np.zeros_like(rest)
+    asked = Range(
+        asked.t,
+        names,
+        np.concatenate([asked.y, rest]),
+        np.concatenate([asked.y1, still]),
+        np.concatenate([asked.y2, still]),
+    )
+    _refuse_long_ways(driven, names, np.column_stack([start_y, asked.y]))
+    q = follow_to_start(driven, q, (start_t, start_y), (t0, asked.y[:, 0]))
+    return follow_range(driven, asked, q, partial, led)
+
+
+def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Array]:
+    """A closed position and its time: as given, or the declared one at t = 0."""
+    from ..initial import Initial
+
+    layout = module.layout
+    if initial is None:
+        first = Initial(module.kernels, 0.0)
+        try:
+            return 0.0, first.assembled({})
+        except AssemblyError:
+            if not t0:
+                raise
+            return t0, Initial(module.kernels, t0).assembled({})
+    here = Initial(module.kernels, t0)
+    if isinstance(initial, Mapping):
+        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
+        if given.rates:
+            raise ill_placed(f"initial takes positions only, not {', '.join(given.rates)}")
+        return t0, here.assembled(given.positions)
+    q = np.array(read_numbers("initial", last_state(initial, module.x_names)))
+    if q.shape == (layout.n_x,):
+        q = q[: layout.n_q]
+    if q.shape != (layout.n_q,):
+        raise ill_shaped(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
+    return t0, here.system.close(q, {}).q if layout.n_h else q
+
+
+def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
+    """The led coordinates, and those of the independent ones that stand still besides.
+
+    Raises
+    ------
+    UsageError
+        Too many are led, or they depend on each other.
+    PartitionError
+        The position is singular for them.
+    """
+    from ..initial import Initial
+
+    layout = module.layout
+    initial: Initial = Initial(module.kernels, t)
+    if len(names) > layout.n_dof:
+        raise ill_chosen(
+            f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be prescribed: {_freedom(module, q, t)}"
+        )
+    free = [layout.velocity_labels[i] for i in layout.independent if layout.velocity_labels[i] in layout.q]
+    others = [name for name in [*free, *layout.q] if name not in names]
+    values = dict.fromkeys(list(dict.fromkeys(others)), 0.0)
+    fine = initial.compatible(q, (), dict.fromkeys(names, 0.0))
+    for name in names:
+        if name not in fine:
+            place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
+            raise PartitionError(
+                f"{name} cannot be prescribed from the initial position ({place}): the coordinate cannot move there, "
+                "or branches meet there; give a slightly different initial position",
+                t,
+                q,
+            )
+    held = list(initial.compatible(q, names, values))[: layout.n_dof - len(names)]
+    if len(names) + len(held) < layout.n_dof:
+        module.layout.require_minimal_form()
+        plural = "s" * (layout.n_dof != 1)
+        raise ill_chosen(
+            f"{layout.n_dof} degree{plural} of freedom, but fewer coordinates can be prescribed at this position"
+        )
+    result = (*names, *held)
+    Q = DrivenCoordinates(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
+    if Q < SINGULAR:
+        place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
+        raise PartitionError(
+            f"the initial position is singular ({place}): branches meet there; give a slightly different one", t, q
+        )
+    return result
+
+
+def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
+    """Ways of more than LONGEST are not followed: they take hours, and positions repeat."""
+    ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / driven.led_scales
+    k = int(ways.argmax()) if ways.size else 0
+    if ways.size and ways[k] > LONGEST:
+        raise too_large(
+            f"the path of {names[k]} from the initial position to the end of the range is {ways[k]:.6g} rad or length "
+            f"scales long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are allowed; positions repeat "
+            "after a turn, so give angles within one turn, or an initial position near the first point"
+        )
+
+
+def _freedom(module: BoundModel, q: Array, t: float) -> str:
+    """Why no more coordinates can be led."""
+    n = module.n_dof
+    if n:
+        return f"{n} degree{'s' * (n > 1)} of freedom, at most {n}"
+    gaps = [module.constraints(q, t=t + step, rows="all") for step in (0.0, 0.0137, 0.377, 1.0)]
+    if any((gap != gaps[0]).any() for gap in gaps):
+        return "0 degrees of freedom: the drivers determine the whole motion; give t"
+    return (
+        "0 degrees of freedom: the mechanism is locked, and no driver moves it; remove a constraint, or replace a "
+        "joint by one with more freedom"
+    )
+
+
+def follow_to_start(
+    driven: DrivenCoordinates, q: Array, start: tuple[float, Array], first: tuple[float, Array]
+) -> Array:
+    """From the initial position to the first point of the range.
+
+    Raises
+    ------
+    PartitionError
+        The way is blocked.
+    """
+    (t, y), (t0, y0) = start, first
+    length = largest(np.concatenate([(y0 - y) / driven.led_scales, [t0 - t]]))
+    if length <= UNMOVED:
+        return q
+    followed = FollowedPath(DrivenPath(driven, t, y, (t0 - t) / length, (y0 - y) / length), q, length)
+    if followed.stop is not None:
+        raise PartitionError(
+            f"the path from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
+            "nearer to the first point",
+            t0,
+            q,
+        )
+    return followed.position(length)
+
+
+def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
+    """Straight pieces one after the other."""
+    n = len(asked.t)
+    pieces = _pieces(driven, asked)
+    columns: list[tuple[Array, Array, Array]] = []
+    found: list[Singular] = []
+    stop: Singular | None = None
+    known_range = KnownRange(asked.t, asked.y)
+    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
+    count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
+    for first, last in pieces:
+        t, y = float(asked.t[first]), asked.y[:, first]
+        dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
+        length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
+        path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
+        along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
+        extent = extents[0] if dt[-1] else extents[1]
+        followed = FollowedPath(path, q, length, known_range.known(first, last) * length, extent)
+        known_range.note(first, last, followed.smooth)
+        new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
+        reach = np.array([followed.holds(s) for s in along])
+        taken = np.arange(len(along))[new][reach[new]]
+        index = first + taken
+        columns.append(followed.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
+        count += len(taken)
+        points += [(done + p.s, path.at(p.s)[0], p.q) for p in followed.continuation.points if followed.holds(p.s)]
+        places.append(done + along[taken])
+        done += length
+        found += followed.singular
+        if followed.stop is not None:
+            stop = followed.stop
+            found.append(followed.stop)
+            break
+        q = columns[-1][0][:, -1] if len(taken) else q
+    along_all, times, positions = (np.array(part) for part in zip(*points, strict=True))
+    x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
+    order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
+    passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
+    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led], passed=passed)
+    if count < n and not partial:
+        gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
+        error = PartitionError(
+            f"the range cannot be followed to its end: {stop}; {gap}give partial=True for the part that can be reached "
+            f"({count} of {n} points)",
+            None if stop is None else stop.t,
+            None if stop is None else stop.q,
+        )
+        error.reached = result  # type: ignore[attr-defined]
+        raise error
+    return result
+
+
+def _pieces(driven: DrivenCoordinates, asked: Range) -> list[tuple[int, int]]:
+    """First and last indices of straight pieces of the range."""
+    scaled = np.concatenate([asked.t[None, :], asked.y / driven.led_scales[:, None]])
+    steps = np.diff(scaled, axis=1)
+    sizes = np.abs(steps).max(axis=0) if steps.size else np.empty(0)
+    pieces: list[tuple[int, int]] = []
+    first, direction = 0, None
+    for k in range(len(sizes)):
+        if sizes[k] <= UNMOVED:
+            continue
+        here = steps[:, k] / sizes[k]
+        if (
+            direction is not None
+            and np.abs(here - direction).max() > ALIGNED + EXACT * np.abs(scaled[:, k]).max() / sizes[k]
+        ):
+            pieces.append((first, k))
+            first = k
+            direction = here
+        elif direction is None:
+            direction = here
+    pieces.append((first, len(asked.t) - 1))
+    return pieces

@@ -1,0 +1,280 @@
+"""What a user asks of a run -> its span, times, tolerances, method, step and first state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base import algebra
+from ...base.algebra import Array
+from ...base.limits.constraints import ALIKE
+from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL
+from ...base.texts import shown
+from ...errors import AssemblyError, ill_shaped, ill_typed, incomplete, no_choice, no_number, off_range
+from ..argument_checks import as_real, read_flag, read_number, read_numbers, read_times, unknown
+from ..initial import Initial
+from ..inputs import Forcing
+from ..trajectory import Span, Start, last_state
+from .integrate import NAMES
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+    from ..inputs import Forcing
+    from ..layout import Layout
+
+# -- states that fit inputs --------------------------------------------------------------------------------------------
+
+
+#: Assemblies in turn, by secant steps, with inputs that depend on the state.
+ROUNDS = 50
+
+
+def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callable[[Array], Array]) -> Array:
+    """The state (n_x,) that is assembled with the inputs that it gives itself.
+
+    Parameters
+    ----------
+    layout : Layout
+    forcing : Forcing
+    t : float
+    assembled : callable
+        u (n_u,) -> the state assembled with these inputs.
+
+    Raises
+    ------
+    AssemblyError
+        None was found.
+    """
+    places = layout.constraint_inputs
+
+    def assemble(u: Array) -> tuple[Array, Array]:
+        """The state at inputs u, and the inputs at this state."""
+        x = assembled(u)
+        found = forcing(t, x)
+        forcing.require_finite()
+        return x, found
+
+    u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
+    forcing.require_finite()
+    secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
+    for _ in range(ROUNDS):
+        x, found = assemble(u)
+        gap = (found - u)[places]
+        if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
+            return x
+        if before is not None:  # Broyden's update: the slope that explains the last step
+            move, change = before
+            secant += np.outer(gap - change - secant @ move, move) / (move @ move)
+        move = algebra.lstsq(secant, -gap, rcond=None)
+        if not np.isfinite(move).all() or not move.any():
+            break
+        before, u = (move, gap), found.copy()
+        u[places] = found[places] - gap + move
+    names = ", ".join(layout.u[i] for i in places)
+    given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
+    raise AssemblyError(
+        f"the inputs {names} change with the state that the constraints give, and no state that fits both was found at "
+        f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
+        "give initial values nearer to such a state, or write the inputs in t",
+        [],
+        code="EG-CONTRADICTION",
+    )
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
+
+
+# -- tolerances and limits of steps ------------------------------------------------------------------------------------
+
+
+IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
+
+
+def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with every tolerance and limit checked.
+
+    Parameters
+    ----------
+    n : int
+        Number of states.
+    span : float
+        Length of the run (s), the longest first step.
+    options : mapping
+        rtol and atol (a number or n of them), max_step, first_step, min_step, vectorized; others are left as they are.
+
+    Returns
+    -------
+    dict of str to object
+        rtol and atol as a float or an (n,) array, rtol at least 100 times the spacing of floating-point numbers; the
+        steps as floats, without those that are None.
+
+    Raises
+    ------
+    UsageError
+        A value that cannot be.
+    """
+    checked = {name: value for name, value in options.items() if value is not None or not name.endswith("_step")}
+    for name in ("rtol", "atol"):
+        if name in checked:
+            checked[name] = _tolerance(name, checked[name], n)
+    if "rtol" in checked:
+        rtol = checked["rtol"]
+        checked["rtol"] = max(rtol, LEAST_RTOL) if isinstance(rtol, float) else np.maximum(rtol, LEAST_RTOL)
+    for name in ("max_step", "first_step"):
+        if name in checked:
+            checked[name] = check_step(name, checked[name])
+    if "vectorized" in checked:
+        checked["vectorized"] = read_flag("vectorized", checked["vectorized"])
+    if "min_step" in checked:
+        checked["min_step"] = read_number("min_step", checked["min_step"])
+        if checked["min_step"] < 0.0:
+            raise off_range(f"min_step must not be negative, not {checked['min_step']:.6g}")
+    if checked.get("first_step", 0.0) > span:
+        raise off_range(f"first_step must not exceed the span of {span:.6g} s, not {checked['first_step']:.6g}")
+    return checked
+
+
+def _tolerance(name: str, given: Any, n: int) -> Any:
+    if type(given) is float and 0.0 <= given < np.inf:
+        return given
+    values = as_real(read_number(name, given) if isinstance(given, str) else given)
+    if values is None:
+        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
+    if values.shape not in ((), (n,)):
+        raise ill_shaped(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
+    if not (np.isfinite(values).all() and (values >= 0.0).all()):
+        raise off_range(f"{name} must not be negative and must be finite, not {shown(given)}")
+    return values if values.ndim else float(values)
+
+
+def check_step(name: str, given: Any) -> float:
+    """A length of steps (s), or a UsageError that names it."""
+    if type(given) is float and 0.0 < given < np.inf:
+        return given
+    found = as_real(read_number(name, given) if isinstance(given, str) else given)
+    if found is None or found.ndim:
+        raise no_number(f"{name} must be a number of seconds, not {shown(given)}")
+    value = float(found)
+    if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
+        raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
+    return value
+
+
+# -- span, times, method, first state ----------------------------------------------------------------------------------
+
+
+PLAIN = frozenset((float, int))
+STIFF = ("Radau", "BDF", "LSODA")  #: implicit methods
+HUGE = 1e300  #: less than the largest number
+DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
+
+
+def find_span(span: Span, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span of a run."""
+    if span is None or (type(span) is float and isfinite(span)):
+        return 0.0, declared if span is None else span
+    ends: Any = span
+    if isinstance(ends, (tuple, list)):
+        start, end = ends if len(ends) == 2 else (HUGE, HUGE)
+        if type(start) in PLAIN and type(end) in PLAIN and abs(start) < HUGE > abs(end):
+            return float(start), float(end)
+        what = "span must be (start, end) in seconds: an end"
+        ends = [read_number(what, end) if isinstance(end, str) else end for end in ends]
+    pair = as_real(ends)
+    if isinstance(span, str) or (pair is not None and not pair.ndim):
+        return 0.0, read_number("the end of the span", span)
+    if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
+        raise ill_typed(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
+    return float(pair[0]), float(pair[1])
+
+
+def declare(module: BoundModel) -> dict[str, Any]:
+    """What holds for a run where nothing is said: what the model says, or the defaults."""
+    return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+
+
+def set_up(
+    module: BoundModel, span: Span, parameters: Any, inputs: Mapping[str, Any] | None
+) -> tuple[BoundModel, Forcing, float, float]:
+    """The module with the values of a run bound, its inputs over time, start and end (s)."""
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(declare(module)["end"]))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    return bound, forcing, start, end
+
+
+def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
+    """The model's own ``max_step`` (s), which implicit methods do not need; empty without."""
+    own = module.metadata.get("simulation", {}).get("max_step")
+    return {} if own is None or (isinstance(method, str) and method in STIFF) else {"max_step": own}
+
+
+def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
+    """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
+    own, named = map(module.metadata.get("simulation", {}).get, ("step", "method"))
+    if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
+        return method, step
+    return named, own if step is None else step
+
+
+def check_method(method: Any, step: Any) -> float | None:
+    """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
+    if method is not None and not isinstance(method, (str, type)):
+        raise no_choice(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
+    if isinstance(method, str) and method not in NAMES:
+        raise unknown("method", method, NAMES)
+    if (isinstance(method, str) and method == "RK4") != (step is not None):
+        raise incomplete("method RK4 needs step=, the size of its steps (s), and no other method takes it but moreau")
+    return None if step is None else check_step("step", step)
+
+
+def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
+    """The times wanted, in order and within the span, or a UsageError; n numbers are kept for each."""
+    times = read_times("t_eval", t_eval, 1 + n)
+    first, last = (0, -1) if end >= start else (-1, 0)
+    if (
+        times.ndim != 1
+        or not times.size
+        or not min(start, end) <= times[first] <= times[last] <= max(start, end)
+        or not (times[1:] > times[:-1] if end >= start else times[1:] < times[:-1]).all()
+    ):
+        raise off_range(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
+    return times
+
+
+def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None = None) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state (a run: its last), which is projected.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or the inputs on which they depend change with the state that they give.
+    """
+    if module.metadata.get("clocks") or module.metadata.get("switched"):
+        from .events import at_next_samples
+
+        span = None if forcing is None else forcing.span
+        return at_next_samples(module, t, _find_state(module, initial, t, forcing), span, initial)
+    return _find_state(module, initial, t, forcing)
+
+
+def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None) -> Array:
+    if forcing is not None and forcing.constrained:
+        return find_led_state(module.layout, forcing, t, lambda u: _find_state(module.bind(None, u), initial, t, None))
+    if initial is None:
+        return module.x0(t=t) if t else module._declared_start.copy()
+    if isinstance(initial, Mapping):
+        return module.x0(initial, t=t)
+    x = np.array(read_numbers("initial", last_state(initial, module.x_names)))
+    if x.shape != (module.n_x,):
+        names = ", ".join(module.x_names)
+        raise ill_shaped(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
+    x = module.project(x, t=t)
+    if module.layout.rank:
+        Initial(module.kernels, t).on_branch(x[: module.n_q], x[module.n_q :], module.layout.v)
+    return x

@@ -1,0 +1,573 @@
+"""Derivatives of a run: between events by the variational equation, at events by their saltation.
+
+An impact of one gap with normal n (see :mod:`.impact`) solves
+
+    M (v+ - v-) + C_q^T l = n^T g        C_q v+ + C_t = 0        r+ + e r- = 0,  r = n v + gap_t
+
+with the rows of what is closed for a time among those of C_q, and velocities that a reset has set to v* go to the
+nearest on the constraints, (v+ - v*) / s^2 + C_q^T l = 0.  Both are differentiated implicitly; changes of l drop out
+along the free motions B, C_q B = 0.
+
+An event g(t, x, u, p) = 0 happens at a time T that moves with what a run is differentiated by:
+
+    dT = -(g_x S- + g_p) / (g_t + g_x f-),  S+ = R_x (S- + f- dT) + R_t dT + R_p - f+ dT
+
+with the state x+ = R(t, x-, p) after it and f-, f+ the rates on both sides (I. A. Hiskens, M. A. Pai, Trajectory
+sensitivity analysis of hybrid systems, IEEE Trans. Circuits Syst. I 47 (2000), 204-220; R. I. Leine, H. Nijmeijer,
+Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7; N. J. Kong et al., Saltation matrices: the
+essential tool for linearizing hybrid dynamical systems, Proc. IEEE 112 (2024), 585-608).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...base import algebra
+from ...base.algebra import Array
+from ...base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH, TOUCHING
+from ...base.numeric.projection import minimum_norm
+from ...errors import NoDerivativeError, cannot
+from ..constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
+from ..inputs import Forcing
+from .events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
+from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, assembly_rows, keep_consistent
+
+if TYPE_CHECKING:
+    from ..bound_model import BoundModel
+
+
+# -- between events ----------------------------------------------------------------------------------------------------
+
+
+class Move(NamedTuple):
+    """Changes of all that a law may depend on, for unit changes of the k names."""
+
+    x: Array  #: (n_x, k)
+    t: Array  #: (k,)
+    u: Array  #: (n_u, k), NaN for an input whose rate is not known
+    p: Array  #: (n_p, k)
+
+    def along(self, slopes: Array, what: str, names: tuple[str, ...]) -> Array:
+        """The changes (m, k) of a law from its derivatives (m, ...) by x, t, u and p.
+
+        Raises
+        ------
+        UsageError
+            It depends on the rate of an input that is a Python function.
+        """
+        n_x, n_u = len(self.x), len(self.u)
+        by_u = slopes[:, n_x + 1 : n_x + 1 + n_u]
+        for j in np.flatnonzero(by_u.any(axis=0) & ~np.isfinite(self.u).all(axis=1)):
+            raise cannot(
+                f"{what} depends on input {names[j]}, a Python function, and its rate is not known; give it as an "
+                "expression in a text, or as a table"
+            )
+        known = np.isfinite(self.u).all(axis=1)
+        found = slopes[:, :n_x] @ self.x + np.multiply.outer(slopes[:, n_x], self.t)
+        return np.asarray(found + by_u[:, known] @ self.u[known] + slopes[:, n_x + 1 + n_u :] @ self.p)
+
+
+class Variational:
+    """x' = f and S' = J S + df/dp as one system z = [x; S * weights].
+
+    Parameters
+    ----------
+    module : BoundModel
+        With parameters and constant inputs bound.
+    forcing : Forcing
+        The inputs of the run.
+    columns : Differentiated
+        What is differentiated by.
+    """
+
+    def __init__(self, module: BoundModel, forcing: Forcing, columns: Differentiated) -> None:
+        self.module, self.forcing, self.columns = module, forcing, columns
+        self.inputs = InputSlopes(module.layout, forcing, module.p)
+        self.weights = _weights(module, columns)
+        kernels, layout = module.kernels, module.layout
+        self.rhs, self.tangent = kernels.timed("rhs", nan=True), kernels.timed("jacobian", nan=True)
+        self.by_p, self.by_u = kernels.timed("parameter_jacobian", nan=True), kernels.timed("input_jacobian", nan=True)
+        k = len(columns.names)
+        self.dp = columns.spread(np.eye(layout.n_p), np.zeros((layout.n_p, layout.n_u)))
+        self.du = columns.spread(np.zeros((layout.n_u, layout.n_p)), np.eye(layout.n_u))
+        self.still = Move(np.zeros((layout.n_x, k)), np.zeros(k), self.du, self.dp)
+
+    def slopes(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
+        """x' and S', S without weights."""
+        u = self.forcing(t, x)
+        S_dot = self.tangent(t, x, u=u) @ S
+        if self.columns.parameters:
+            S_dot = S_dot + self.by_p(t, x, u=u) @ self.dp
+        if self.columns.inputs or self.inputs.by_state_or_parameters:
+            S_dot = S_dot + self.by_u(t, x, u=u) @ self.move(t, x, S).u
+        return self.rhs(t, x, u=u), S_dot
+
+    def move(self, t: float, x: Array, dx: Array, dt: Array | None = None) -> Move:
+        """Everything that goes with changes of the state (n_x, k), and of the time (k,) at which it is looked at."""
+        moved = self.still._replace(x=dx)
+        if not self.forcing:
+            return moved if dt is None else moved._replace(t=dt)
+        by_t, by_x, by_p = self.inputs(t, x)
+        du = self.du + by_x @ dx + by_p @ self.dp
+        if dt is None:
+            return moved._replace(u=du)
+        return moved._replace(t=dt, u=du + np.multiply.outer(by_t, dt))
+
+    def __call__(self, t: float, z: Array) -> Array:
+        """z' of z."""
+        x, S = self.split(z)
+        x_dot, S_dot = self.slopes(t, x, S)
+        return self.joined(x_dot, S_dot)
+
+    def split(self, z: Array) -> tuple[Array, Array]:
+        """x (n_x,) and S (n_x, k) without weights."""
+        n = self.module.n_x
+        return z[:n], z[n:].reshape(n, -1) / self.weights
+
+    def joined(self, x: Array, S: Array) -> Array:
+        """z of x and S."""
+        return np.concatenate([x, (S * self.weights).ravel()])
+
+    def outputs(self, t: float, x: Array, S: Array) -> Array:
+        """Derivatives (n_y, k) of the outputs."""
+        layout, here = self.module.layout, self.module.bind(u=self.forcing(t, x))
+        n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
+        x_dot, S_dot = self.slopes(t, x, S)
+        Y, move = here.kernels.output_derivatives(t, x, x_dot[n_q:]), self.move(t, x, S)
+        by_u, by_p = Y[:, n_x + n_v : n_x + n_v + n_u], Y[:, n_x + n_v + n_u :]
+        return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
+
+
+def _weights(module: BoundModel, columns: Differentiated) -> Array:
+    """Sizes of what is differentiated by, so that one tolerance fits all columns."""
+    weights = np.ones(len(columns.names))
+    for column, index in columns.parameters:
+        weights[column] = abs(module.p[index]) or 1.0
+    for column, index in columns.inputs:
+        weights[column] = abs(module.u[index]) or 1.0
+    return weights
+
+
+# -- resets and impacts ------------------------------------------------------------------------------------------------
+
+
+class Strike:
+    """The laws that rule velocities at one instant.
+
+    Parameters
+    ----------
+    module : BoundModel
+        With the inputs at that instant bound.
+    t : float
+    x : (n_x,) array
+        The state right after.
+    closed : sequence of int
+        Equations of constraints that close and open that rule too.
+    """
+
+    def __init__(self, module: BoundModel, t: float, x: Array, closed: Sequence[int] = ()) -> None:
+        self.module, self.t, self.layout, self.closed = module, t, module.layout, closed
+        self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
+        self.C_q, self.scales = module.kernels.constraint_jacobian(self.q, t=t, rows="all"), self.layout.scales
+        if closed:
+            self.C_q, self.scales = with_closed_rows(module, t, x, self.C_q)
+        self.B = free_motions(self.C_q, self.scales)
+        self._slopes = module.kernels.timed("strike_derivatives")
+
+    def rows(self, v: Array, change: Array, l: Array, g: Array) -> tuple[Array, Array, Array, Array]:
+        """Derivatives by [q, v, t, u, p] of M a + C_q^T l - n^T g, of a / s^2 + C_q^T l, of C_q v + C_t and of the
+        events' rates."""
+        n_v, n_c = self.layout.n_v, self.layout.n_c
+        held = np.zeros(self.layout.n_held // 2)
+        held[[*self.closed]] = l[n_c:]
+        every = self._slopes(self.t, np.concatenate([self.q, v, change, l[:n_c], g, held]))
+        ends = np.cumsum([n_v, n_v, n_c, self.layout.n_events])
+        first, second, third, fourth, fifth = np.split(every, ends)
+        return first, second, np.vstack([third, fifth[[*self.closed]]]), fourth
+
+    def solve(self, metric: Array, dv: Array, force: Array, rate: Array, n: Array, gap: Array) -> Array:
+        """The changes (n_v, k) of v+: metric (dv+ - dv) + force = n^T dg along B, C_q dv+ = -rate, n dv+ = -gap."""
+        w = -minimum_norm(self.C_q, rate, self.scales) if len(rate) else np.zeros_like(dv)
+        B, free, closed = self.B, self.B.shape[1], n @ self.B
+        K = np.zeros((free + len(n), free + len(n)))
+        K[:free, :free], K[:free, free:], K[free:, :free] = B.T @ metric @ B, -closed.T, closed
+        right = np.vstack([B.T @ (metric @ (dv - w) - force), -gap - n @ w])
+        return np.asarray(w + B @ algebra.solve(K, right)[:free])
+
+
+def after_impact(
+    run: Variational, module: BoundModel, t: float, v: Array, move: Move, x: Array, event: int, e: float
+) -> Array:
+    """How the state after the impact of one gap changes, (n_x, k).
+
+    Parameters
+    ----------
+    run : Variational
+    module : BoundModel
+        With the inputs at that instant bound.
+    t : float
+    v : (n_v,) array
+        Velocities before.
+    move : Move
+        Changes of the state before, of time, inputs and parameters.
+    x : (n_x,) array
+        The state after.
+    event : int
+        The model's event whose expression is the gap.
+    e : float
+        Restitution.
+    """
+    layout, strike = module.layout, Strike(module, t, x, closed_rows(module, x))
+    n_q, n_x, names = layout.n_q, layout.n_x, layout.u
+    change, none, rest = strike.v - v, np.zeros(len(strike.C_q)), np.zeros(layout.n_events)
+    M = module.kernels.mass_matrix(strike.q, t=t)
+    n = strike.rows(v, change, none, rest)[3][event : event + 1, n_q:n_x]
+    g = np.array(rest)
+    g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]
+    force = M @ change - n[0] * g[event]
+    l = solve_multipliers(strike.C_q[None], force[:, None], strike.scales)[:, 0]
+    held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
+    balance, _, rate, after = strike.rows(strike.v, change, l, g)
+    before = strike.rows(v, change, l, g)[3]
+    what = f"event {layout.metadata['events'][event]['name']}"
+    gap = held.along(after[event : event + 1], what, names) + e * move.along(before[event : event + 1], what, names)
+    pushed, rates = held.along(balance, what, names), held.along(rate, what, names)
+    return np.vstack([move.x[:n_q], strike.solve(M, move.x[n_q:], pushed, rates, n, gap)])
+
+
+def after_reset(
+    run: Variational, module: BoundModel, t: float, before: Array, move: Move, x: Array, event: int, u: Array
+) -> Array:
+    """How the state after a reset changes, (n_x, k); arguments as for :func:`after_impact`, u (n_u,) before it."""
+    layout = module.layout
+    n_q, names, what = layout.n_q, layout.u, f"event {layout.metadata['events'][event]['name']}"
+    resets = layout.metadata["resets"]
+    chosen = [k for k, (owner, _) in enumerate(resets) if owner == event]
+    places = [resets[k][1] for k in chosen]
+    slopes = module.kernels.rows("event_derivatives", [layout.n_events + k for k in chosen], t, before, u)
+    star, moved = np.array(before), np.array(move.x)
+    star[places] = module.kernels.rows("resets", chosen, t, before, u)
+    moved[places] = move.along(slopes, what, names)
+    dq, dv = moved[:n_q], moved[n_q:]
+    if layout.space is not None:
+        for i, _ in layout.quaternion_slots:
+            dq[i : i + 4] /= np.linalg.norm(star[i : i + 4])
+        star[:n_q] = layout.space.normalised(star[:n_q])
+        dq = dq - layout.space.stretch(star[:n_q], dq)
+    if not layout.n_c:
+        return np.vstack([dq, dv])
+    off = float(np.abs(layout.scales.distance(x[:n_q], star[:n_q])).max())
+    if off > OFF:
+        raise NoDerivativeError(
+            f"{what} resets coordinates to values that do not close the loops (the projection moves them by {off:.2g}, "
+            "scaled), so the derivative is not known; reset all coordinates so that the loops stay closed"
+        )
+    strike, scales = Strike(module, t, x), layout.scales
+    dq = dq - _back(run, module, strike, dq, move)
+    star_v = star[n_q:]
+    m = solve_multipliers(strike.C_q[None], ((strike.v - star_v) / scales.q**2)[:, None], scales)[:, 0]
+    held = run.move(t, x, np.vstack([dq, np.zeros_like(dv)]), move.t)
+    _, least, rate, _ = strike.rows(strike.v, strike.v - star_v, m, np.zeros(layout.n_events))
+    pushed, rates = held.along(least, what, names), held.along(rate, what, names)
+    nothing = np.zeros((0, layout.n_v)), np.zeros((0, dv.shape[1]))
+    return np.vstack([dq, strike.solve(np.diag(scales.q**-2), dv, pushed, rates, *nothing)])
+
+
+def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move: Move) -> Array:
+    """What brings changes of coordinates (n_q, k) back onto the constraints."""
+    layout, t, q = module.layout, strike.t, strike.q
+    n_h, n_q, n_x = layout.n_h, layout.n_q, layout.n_x
+    if not n_h:
+        return np.zeros_like(dq)
+    x = np.concatenate([q, np.zeros(layout.n_v)])
+    E = assembly_rows(module, t, x, run.inputs(t, x) if run.forcing else None)[:n_h]
+    drift = module.velocity_constraints(x, t=t, rows="all")[:n_h]
+    off = E[:, :n_q] @ dq + np.multiply.outer(drift, move.t) + E[:, n_x + layout.n_u :] @ move.p
+    off = off + E[:, n_x : n_x + layout.n_u] @ run.du
+    N = layout.scales.rates(q, np.eye(layout.n_v))
+    return layout.scales.rates(q, minimum_norm(E[:, :n_q] @ N, off, layout.scales))
+
+
+# -- across an event ---------------------------------------------------------------------------------------------------
+
+
+GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
+
+
+class Saltation:
+    """Carries the derivatives of one run through its events.
+
+    Parameters
+    ----------
+    run : Variational
+    events : Events
+    span : (float, float)
+    tolerances : (float, array or float)
+        rtol and atol of the run.
+    corners : sequence of float
+        Times at which inputs jump or bend.
+    """
+
+    def __init__(
+        self, run: Variational, events: Events, span: tuple[float, float], tolerances: tuple[float, Any],
+        corners: Sequence[float],
+    ) -> None:  # fmt: skip
+        if events.functions:
+            raise cannot(
+                f"event {events.functions[0].name} is a Python function, and its derivatives are not known; give its "
+                "expression as a text"
+            )
+        self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
+        self.module, self.n, self.names = run.module, run.module.n_x, events.names
+        self.every, self.crowded, self.over = events.every, events.crowded, False
+        self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
+        self.found: list[EventSlopes] = []
+
+    def __len__(self) -> int:
+        return len(self.every)
+
+    def encode(self) -> dict[str, Any] | None:
+        """The events, at each of which the loop stops, whatever it does: rates may jump there."""
+        encoded = self.events.encode()
+        actions = [PAUSE if event.action == GO_ON else event.action for event in self.every]
+        return encoded and {**encoded, "action": actions, "resets": []}
+
+    def reset(self, module: BoundModel, forcing: Forcing, t: float, z: Array, fired: Sequence[int]) -> Array:
+        """z = [x; S] right after events that happened at time t."""
+        changed: list[str] = []
+        fixed = all(self._is_fixed(t, *self.run.split(z), index) for index in fired)
+        for index in sorted(fired, key=lambda index: self.every[index].action != GO_ON):
+            after = self._pass(t, z, index)
+            changed += [self.names[index]] if after is not z else []
+            z = after
+        if len(changed) > 1 and not fixed:
+            raise self._at_once(t, changed)
+        return z
+
+    def _pass(self, t: float, z: Array, index: int) -> Array:
+        """z right after one event; z itself where the event changes nothing."""
+        forcing, event, name = self.run.forcing, self.every[index], self.names[index]
+        raw, S = self.run.split(z)
+        x, S = self._consistent(t, raw, S)
+        before, after = self._sides(t, x)
+        changes = event.action != GO_ON or bool(np.abs(before - after).max() > 0.0)
+        fixed = self._is_fixed(t, x, S, index)
+        if changes and not fixed:
+            self._refuse_ends(t, index)
+            self._refuse_others(t, x, index, before)
+        dt = np.zeros(S.shape[1]) if fixed else self._time(t, x, S, index, before, changes)
+        move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)
+        if not changes:
+            self.found.append(EventSlopes(name, t, x, x, dt, move.x, move.x))
+            return z
+        x_after, d_after = x, move.x
+        if event.action != GO_ON:
+            x_after = self.events.reset(self.module, forcing, t, x, [index])
+            d_after = self._after(t, x, move, x_after, index)
+            after = self._sides(t, x_after)[1]
+        self.found.append(EventSlopes(name, t, x, x_after, dt, move.x, d_after))
+        x_after, S = self._consistent(t, x_after, d_after - np.multiply.outer(after, dt))
+        return self.run.joined(x_after, S)
+
+    def stop(self, t: float, z: Array, index: int) -> None:
+        """Note an event that ended the run."""
+        x, S = self._consistent(t, *self.run.split(z))
+        before = self._sides(t, x)[0]
+        self._refuse_others(t, x, index, before)
+        dt = self._time(t, x, S, index, before, True)
+        moved = S + np.multiply.outer(before, dt)
+        self.found.append(EventSlopes(self.names[index], t, x, x, dt, moved, moved))
+
+    def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
+        forcing = self.run.forcing
+        here = self.module.bind(u=forcing(t, x))
+        if self.events.model[index].action == RESET:
+            found = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
+            self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
+            return found
+        declared = self.events.declared
+        values = self.module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x))
+        near = TOUCHING * max(1.0, self.module.layout.length)
+        gaps = [j for j, other in enumerate(declared) if other.get("restitution") is not None]
+        touching = [str(declared[j]["name"]) for j in gaps if j != index and abs(values[j]) <= near]
+        if touching:
+            raise self._at_once(t, [str(declared[index]["name"]), *touching])
+        self._refuse_moving(t, x, index)
+        if declared[index].get("friction"):
+            raise NoDerivativeError(
+                f"event {declared[index]['name']} is an impact with friction, whose derivative is not available; leave "
+                "the friction out, or end the run before it"
+            )
+        v, e = x[self.module.n_q :], float(declared[index]["restitution"])
+        return after_impact(self.run, here, t, v, move, x_after, index, e)
+
+    def _refuse_moving(self, t: float, x: Array, index: int) -> None:
+        layout = self.module.layout
+        by_u = self._gradient(t, x, index)[0, self.n + 1 : self.n + 1 + layout.n_u]
+        for j in np.flatnonzero(by_u):
+            if j in self.run.forcing.varying and layout.u[j] not in layout.input_rates:
+                raise NoDerivativeError(
+                    f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
+                    "derivative of such an impact is not available; write the motion into the gap's expression"
+                )
+
+    # -- the time of an event -------------------------------------------------------------------------------------
+    def _is_fixed(self, t: float, x: Array, S: Array, index: int) -> bool:
+        """Whether an event is a sampling time that no change moves."""
+        clocks = [clock["event"] for clock in self.module.metadata.get("clocks", [])]
+        if index not in clocks:
+            return False
+        gradient = self._gradient(t, x, index)
+        return not self.run.move(t, x, S).along(gradient, f"event {self.names[index]}", self.module.layout.u).any()
+
+    def _gradient(self, t: float, x: Array, index: int) -> Array:
+        """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
+        first = len(self.events.model)
+        if index < first:
+            return self.module.kernels.rows("event_derivatives", [index], t, x, self.run.forcing(t, x))
+        every, n_u = self.formulas[index - first](t, x), self.module.layout.n_u
+        return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
+
+    def _value(self, t: float, x: Array, index: int) -> float:
+        """An event's value."""
+        first = len(self.events.model)
+        if index < first:
+            kernel = self.module.kernels.timed("events", nan=True)
+            return float(kernel(t, x, u=self.run.forcing(t, x) if self.run.forcing else None)[index])
+        return float(self.events.formulas[index - first][1].function(self.module.p)(t, x))
+
+    def _rate(self, t: float, x: Array, index: int, f: Array) -> float:
+        """How fast an event's value changes along rates f (n_x,)."""
+        layout = self.module.layout
+        u = np.zeros((layout.n_u, 1))
+        if self.run.forcing:
+            by_t, by_x, _ = self.run.inputs(t, x)
+            u = (by_t + by_x @ f)[:, None]
+        flow = Move(f[:, None], np.ones(1), u, np.zeros((layout.n_p, 1)))
+        return float(flow.along(self._gradient(t, x, index), f"event {self.names[index]}", layout.u)[0, 0])
+
+    def _time(self, t: float, x: Array, S: Array, index: int, f: Array, needed: bool) -> Array:
+        """The derivatives (k,) of the time of an event; NaN where they do not exist and nothing depends on them."""
+        gradient, rate, name = self._gradient(t, x, index), self._rate(t, x, index, f), self.names[index]
+        h = ASIDE * (self.span[1] - self.span[0])
+        earlier = x - h * f
+        with np.errstate(all="ignore"):
+            bend = (rate - self._rate(t - h, earlier, index, self._f(t - h, earlier))) / h
+        error = self._error(x, gradient)
+        if needed and t == self.span[0]:
+            raise self._at_an_end(t, name, "start")
+        if not rate * rate > GRAZING * abs(bend) * error or rate == 0.0 or t == self.span[0]:
+            if needed:
+                raise NoDerivativeError(
+                    f"event {name} at t = {t:.6g} s only grazes its surface (its rate is {rate:.3g}): "
+                    "the run has no derivative there, nor where impacts die away; end the run before it, or give "
+                    "tighter tolerances if the event does cross"
+                )
+            return np.full(S.shape[1], np.nan)
+        along = self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u)
+        return np.asarray(-along[0] / rate)
+
+    def _error(self, x: Array, gradient: Array) -> float:
+        """What the errors that the integrator allows make of an event's value."""
+        rtol, atol = self.tolerances
+        sizes = np.broadcast_to(np.asarray(atol, dtype=float), np.shape(atol) or (1,))
+        allowed = rtol * np.abs(x) + (sizes[: self.n] if len(sizes) > 1 else sizes)
+        return float(np.abs(gradient[0, : self.n]) @ allowed)
+
+    # -- both sides -----------------------------------------------------------------------------------------------
+    def _f(self, t: float, x: Array) -> Array:
+        return np.asarray(self.run.rhs(t, x, u=self.run.forcing(t, x)))
+
+    def _sides(self, t: float, x: Array) -> tuple[Array, Array]:
+        """The rates (n_x,) before and after an event at x, extrapolated from either side where they jump."""
+        f, step = self._f(t, x), ASIDE * (self.span[1] - self.span[0])
+        limit, sides = SMOOTH * np.abs(f).max(initial=0.0), []
+        for h in (-step, step):
+            with np.errstate(all="ignore"):
+                near, far = (self._f(t + k * h, x + k * h * f) for k in (1.0, 2.0))
+            side = 2.0 * near - far
+            smooth = not np.isfinite(side).all() or np.abs(side - f).max(initial=0.0) <= limit
+            sides.append(f if smooth else side)
+        return sides[0], sides[1]
+
+    def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
+        """A state and its derivatives, brought onto the constraints."""
+        module, forcing = self.module, self.run.forcing
+        x = np.asarray(module.project(x, t=t, u=forcing(t, x)))
+        slopes = self.run.inputs(t, x) if forcing else None
+        return x, keep_consistent(module.bind(u=forcing(t, x)), t, x, S, self.run.columns, slopes)
+
+    # -- what has no derivative -----------------------------------------------------------------------------------
+    def _refuse_ends(self, t: float, own: int) -> None:
+        near = SIMULTANEOUS * abs(self.span[1] - self.span[0])
+        for end, what in ((self.span[0], "start"), (self.span[1], "end")):
+            if abs(t - end) <= near:
+                raise self._at_an_end(t, self.names[own], what)
+        if any(abs(t - corner) <= near for corner in self.corners):
+            raise NoDerivativeError(
+                f"event {self.names[own]} happens at t = {t:.6g} s, exactly where an input jumps or bends; the run "
+                "has no "
+                "derivative there"
+            )
+
+    def _refuse_others(self, t: float, x: Array, own: int, f: Array) -> None:
+        """Refuse another event at the same instant that changes the state or ends the run."""
+        for other, event in enumerate(self.every):
+            if other == own or event.direction == UNWATCHED or (event.action == GO_ON and not event.terminal):
+                continue
+            value = self._value(t, x, other)
+            if np.isnan(value):
+                continue
+            gradient, rate = self._gradient(t, x, other), self._rate(t, x, other, f)
+            onward = rate if self.span[1] >= self.span[0] else -rate
+            if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:
+                continue  # it has just happened, and leaves
+            near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
+            if abs(value) <= near:
+                raise self._at_once(t, [self.names[own], self.names[other]])
+
+    def _refuse_contradictions(
+        self, t: float, x: tuple[Array, Array], d: tuple[Array, Array], move: Move, index: int
+    ) -> None:
+        """Refuse a reset whose new positions obey what is closed here, but not where a parameter changes.
+
+        ``x`` and ``d`` are states and their derivatives (n_x, k) before and after it.
+        """
+        module, layout = self.module, self.module.layout
+        rows = module.metadata.get("held_rows", [])
+        closed = [k for k, (_, state, _) in enumerate(rows) if x[0][layout.x.index(state)] > 0.5]
+        if not closed or "held_errors" not in module.kernels.core.names:
+            return
+        errors = module.kernels.timed("held_errors")
+        for column, name in enumerate(self.run.columns.names):
+            h = ASIDE / max(1.0, float(np.abs(d[0][:, column]).max()), float(np.abs(d[1][:, column]).max()))
+            slopes = []
+            for state, slope in zip(x, d, strict=True):
+                ends = [
+                    errors(t + s * move.t[column], state + s * slope[:, column], p=module.p + s * move.p[:, column])
+                    for s in (h, -h)
+                ]
+                slopes.append((ends[0] - ends[1])[::2][closed] / (2.0 * h))
+            least = CONTRADICTS * float(np.abs(d[1][:, column]).max())
+            if np.minimum(np.abs(slopes[1] - slopes[0]), np.abs(slopes[1])).max() > least:
+                raise NoDerivativeError(
+                    f"event {self.events.declared[index]['name']} gives positions at t = {t:.6g} s that contradict "
+                    f"what is closed ({', '.join(rows[k][0] for k in closed)}) as soon as {name} changes, so there is "
+                    "no derivative; give positions that obey it for all values"
+                )
+
+    @staticmethod
+    def _at_an_end(t: float, name: str, what: str) -> NoDerivativeError:
+        return NoDerivativeError(
+            f"event {name} happens at the {what} of the run, t = {t:.6g} s, so a small change can move it "
+            "out of the run, which has no derivative there; give another span"
+        )
+
+    def _at_once(self, t: float, names: Sequence[str]) -> NoDerivativeError:
+        return NoDerivativeError(
+            f"the events {' and '.join(names)} happen at once at t = {t:.6g} s; a small change decides which of them "
+            "comes first, so the run has no derivative there"
+        )

@@ -1,0 +1,572 @@
+"""Generated code against joints and Newton's and Euler's equations of every body."""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import partial
+
+import numpy as np
+
+from ..analysis.reactions import reactions
+from ..base import algebra
+from ..base.algebra import Array
+from ..base.limits.numbers import EPS, TINY
+from ..elements.forces import ReactionFriction
+from ..elements.forces.friction import reaction_symbol
+from ..elements.frames import GROUND, Marker
+from ..elements.joints import Continuous, Prismatic, Revolute
+from ..expr.core import Expr, substitute, symbols_of
+from ..mechanics import Kinematics
+from ..model.mechanism import JointSpec
+from . import bodies
+from .bench import Bench, numbers
+from .digits import FOLDED, UNIT, Number
+from .finding import Comparison, Finding, pairs, size_of
+from .truth import Truth
+
+# -- joints ------------------------------------------------------------------------------------------------------------
+
+
+PARTS = ("x", "y", "z", *["rotation"] * 9)  #: of a relative pose
+
+
+def check_joints(bench: Bench) -> list[Finding]:
+    """Rotations, placements at the joints, relative velocities."""
+    return [_rigid(bench), _joints(bench), _freedoms(bench)]
+
+
+def _rigid(bench: Bench) -> Finding:
+    """R^T R = 1 and det R = 1 for every body."""
+    check = "poses: rotation matrices are orthonormal"
+    if not bench.layout.n_bodies:
+        return Finding.skipped(check, "there are no bodies")
+    found = Comparison(check)
+    bounds = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    for k, case in enumerate(bench.cases):
+        poses = bench.call("poses", case)
+        error = 8.0 * bounds[:, k].reshape(-1, 4, 4)[:, :3, :3].max(axis=(1, 2)) + 8.0 * UNIT
+        R = poses[:, :3, :3]
+        gap = np.abs(np.einsum("bij,bik->bjk", R, R) - np.eye(3)).max(axis=(1, 2))
+        gap = np.maximum(gap, np.abs(np.linalg.det(R) - 1.0))
+        found.add(k, gap, error, 1.0, bench.layout.bodies)
+    return found.finding()
+
+
+def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
+    """A marker in ground axes, from the pose of its body."""
+    frame = marker.frame
+    flat = truth.system.evaluate(
+        f"marker {name}", lambda: [*frame.position, *(x for row in frame.rotation for x in row)], truth.values
+    )
+    position, rotation = flat[:3], [flat[3:6], flat[6:9], flat[9:12]]
+    if marker.body == GROUND:
+        return bodies.Pose(rotation, position)
+    body = truth.here[marker.body]
+    return bodies.Pose(
+        bodies.product(body.rotation, rotation), bodies.add(body.position, bodies.times(body.rotation, position))
+    )
+
+
+def _joints(bench: Bench) -> Finding:
+    """At every joint the successor stands, seen from the predecessor, where the joint's coordinates say.
+
+    Joints of the tree and cut ones alike, which tells whether loops have all the equations they need; joints without
+    coordinates by their own equations.
+    """
+    check = "joints: poses match their coordinates"
+    if not bench.mechanism.joints:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    cut = bench.kinematics.loop_coordinates
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    held = (
+        bench.bounds("constraints", lambda: bench.terms.constraints)[1]
+        if bench.terms.constraints
+        else np.zeros((0, len(bench.cases)))
+    )
+    for k, truth in enumerate(bench.truths):
+        measured = dict(zip(cut.names, truth.measured(truth.values), strict=True)) if cut.names else {}
+        gaps, labels = [], []
+        for spec in bench.mechanism.joints:
+            if not spec.joint.coordinates and spec.joint.role == "loop":
+                continue
+            outer = placed(truth, spec.predecessor, f"{spec.name} P")
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            symbols = [graph.symbol(name) for name in spec.coordinates]
+            rotation, position = spec.joint.pose(graph, symbols)
+            values = truth.values | {n: measured[n] for n in spec.coordinates if n in measured}
+            parts = [*position, *(x for row in rotation for x in row)]
+            flat = truth.system.evaluate(f"pose {spec.name}", partial(list, parts), values)
+            back = bodies.transpose(outer.rotation)
+            turn = bodies.product(back, inner.rotation)
+            place = bodies.times(back, bodies.sub(inner.position, outer.position))
+            own = [*place, *(x for row in turn for x in row)]
+            gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+            labels += [f"{spec.name} {what}" for what in PARTS]
+            plain = _textbook(spec, truth)
+            if plain is not None:
+                flat = [*plain.position, *(x for row in plain.rotation for x in row)]
+                gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+                labels += [f"{spec.name} {what}" for what in PARTS]
+        C = bench.module.kernels.constraint_jacobian(
+            truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all"
+        )
+        moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
+        length = max(1.0, bench.layout.length)
+        rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
+            np.abs(C).max(initial=0.0)
+        )
+        limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
+    """Joints of one degree, written out once more: S turned by q about z, or shifted by q along z, in P."""
+    if not isinstance(spec.joint, Revolute | Prismatic) or spec.coordinates[0] not in truth.values:
+        return None
+    mp, q, o = truth.mp, truth.values[spec.coordinates[0]], truth.zero
+    one = mp.mpf(1)
+    if isinstance(spec.joint, Prismatic):
+        return bodies.Pose([[one, o, o], [o, one, o], [o, o, one]], [o, o, q])
+    c, s = mp.cos(q), mp.sin(q)
+    return bodies.Pose([[c, -s, o], [s, c, o], [o, o, one]], [o, o, o])
+
+
+def _freedoms(bench: Bench) -> Finding:
+    """In a unit of one velocity, and q' = N v, the successor moves by the joint's column of it, all else at rest.
+
+    An angular velocity of a joint in Euler parameters is the relative one, in the successor's axes.
+    """
+    check = "joints: relative velocities"
+    if not bench.mechanism.joints or bench.mechanism.bare:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    names = bench.layout.v
+    for k, truth in enumerate(bench.truths):
+        gaps, labels = [], []
+        for spec in (bench.mechanism.joints[b.joint] for b in bench.kinematics.topology.branches):
+            columns = spec.joint.subspace(graph, [graph.symbol(name) for name in spec.coordinates])
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
+                flat = truth.system.evaluate(f"column {name}", lambda a=angular, l=linear: [*a, *l], truth.values)  # type: ignore[misc]
+                turn, shift = (bodies.times(inner.rotation, part) for part in (flat[:3], flat[3:]))
+                own = _relative(truth, spec, names.index(name), inner)
+                gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
+                labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
+        limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, bench.layout.length)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodies.Twist:
+    """Twist of S relative to P at S, ground axes, in a unit of velocity j."""
+    ends = []
+    for marker in (spec.successor, spec.predecessor):
+        if marker.body == GROUND:
+            ends.append(bodies.Twist([truth.zero] * 3, [truth.zero] * 3))
+            continue
+        w = truth.virtual[j][marker.body]
+        ends.append(bodies.Twist(w.angular, w.at(bodies.sub(inner.position, truth.here[marker.body].position))))
+    s, p = ends
+    return bodies.Twist(bodies.sub(s.angular, p.angular), bodies.sub(s.linear, p.linear))
+
+
+# -- equations of bodies -----------------------------------------------------------------------------------------------
+
+# What is expected comes from :mod:`.truth`, which shares no formula with the derivation but where the bodies are and
+# what the force elements exert.
+
+
+def check_bodies(bench: Bench) -> list[Finding]:
+    """Equations of the tree, accelerations, energies, momenta and power."""
+    found = [_tree(bench, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
+    found += [_accelerations(bench), _energy(bench), _momentum(bench), _power(bench)]
+    return found
+
+
+def source(bench: Bench) -> str:
+    """What the equations are judged by."""
+    if bench.mechanism.lagrangian is not None:
+        return "Lagrange's equations by differences of L"
+    return "equations as they were given" if bench.mechanism.given is not None else "free bodies"
+
+
+def _inertia_sizes(truth: Truth) -> Array:
+    """Sizes (n_v,) of the terms that the bias is a sum of, which may cancel: bodies' inertia forces, gravity, loads."""
+    if truth.system.mechanism.bare:
+        return np.zeros(truth.n)
+
+    def norm(vector: list[Number]) -> float:
+        return float(truth.mp.sqrt(bodies.dot(vector, vector)))
+
+    rates, sizes = truth.body_rates([truth.zero] * truth.n), np.abs(numbers(truth.applied()))
+    for j in range(truth.n):
+        for body, w, rate, twist in zip(truth.bodies, truth.virtual[j], rates, truth.twists, strict=True):
+            turning, inertia = norm(twist.angular) ** 2, max(norm(row) for row in body.inertia)
+            a = norm(rate.at(body.arm)) + turning * norm(body.arm) + norm(truth.gravity)
+            moment = inertia * (norm(rate.angular) + turning)
+            sizes[j] += float(body.mass) * a * norm(w.at(body.arm)) + moment * norm(w.angular)
+    return sizes
+
+
+def _tree(bench: Bench, name: str) -> Finding:
+    found, layout = Comparison(f"{name}: {source(bench)}"), bench.layout
+    labels = pairs(layout.v, layout.v) if name == "mass_matrix" else list(layout.v)
+    for k, truth in enumerate(bench.truths):
+        actual = bench.call(name, truth.case).ravel()
+        if name == "mass_matrix":
+            expected = numbers([x for row in truth.mass_matrix for x in row])
+        elif name == "bias":
+            expected = numbers(truth.bias)
+        else:
+            expected = numbers(truth.inverse_dynamics([truth.mp.mpf(float(x)) for x in truth.case.a]))
+        if name in bench.graph_kernels:
+            bound = bench.bounds(name, bench.graph_kernels[name])[1][:, k]
+        else:
+            bound = layout.n_v * bench.bounds("inverse_dynamics", lambda: bench.terms.inverse_dynamics)[1][:, k].max()
+        size = size_of(expected)
+        if name == "bias":
+            size = max(size, size_of(_inertia_sizes(truth)))
+        floor = np.full(len(expected), FOLDED * size)
+        if name == "mass_matrix":
+            d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
+            floor = FOLDED * np.outer(d, d).ravel() + 4.0 * EPS * size
+        found.add(k, actual - expected, bound + UNIT * np.abs(expected) + floor, size, labels)
+    return found.finding()
+
+
+def true_accelerations(bench: Bench, k: int) -> tuple[Array, Array, float]:
+    """v' at a state in many digits, of M a + h + C_q^T l = 0 and C_q a + gamma = 0; what rounding allows, and the size.
+
+    Raises
+    ------
+    ZeroDivisionError
+        The system is singular.
+    """
+    truth = bench.truths[k]
+    a, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
+    own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
+    limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
+    return a, limit, max(size_of(a), size_of(own))
+
+
+def _accelerations(bench: Bench) -> Finding:
+    found, n_q = Comparison(f"accelerations: {source(bench)}"), bench.module.n_q
+    for k, truth in enumerate(bench.truths):
+        try:
+            a, limit, size = true_accelerations(bench, k)
+        except ZeroDivisionError:
+            return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
+        found.add(k, bench.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in bench.layout.v])
+    return found.finding()
+
+
+def kinetic(truth: Truth) -> Number:
+    """T of the bodies and the rotors of drives."""
+    total = sum((b.product(w, w) for b, w in zip(truth.bodies, truth.twists, strict=True)), truth.zero)
+    for name, inertia in truth.drives:
+        v = [truth.values[n] for n in truth.system.terms.v]
+        rate = sum((y * x for y, x in zip(truth.coordinate_slopes(name), v, strict=True)), truth.zero)
+        total += inertia * rate * rate
+    return total / 2
+
+
+def potential(truth: Truth, poses: list[bodies.Pose], values: dict[str, Number]) -> Number:
+    """V of gravity and of the force elements, with bodies at some poses."""
+    total = truth.zero
+    for body, pose, here in zip(truth.bodies, poses, truth.here, strict=True):
+        own = bodies.times(bodies.transpose(here.rotation), body.arm)
+        centre = bodies.add(pose.position, bodies.times(pose.rotation, own))
+        total -= body.mass * bodies.dot(truth.gravity, centre)
+    parts = [terms.potential for terms in truth.system.kinematics.forces if terms.potential is not None]
+    return total + sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)
+
+
+def _energy(bench: Bench) -> Finding:
+    check = "energy: of the bodies"
+    if bench.mechanism.bare or "energy" not in bench.graph_kernels:
+        return Finding.skipped(check, "there are no bodies; T and V are those of the given equations")
+    found = Comparison(check)
+    bounds = bench.bounds("energy", bench.graph_kernels["energy"])[1]
+    for k, truth in enumerate(bench.truths):
+        expected = numbers([kinetic(truth), potential(truth, truth.here, truth.values)])
+        actual = bench.call("energy", truth.case)
+        limit = bounds[:, k] + UNIT * np.abs(expected) + FOLDED * size_of(expected)
+        found.add(k, actual - expected, limit, size_of(expected), bench.labels("energy"))
+    return found.finding()
+
+
+def _momentum(bench: Bench) -> Finding:
+    """Linear and angular momentum, and that external forces are what changes them."""
+    check = "momentum: of the bodies"
+    if "centroidal" not in bench.graph_kernels:
+        return Finding.skipped(check, "no body has a mass")
+    found, n = Comparison(check), 3 + 3 * bench.layout.n_v
+    bounds = bench.bounds("centroidal", bench.graph_kernels["centroidal"])[1]
+    for k, truth in enumerate(bench.truths):
+        expected = numbers([*_centre(truth), *_momenta(truth)])
+        every = bench.call("centroidal", truth.case)
+        actual, limit = (np.concatenate([y[:3], y[n : n + 6]]) for y in (every, bounds[:, k]))
+        labels = [f"{what} {axis}" for what in ("centre", "linear", "angular") for axis in "xyz"]
+        size = size_of(expected)
+        found.add(k, actual - expected, limit + UNIT * np.abs(expected) + FOLDED * size, size, labels)
+    return found.finding()
+
+
+def _centre(truth: Truth) -> list[Number]:
+    mass = sum((b.mass for b in truth.bodies), truth.zero)
+    total = [truth.zero] * 3
+    for body, pose in zip(truth.bodies, truth.here, strict=True):
+        total = bodies.add(total, bodies.scale(body.mass / mass, body.centre(pose)))
+    return total
+
+
+def _momenta(truth: Truth) -> list[Number]:
+    centre, linear, angular = _centre(truth), [truth.zero] * 3, [truth.zero] * 3
+    for body, pose, w in zip(truth.bodies, truth.here, truth.twists, strict=True):
+        own = bodies.scale(body.mass, w.at(body.arm))
+        linear = bodies.add(linear, own)
+        spin = bodies.times(body.inertia, w.angular)
+        angular = bodies.add(angular, bodies.add(spin, bodies.cross(bodies.sub(body.centre(pose), centre), own)))
+    return [*linear, *angular]
+
+
+def _power(bench: Bench) -> Finding:
+    """dE/dt along the motion, time and inputs held, against the power of forces without a potential and of drivers.
+
+    E is the sum that the module reports, differentiated along x' = rhs in many digits.  The reactions of rows
+    C' = C_q v + C_t do the power l . C_t.
+    """
+    check = "power: rate of energy, forces and drivers"
+    if bench.mechanism.bare or "energy" not in bench.graph_kernels:
+        return Finding.skipped(check, "there are no bodies, so it is not known which forces have a potential")
+    found, layout = Comparison(check), bench.layout
+    for k, truth in enumerate(bench.truths):
+        a = bench.rhs(truth.case)[bench.module.n_q :]
+        try:
+            exact, multipliers = truth.solve(list(layout.rows))
+        except ZeroDivisionError:
+            return Finding.skipped(check, "the system of accelerations and multipliers is singular")
+        rate = _energy_rate(bench, truth, a)
+        v = [truth.values[name] for name in bench.terms.v]
+        parts = [f * x for f, x in zip(truth.applied(remainder=True), v, strict=True)]
+        C, rows = truth.constraint_jacobian, truth.velocity_rows
+        for row, l in zip(layout.rows, multipliers, strict=True):
+            parts.append(-l * sum((c * x for c, x in zip(C[row], v, strict=True)), truth.zero))  # C_q v = -C_t
+        power = sum(parts, truth.zero)
+        momentum = np.abs(
+            numbers([sum((m * x for m, x in zip(row, v, strict=True)), truth.zero) for row in truth.mass_matrix])
+        )
+        slack = bench.acceleration_limit(k, numbers(exact), numbers(multipliers))
+        gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
+        limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
+        size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), TINY)
+        found.add(k, [float(rate - power)], [limit], size)
+    return found.finding()
+
+
+def _energy_rate(bench: Bench, truth: Truth, a: Array) -> Number:
+    """d(T + V)/dt along q' = N v, v' = a at a held time."""
+    energies, many = bench.graph_kernels["energy"], [truth.mp.mpf(float(x)) for x in a]
+    return truth.slope(
+        lambda values: [sum(bench.system.evaluate("kernel energy", energies, values), truth.zero)],
+        lambda s: truth.later(s, many, frozen=True),
+    )[0]
+
+
+# -- reactions ---------------------------------------------------------------------------------------------------------
+
+# Reactions leave out what acts along a joint's coordinates (loads, inertias of drives); that is added here as the
+# torque or force about or along the joint's axis, between the two bodies.
+
+
+TURNING = (Revolute, Continuous)
+
+
+def check_reactions(bench: Bench) -> list[Finding]:
+    """One finding."""
+    return [_reactions(bench)]
+
+
+def _inapplicable(bench: Bench) -> str:
+    """Why the balance cannot be made up here, empty if it can."""
+    table = bench.layout.metadata.get("wrenches")
+    if table is None:
+        return "there are no joints between bodies"
+    if not bench.layout.projects:
+        return "derived with baumgarte="
+    if bench.mechanism.constraints:
+        return "constraint elements act on bodies too, and reactions contain only the joints"
+    plain = {s.coordinates[0] for s in bench.mechanism.joints if isinstance(s.joint, (*TURNING, Prismatic))}
+    loaded = {load.coordinate for terms in bench.kinematics.forces for load in terms.coordinate_loads}
+    loaded |= {s.coordinates[0] for s in bench.mechanism.joints if s.armature is not None}
+    if not loaded <= plain:
+        return f"forces act along {', '.join(sorted(loaded - plain))}, not about or along one fixed axis"
+    return ""
+
+
+def _reactions(bench: Bench) -> Finding:
+    """m a and the rate of angular momentum of each body against gravity, loads and what its joints exert on it."""
+    check, module = "reactions: every body in balance", bench.module
+    why = _inapplicable(bench)
+    if why:
+        return Finding.skipped(check, why)
+    found = Comparison(check)
+    labels = [f"{body} {part}" for body in bench.layout.bodies for part in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    for k, truth in enumerate(bench.truths):
+        case = truth.case
+        a = bench.rhs(case)[module.n_q :]
+        wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
+        missing, size = _unbalanced(bench, truth, a, wrenches)
+        found.add(k, missing, _limit(bench, k, truth, wrenches, size), size_of(size), labels)
+    return found.finding()
+
+
+def _limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
+    case, module = truth.case, bench.module
+    loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
+    grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)
+    limit = _inertia(truth) @ slack + grown * (size + np.repeat(loads, len(bench.layout.bodies), axis=0).ravel())
+    return np.asarray(limit)
+
+
+def force_limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray) -> float:
+    """What rounding allows the force in a joint at state k to be off by: it carries all bodies beyond it."""
+    a = bench.rhs(truth.case)[bench.module.n_q :]
+    _, size = _unbalanced(bench, truth, a, wrenches)
+    return float(_limit(bench, k, truth, wrenches, size).reshape(-1, 2, 3)[:, 0].sum())
+
+
+def _inertia(truth: Truth) -> np.ndarray:
+    """|wrench| (6 n_bodies, n_v) that a unit of each acceleration takes, about the bodies' origins."""
+    columns = []
+    for row in truth.virtual:
+        flat: list[float] = []
+        for body, w in zip(truth.bodies, row, strict=True):
+            force = bodies.scale(body.mass, w.at(body.arm))
+            moment = bodies.add(bodies.times(body.inertia, w.angular), bodies.cross(body.arm, force))
+            flat += [abs(float(x)) for x in (*force, *moment)]
+        columns.append(flat)
+    return np.array(columns).T.reshape(6 * len(truth.bodies), len(truth.virtual))
+
+
+def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about its origin that each body lacks (6 n_bodies,), and the size of the terms."""
+    rates = truth.body_rates([truth.mp.mpf(float(x)) for x in a])
+    total, size = np.zeros((len(truth.bodies), 6)), np.zeros((len(truth.bodies), 6))
+
+    def take(body: int, force: list[Number], moment: list[Number], arm: list[Number]) -> None:
+        whole = numbers([*force, *bodies.add(moment, bodies.cross(arm, force))])
+        total[body] += whole
+        parts = np.abs(whole).reshape(2, 3)
+        size[body] += np.repeat(parts.max(axis=1), 3)  # a vector turned from other axes is rounded as a whole
+
+    for k, (body, rate, w) in enumerate(zip(truth.bodies, rates, truth.twists, strict=True)):
+        acceleration = bodies.add(rate.at(body.arm), bodies.cross(w.angular, bodies.cross(w.angular, body.arm)))
+        spin = bodies.times(body.inertia, w.angular)
+        moment = bodies.add(bodies.times(body.inertia, rate.angular), bodies.cross(w.angular, spin))
+        take(k, bodies.scale(body.mass, acceleration), moment, body.arm)
+        take(k, bodies.scale(-body.mass, truth.gravity), [truth.zero] * 3, body.arm)
+    for body_index, arm, force, torque in truth.marker_loads():
+        take(body_index, bodies.scale(-1, force), bodies.scale(-1, torque), arm)
+    along = _along(truth, a)
+    for spec, wrench in zip(bench.mechanism.joints, wrenches, strict=True):
+        point = placed(truth, spec.successor, f"{spec.name} S").position
+        many = [truth.mp.mpf(float(x)) for x in wrench]
+        if spec.coordinates and spec.coordinates[0] in along:
+            axis = [row[2] for row in placed(truth, spec.predecessor, f"{spec.name} P").rotation]
+            own = bodies.scale(along[spec.coordinates[0]], axis)
+            many = bodies.add(
+                many, [*[truth.zero] * 3, *own] if isinstance(spec.joint, TURNING) else [*own, *[truth.zero] * 3]
+            )
+        for end, sign in ((spec.successor, -1), (spec.predecessor, 1)):
+            if end.body != GROUND:
+                arm = bodies.sub(point, truth.here[end.body].position)
+                take(end.body, bodies.scale(sign, many[:3]), bodies.scale(sign, many[3:]), arm)
+    return total.ravel(), _carried(truth, size).ravel()
+
+
+def _carried(truth: Truth, size: np.ndarray) -> np.ndarray:
+    """Sizes (n_bodies, 6) of the terms of all bodies about each origin: a joint carries what is beyond it."""
+    origins = np.array([numbers(pose.position) for pose in truth.here])
+    apart = np.linalg.norm(origins[:, None] - origins[None], axis=2)
+    forces, moments = size[:, :3].max(axis=1), size[:, 3:].max(axis=1)
+    whole = np.stack([np.full(len(size), forces.sum()), moments.sum() + apart @ forces], axis=1)
+    return np.repeat(whole, 3, axis=1)
+
+
+def _along(truth: Truth, a: Array) -> dict[str, Number]:
+    """Forces along joint coordinates, inertias of drives among them."""
+    total: dict[str, Number] = {}
+    for name, value in truth.coordinate_loads():
+        total[name] = total.get(name, truth.zero) + value
+    many = [truth.mp.mpf(float(x)) for x in a]
+    for name, inertia in truth.drives:
+        if name in truth.system.kinematics.velocity_labels:
+            bend = many[truth.system.kinematics.velocity_labels.index(name)]
+        else:
+            k = truth.system.kinematics.loop_coordinates.names.index(name)
+            bend = truth.bend(truth.measured, lambda s: truth.later(s, many))[k]
+        total[name] = total.get(name, truth.zero) - inertia * bend
+    return total
+
+
+# -- laws of reactions -------------------------------------------------------------------------------------------------
+
+# The forces are those that the equations of motion contain, in many digits.  They are held against their laws at the
+# reactions of :func:`~eomgen.analysis.reactions.reactions`, which are found from numbers, joint by joint.
+
+
+def check_reaction_laws(bench: Bench) -> list[Finding]:
+    """One finding, of models with such friction."""
+    laws = [terms for terms in bench.kinematics.forces if isinstance(terms.force, ReactionFriction)]
+    if not laws or bench.layout.metadata.get("wrenches") is None or not bench.layout.projects:
+        return []
+    found = Comparison("friction: laws at the joints' reactions")
+    specs = {spec.name: spec for spec in bench.mechanism.joints}
+    forces = [terms.force for terms in laws if isinstance(terms.force, ReactionFriction)]
+    loads = [load.value for terms in laws for load in terms.coordinate_loads]
+    for k, truth in enumerate(bench.truths):
+        case = truth.case
+        wrenches = reactions(bench.module, case.t, case.x, p=case.p, u=case.u)
+        carried = dict(zip(bench.layout.metadata["joint_names"], wrenches, strict=True))
+        loose = force_limit(bench, k, truth, wrenches)
+        acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
+        expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
+        limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(bench.layout.bodies)
+        found.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
+    return [found.finding()]
+
+
+def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndarray) -> tuple[float, float]:
+    """The force of a law at a reaction (ground axes), and how much it grows with that."""
+    axis = numbers([row[2] for row in placed(truth, spec.successor, f"{spec.name} S").rotation])
+    along = float(wrench[:3] @ axis)
+    across = float(np.linalg.norm(wrench[:3] - along * axis))
+    values = [_value(truth, force, *pair) for pair in ((across, along), (across + 1.0, along), (across, along + 1.0))]
+    grown = abs(values[1] - values[0]) + abs(values[2] - values[0])
+    return float(values[0]), float(grown)
+
+
+def _value(truth: Truth, force: ReactionFriction, across: float, along: float) -> Number:
+    kinematics, number = truth.system.kinematics, truth.mp.mpf
+    names = [reaction_symbol(kinematics.graph, force.joint, k).node[1] for k in range(3)]
+    carried = dict(zip(names, (number(across), truth.zero, number(along)), strict=True))
+    outputs = truth.system.evaluate(f"law of {force.name}", lambda: [_open(kinematics, force)], truth.values | carried)
+    return outputs[0]
+
+
+def _open(kinematics: Kinematics, force: ReactionFriction) -> Expr:
+    """The force of an element in terms of the state and of the joint's reaction."""
+    motion = copy(kinematics.motion)
+    motion.carried = {}
+    law = force.along(*force.path.measure(motion))
+    mapping = motion.derived_symbols(kinematics.mechanism, symbols_of([law]))
+    return substitute([law], mapping)[0] if mapping else law

@@ -1,0 +1,229 @@
+"""The same mechanism described differently -> how far its accelerations differ.
+
+Each change is a function of a Mechanism.  Coordinates keep their names and meaning, so the same state gives the same
+accelerations, by whatever method, target, frames of bodies and cuts of loops they were derived.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from functools import partial
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import pipeline
+from ..base.algebra import from_quaternion
+from ..elements.frames import GROUND, Frame, Marker
+from ..errors import EomgenError, ToolchainError
+from ..expr import vectors as vec
+from ..expr.core import copied
+from ..expr.vectors import Mat3, Vec3
+from ..mechanics.methods import METHODS
+from ..mechanics.topology import Topology, find_topology
+from ..model.mechanism import Body, Mechanism
+from ..reading.derivation import Derivation, derive_mechanism
+from ..runtime.bound_model import BoundModel
+from .check_bodies import true_accelerations
+from .finding import NOT_REACHED, Comparison, Finding, failed
+
+if TYPE_CHECKING:
+    from ..base.algebra import Array
+    from .bench import Bench
+    from .cases import Case
+
+SHIFT = 0.5  #: of the frames of bodies, in lengths of the model
+
+
+class NotApplicable(Exception):
+    """The change has no meaning for this model; the text says why."""
+
+
+def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Finding]:
+    """Every change that applies to a model, one finding each.
+
+    Parameters
+    ----------
+    bench : Bench
+    seconds : float
+        Time after which the changes that remain are left out, each with a note.
+    seed : int
+        Of the turns of frames, and of which joint is cut.
+    """
+    end = perf_counter() + seconds
+    target = bench.module.metadata.get("target", "numpy")
+    changes: dict[str, Callable[[], BoundModel]] = {
+        "body frames turned": partial(_turned, bench, seed),
+        "another joint cut": partial(_cut_another, bench, seed),
+        **{f"method {name}": partial(_derived, bench, name) for name in METHODS if name != bench.equations.method},
+        "target numpy": partial(_interpreted, bench, target),
+    }
+    found = []
+    for name, change in changes.items():
+        check = f"variants: {name}"
+        if perf_counter() > end:
+            found.append(Finding.skipped(check, f"{NOT_REACHED} in {seconds:g} s"))
+            continue
+        try:
+            found.append(_compared(bench, check, change()))
+        except (NotApplicable, ToolchainError) as why:
+            found.append(Finding.skipped(check, str(why)))
+        except (EomgenError, ArithmeticError, LookupError) as error:  # though the model itself was not refused
+            found.append(failed(check, error))
+    return found
+
+
+def _compared(bench: Bench, check: str, other: BoundModel) -> Finding:
+    """Accelerations of another module at the states of this one, against those found in many digits."""
+    found = Comparison(check)
+    if other.n_dof != bench.module.n_dof:
+        note = f"{other.n_dof} degrees of freedom instead of {bench.module.n_dof}"
+        return Finding(check, np.inf, 0.0, note=note)
+    for k, truth in enumerate(bench.truths):
+        try:
+            a, limit, size = true_accelerations(bench, k)
+        except ZeroDivisionError:
+            return Finding.skipped(check, "the system of accelerations and multipliers is singular")
+        case, names = truth.case, bench.layout.v
+        x = _state_of(bench, case, other)
+        rates = dict(zip(other.layout.v, other.rhs(case.t, x, p=case.p, u=case.u)[other.n_q :], strict=True))
+        shared = [i for i, name in enumerate(names) if name in rates]
+        actual = np.array([rates[names[i]] for i in shared])
+        found.add(k, actual - a[shared], limit[shared], size, [f"{names[i]}'" for i in shared])
+    return found.finding()
+
+
+def _state_of(bench: Bench, case: Case, other: BoundModel) -> Array:
+    """A state in the coordinates of another module, those of joints that are cut here among them."""
+    values = dict(zip(bench.module.x_names, case.x.tolist(), strict=True))
+    loops = bench.layout.loops
+    if loops:
+        cut = bench.call("loop_coordinates", case).reshape(3, -1)
+        for name, place, rate in zip(loops, *cut[:2].tolist(), strict=True):
+            values |= {name: place, f"{name}_dot": rate}
+    if lacking := [name for name in other.x_names if name not in values]:
+        raise NotApplicable(f"{', '.join(lacking)} cannot be told from the coordinates here")
+    return np.array([values[name] for name in other.x_names])
+
+
+def _made(mechanism: Mechanism, method: str) -> BoundModel:
+    derived = derive_mechanism(Derivation, mechanism, method)
+    return BoundModel(pipeline.compile_core(derived, "numpy", ["rhs"]))
+
+
+def _own(bench: Bench) -> Mechanism:
+    """The mechanism in a graph of its own."""
+    return copied(bench.mechanism)
+
+
+def _derived(bench: Bench, method: str) -> BoundModel:
+    if bench.mechanism.bare:
+        raise NotApplicable("the equations are given")
+    return _made(_own(bench), method)
+
+
+def _interpreted(bench: Bench, target: str) -> BoundModel:
+    if target == "numpy":
+        raise NotApplicable("the module is of target numpy itself; verify one of target cython")
+    return _made(_own(bench), bench.equations.method)
+
+
+# -- frames of bodies --------------------------------------------------------------------------------------------------
+def _turned(bench: Bench, seed: int) -> BoundModel:
+    """Every body's frame turned by any angle about any axis, and shifted."""
+    mechanism, random = _own(bench), np.random.default_rng(seed)
+    if not mechanism.bodies:
+        raise NotApplicable("there are no bodies")
+    graph, size = mechanism.graph, SHIFT * float(bench.module.metadata.get("length_scale") or 1.0)
+    places = {
+        k: Frame(
+            vec.matrix(graph, from_quaternion(*random.normal(size=4)).tolist()),
+            vec.vector(graph, (size * random.uniform(-1.0, 1.0, 3)).tolist()),
+        )
+        for k in range(len(mechanism.bodies))
+    }
+    bodies = tuple(_described_in(body, places[k]) for k, body in enumerate(mechanism.bodies))
+    made = _Moved(places).of(replace(mechanism, bodies=(), body_shapes=()))
+    return _made(replace(made, bodies=bodies), bench.equations.method)
+
+
+def _point(place: Frame, at: Vec3) -> Vec3:
+    """A point in the new axes."""
+    return vec.transpose_times(place.rotation, vec.sub(at, place.position))
+
+
+def _described_in(body: Body, place: Frame) -> Body:
+    """A body in other axes: R^T (c - d), R^T I R."""
+    back = vec.transpose(place.rotation)
+
+    def tensor(rows: Mat3) -> Mat3:
+        return vec.product(vec.product(back, rows), place.rotation)
+
+    return replace(
+        body,
+        com=_point(place, body.com),
+        inertia=tensor(body.inertia),
+        moment=None,
+        inertia_origin=None,
+        about=None if body.about is None else _point(place, body.about),
+        plane=None if body.plane is None else vec.times(back, body.plane),
+    )
+
+
+class _Moved:
+    """Whatever holds markers -> the same with the markers of turned bodies where they were."""
+
+    def __init__(self, places: Mapping[int, Frame]) -> None:
+        self.places = places
+
+    def of(self, x: Any) -> Any:
+        if isinstance(x, Marker):
+            return self._marker(x)
+        if isinstance(x, tuple):
+            parts = [self.of(part) for part in x]
+            return tuple.__new__(type(x), parts) if any(a is not b for a, b in zip(parts, x, strict=True)) else x
+        if isinstance(x, dict):
+            return {key: self.of(part) for key, part in x.items()}
+        if is_dataclass(x) and not isinstance(x, type):
+            held = {f.name: getattr(x, f.name) for f in fields(x)}
+            changed = {name: new for name, old in held.items() if (new := self.of(old)) is not old}
+            return replace(x, **changed) if changed else x
+        return x
+
+    def _marker(self, marker: Marker) -> Marker:
+        if marker.body == GROUND:
+            return marker
+        place, frame = self.places[marker.body], marker.frame
+        turn = vec.product(vec.transpose(place.rotation), frame.rotation)
+        return replace(marker, frame=Frame(turn, _point(place, frame.position)))
+
+
+# -- cuts --------------------------------------------------------------------------------------------------------------
+def _cut_another(bench: Bench, seed: int) -> BoundModel:
+    """Of a loop another joint is cut: the only one of it whose coordinates the user did not name."""
+    mechanism, topology = _own(bench), bench.kinematics.topology
+    joints = mechanism.joints
+    able = [k for cut in topology.cut for k in _way_round(mechanism, topology, cut) if joints[k].joint.role == "either"]
+    for chosen in np.random.default_rng(seed).permutation(able).astype(int).tolist():
+        named = tuple(replace(joint, named=k != chosen) for k, joint in enumerate(joints))
+        made = replace(mechanism, joints=named, independent=())
+        if chosen in find_topology(made).cut:
+            return _made(made, bench.equations.method)
+    raise NotApplicable("no loop has another joint that can be cut")
+
+
+def _way_round(mechanism: Mechanism, topology: Topology, cut: int) -> list[int]:
+    """The joints of the tree between the ends of a cut joint."""
+    above = {branch.body: branch for branch in topology.branches}
+
+    def down(body: int) -> list[int]:
+        found = []
+        while body != GROUND:
+            found.append(above[body].joint)
+            body = above[body].parent
+        return found
+
+    first, second = (down(end.body) for end in (mechanism.joints[cut].predecessor, mechanism.joints[cut].successor))
+    return [k for k in (*first, *second) if (k in first) != (k in second)]

@@ -1,0 +1,158 @@
+"""A module, or a model and its module -> everything that was compared, in one table.
+
+The order is: what the module says of itself; then, where the equations it was made from are there, the graph, the free
+bodies, constraints, derivatives and runs; then what concerns the model as it was described.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.limits.numbers import EPS
+from ..base.limits.runs import MOST_STATES
+from ..base.texts import shown
+from ..base.value_rules import read_count
+from ..errors import EomgenError, off_range
+from ..runtime.runs.events import told_by_the_caller
+from .cases import random_cases
+from .finding import Finding, Verification, failed
+from .identities import identities, jacobians
+
+if TYPE_CHECKING:
+    from ..reading.derivation import Derivation
+    from ..runtime.bound_model import BoundModel
+    from .cases import Case
+
+STATES = 6  #: random states
+SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
+#: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
+GROUPS = (  #: group of checks -> the file with its function
+    dict.fromkeys(("kernels",), "check_kernels")
+    | dict.fromkeys(("bodies", "joints", "reactions", "reaction_laws"), "check_bodies")
+    | dict.fromkeys(("constraints", "derivatives"), "check_kernels")
+    | {"runs": "check_runs"}
+)
+KINEMATIC = ("kernels", "constraints")  #: of models without inertia
+
+
+def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
+    """Compare this module with several independent calculations.
+
+    Parameters
+    ----------
+    states : int
+        Number of random states on the constraints, near the declared initial position.
+    seed : int
+        Of the states.
+    seconds : float
+        Time for all checks.  Variants (the same mechanism described differently) get the time that is left, and at
+        least 2 s; variants for which no time is left are counted.
+
+    Returns
+    -------
+    Verification
+        ``ok``, ``table``, ``findings``, ``breaches``; printed, it is a table of the worst figures, their limits and
+        where they are.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close at the declared initial values.
+    MissingDependencyError
+        mpmath or SciPy is not installed.
+    UsageError
+        ``states``, ``seed`` or ``seconds`` is not a valid number.
+
+    Notes
+    -----
+    A module that was compiled here is compared with its graph, with the graph in 50 digits, with Newton's and
+    Euler's equations of every body, with SciPy and with variants of its mechanism.  One of an exported package is
+    compared with itself, and by ``python -m NAME.selftest`` with what was recorded when it was generated.
+    """
+    states, seed = _read(states, seed, seconds)
+    start = perf_counter()
+    with told_by_the_caller():
+        found = _of_module(module, states, seed, start + seconds)
+    return Verification(module.name, tuple(found), perf_counter() - start)
+
+
+def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
+    """The number of states and the seed; what is none, or no time, is refused."""
+    if (
+        isinstance(seconds, bool)
+        or not isinstance(seconds, int | float | np.integer | np.floating)
+        or not seconds >= 0.0
+    ):
+        raise off_range(f"verify: seconds must be the time for all checks, a number of 0 or more, not {shown(seconds)}")
+    most = read_count("verify: states, the number of random states,", states, 1, MOST_STATES)
+    return most, read_count("verify: seed, of the random states,", seed)
+
+
+def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[Finding]:
+    """What the module says of itself, and what follows from its equations."""
+    if not module.n_x:
+        return _of_fixed_bodies(module)
+    cases = random_cases(module, states, seed)
+    found = identities(module, cases)
+    equations = getattr(module, "equations", None)
+    if equations is None:
+        found += jacobians(module, cases)
+        why = "they need the equations, and a package does not contain them: verify the model that it was made from"
+        found.append(Finding.skipped("graph, free bodies, derivatives, runs, variants", why))
+    else:
+        found += _with_equations(module, equations, cases, seed, end)
+    return found
+
+
+def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
+    """Of a model without coordinates: its poses."""
+    R = module.poses(np.empty(0))[:, :3, :3]
+    worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
+    why = "the model has no coordinate: its bodies are fixed to ground"
+    return [
+        Finding("poses: rotation matrices are orthonormal", worst, 16.0 * EPS, cases=1),
+        Finding.skipped("all that moves", why),
+    ]
+
+
+def _only_in_c(equations: Derivation | None) -> str:
+    """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
+    functions = equations.kinematics.graph.functions.values() if equations is not None else ()
+    blind = [function.name for function in functions if function.evaluator is None]
+    return f"{', '.join(blind)} is C code without a Python version, so nothing else can evaluate it" if blind else ""
+
+
+def _with_equations(
+    module: BoundModel, equations: Derivation, cases: list[Case], seed: int, end: float
+) -> list[Finding]:
+    """All groups, and variants until a time; one that cannot be carried out fails."""
+    why = _only_in_c(equations)
+    if why:
+        return [Finding.skipped("graph, free bodies, derivatives, runs, variants", why)]
+    from ..mechanics.methods.positive import FREE, note_lost_digits, smallest_share
+    from .bench import Bench
+
+    bench, found = Bench(module, equations, cases), []
+    parts = equations.kinematics, equations.mobility, equations.tree
+    idle = module.metadata.get("no_inertia")
+    if idle:
+        why = f"the model is for kinematics only: {idle}"
+        found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs, variants", why))
+    elif equations.method not in FREE and (note := note_lost_digits(*parts)):
+        share = smallest_share(*parts)
+        found.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
+    for group in KINEMATIC if idle else GROUPS:
+        check = getattr(import_module(f"{__package__}.{GROUPS[group]}"), f"check_{group}")
+        try:
+            found += check(bench)
+        except (EomgenError, ArithmeticError) as error:
+            found.append(failed(f"checks of {group}", error))
+    if not idle:
+        from .variants import variant_findings
+
+        found += variant_findings(bench, max(LEAST, end - perf_counter()), seed)
+    return found
