@@ -51,6 +51,7 @@ _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "api.loading"
 #: For annotations: what calls return, so no name that a misspelt one stands for.
 _TYPES = {"Equations": "api.equations", "Module": "module", "Trajectory": "runtime.trajectory"}
 _HOMES |= _TYPES
+_MODULES = {"errors": ".errors", "rotations": ".elements.rotations"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
@@ -94,8 +95,8 @@ __all__ = [
 
 def _late(name: str) -> Any:
     """Load a public name on first use (PEP 562)."""
-    if name == "errors":
-        return import_module(".errors", __name__)
+    if name in _MODULES:
+        return import_module(_MODULES[name], __name__)
     home = _HOMES.get(name)
     if home is None:
         near = (

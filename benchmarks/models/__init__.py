@@ -10,7 +10,7 @@ import numpy as np
 
 import eomgen as eg
 
-from .measure import ROOT
+from ..measure import ROOT
 
 HERE = Path(__file__).parent
 EXAMPLES = ROOT / "examples"

@@ -176,21 +176,6 @@ class ElementMethods(Described):
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
         formula: str | None = None, normal_law: str | None = None, damping: Value = None) -> ForceHandle:
         """Add elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both."""
-    def muscle(self, name: str, a: Any, b: Any, activation: Value = None, force_max: Value = None,
-        fiber_length: Value = None, slack_length: Value = None, velocity_max: Value = None, pennation: Value = 0,
-        damping: Value = 0.1, via: Sequence[Any] | None = None, excitation: Value = None,
-        activation_time: Value = 0.015, deactivation_time: Value = 0.06) -> ForceHandle:
-        """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
-    def creep(self, name: str, track: Any, wheel: Any, radius: Value, longitudinal: Value, lateral: Value,
-        lateral_spin: Value = 0, spin: Value = 0, speed: Value = None, creep_law: str | None = None,
-        normal: Value = None, friction: Value = None) -> ForceHandle:
-        """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
-    def tyre(self, name: str, road: Any, wheel: Any, radius: Value, stiffness: Value, relaxation: Sequence[Value],
-        damping: Value = 0, settling: Value = 0, reversal: Value = 0.1, axis: str | Sequence[float] | None = None,
-        rolling_radius: Value = None, law: str | None = None, slip_stiffness: Value = None, friction: Value = None,
-        half_length: Value = None, shifts: bool | None = None) -> ForceHandle:
-        """Add a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the
-        wheel."""
     def point_plane(self, name: str, a: Any, b: Any, stiffness: Value, exponent: Value = 1.5, dissipation: Value = None,
         restitution: Value = None, velocity: Value = None, formula: str | None = None, friction: Value = None,
         static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None,
@@ -227,6 +212,21 @@ class ElementMethods(Described):
         reversal: Value = 0.01, settling: Value = 0.001, recovery: Value = None,
         lateral: bool | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
+    def muscle(self, name: str, a: Any, b: Any, activation: Value = None, force_max: Value = None,
+        fiber_length: Value = None, slack_length: Value = None, velocity_max: Value = None, pennation: Value = 0,
+        damping: Value = 0.1, via: Sequence[Any] | None = None, excitation: Value = None,
+        activation_time: Value = 0.015, deactivation_time: Value = 0.06) -> ForceHandle:
+        """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
+    def creep(self, name: str, track: Any, wheel: Any, radius: Value, longitudinal: Value, lateral: Value,
+        lateral_spin: Value = 0, spin: Value = 0, speed: Value = None, creep_law: str | None = None,
+        normal: Value = None, friction: Value = None) -> ForceHandle:
+        """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
+    def tyre(self, name: str, road: Any, wheel: Any, radius: Value, stiffness: Value, relaxation: Sequence[Value],
+        damping: Value = 0, settling: Value = 0, reversal: Value = 0.1, axis: str | Sequence[float] | None = None,
+        rolling_radius: Value = None, law: str | None = None, slip_stiffness: Value = None, friction: Value = None,
+        half_length: Value = None, shifts: bool | None = None) -> ForceHandle:
+        """Add a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the
+        wheel."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
         releases: Any = None, stabilisation: Value = 10) -> ConstraintHandle:

@@ -25,7 +25,8 @@ from ..elements.kinds import PLACED as PLACED
 from ..elements.solids import SOLIDS
 from .mechanism import Simulation
 
-FORCES |= CONTACTS
+# Contact stands before muscles, creep and tyres in lists of types.
+FORCES |= CONTACTS | {name: FORCES.pop(name) for name in ("muscle", "creep", "tyre")}
 
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4", "moreau")
 FIXED_STEP = ("RK4", "moreau")  #: methods whose steps are of one size

@@ -219,7 +219,7 @@ class Named(NamedTuple):
             return cls(name, element)
         if name == REACTION or (name == WRENCH and (given or part)):
             return cls._wrench(name, element, given, part)
-        if not element or "." in element or given or part:
+        if not element or given or part:
             raise ExpressionError(f"{name}() takes the name of one force element", 0, f"write {name}(spring_1)")
         return cls(name, element)
 
@@ -253,7 +253,7 @@ class Named(NamedTuple):
             message = f"{WRENCH}({element}).{part} does not say on which body the element acts"
             raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{part}")
         missing = name == WRENCH and "on" not in given
-        if not element or "." in element or missing or "" in given.values() or not given.keys() <= {*keywords}:
+        if not element or missing or "" in given.values() or not given.keys() <= {*keywords}:
             owner = "joint" if name == REACTION else "element"
             raise ExpressionError(f"{what} is that of one {owner}", 0, _WRITE[name])
         if part not in parts:

@@ -18,11 +18,7 @@ from .stops import JointStop
 from .tyres import Tyre
 
 FORCES: Types = {}
-_HOMES = (
-    *(actuators, springs, laws, bushing, attraction, friction, stops, muscle, creep),
-    tyres,
-)
-for _home in _HOMES:
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, muscle, creep, tyres):
     FORCES |= _home.TYPES
 
 __all__ = [
