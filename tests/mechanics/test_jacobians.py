@@ -126,7 +126,7 @@ CASES: dict[str, Callable[[], eg.Model]] = {
 }
 
 
-ALWAYS_IN_C = {"spatial chain", "rods held twice", "slider-crank"}
+ALWAYS_IN_C = {"spatial chain"}
 
 
 def on_constraints(module: Any, seed: int, t: float) -> np.ndarray:

@@ -206,7 +206,7 @@ def top() -> Any:
     m.free("fly", m.ground, body, rotation="euler_parameters")
     law = {"normal_law": "linear", "stiffness": STIFFNESS, "damping": 1.0, "friction": 0.3, "smoothing": 0.1}
     m.sphere_plane("floor", m.ground, body, radius=R, **law)
-    return m.compile()
+    return m.compile(target="numpy")
 
 
 def threshold(gamma: float) -> float:

@@ -136,7 +136,7 @@ def biped() -> Any:
             f"step_{name}", m.ground, f"leg_{name}.foot", axes="xy", closed=name == "a", releases=f"step_{other}",
             closes=f"y(leg_{name}.foot) if {ahead} > 0.3 else 1",
         )  # fmt: skip
-    return m.compile(optimize=0)
+    return m.compile(target="numpy")
 
 
 def start_of(stance: float, swing: float, stance_rate: float, swing_rate: float) -> dict[str, float]:

@@ -32,7 +32,7 @@ def bounces(e: float, end: float) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def bouncing() -> Any:
-    return compiled("hopper_with_apex", "cython")
+    return compiled("hopper_with_apex")
 
 
 @pytest.mark.parametrize("method", METHODS)
