@@ -17,7 +17,7 @@ from eomgen.toolchain.native import find_native
 
 CACHE = pytest.StashKey[str]()
 #: Most builds in C in the shared cache by ``make test``, beside the 20 of tests that have caches of their own.
-BUILDS = 155
+BUILDS = 150
 QUICK = pytest.StashKey[set[str]]()
 #: What ``--quick`` runs a folder of tests for: the packages of eomgen that it guards.
 ROOMS = {

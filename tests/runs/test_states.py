@@ -306,7 +306,7 @@ def lag(events: bool = False, tau: float = 0.5) -> eg.Model:
 
 
 @cache
-def lag_module(target: str = "cython", events: bool = False) -> Any:
+def lag_module(target: str = "numpy", events: bool = False) -> Any:
     return lag(events).compile(target=target, **(IN_C if target == "cython" else {}))
 
 
@@ -353,7 +353,7 @@ def with_events(parameters: dict[str, float] | None = None, start: tuple[float, 
     return np.asarray(solve_ivp(lambda t, x: A @ x, (first.t[-1], 3), x, **tight).y[:, -1])
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_events_see_states_and_reset_them(target: str) -> None:
     traj = lag_module(target, events=True).simulate(3.0, rtol=1e-10, atol=1e-12)
     assert [len(times) for times in traj.t_events] == [1, 2]
