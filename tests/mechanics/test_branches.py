@@ -84,6 +84,7 @@ def slider_crank(target: str) -> Any:
     m.revolute("C", rod.at(1, 0, 0), slider)
     m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
     m.guess(th=0.5, b=-1.0, s=1.8)
+    m.output("acceleration", "th_ddot")
     return m.compile(target=target)
 
 
@@ -109,6 +110,17 @@ def test_a_slider_crank_of_equal_arms_runs_on_both_branches(s_dot: float, law: A
     )  # fmt: skip
     assert abs(run["th"][-1] - found.y[0, -1]) < 1e-8
     assert abs(run["th_dot"][-1] - found.y[1, -1]) < 1e-7
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("s_dot", "law"), [(-4.0, mirrored), (0.0, together)])
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-5, 0.1])
+def test_outputs_follow_the_branch_too(off: float, s_dot: float, law: Any, target: str) -> None:
+    mod, turn = slider_crank(target), s_dot / 4.0
+    x = mod.project([np.pi / 2 + off, -np.pi + 2 * off * turn, 2 * np.sin(off) * turn, 2.0, s_dot, s_dot * np.cos(off)])
+    expected = law(np.pi / 2 + off, 2.0)
+    assert mod.rhs(0.0, x)[3] == pytest.approx(expected, rel=1e-5, abs=1e-11)
+    assert mod.outputs(0.0, x) == pytest.approx([expected], rel=1e-5, abs=1e-11)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -209,6 +221,16 @@ def test_it_is_refused(method: str, target: str, scales: tuple[float, ...], angl
         mod.rhs(0.0, x)
     with pytest.raises((eg.PartitionError, eg.UnsolvedError)):
         mod.jacobian(0.0, x)
+
+
+@pytest.mark.parametrize("angle", [1e-8, 1e-7, 1e-6])
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("method", ["augmented", "newton_euler"])
+def test_a_position_closed_by_rounding_alone_is_refused(method: str, target: str, angle: float) -> None:
+    """One crank at half the angle of the other: the loop is open by less than rounding, no motion keeps it closed."""
+    mod = parallelograms((1.0,), method, target)
+    with pytest.raises((eg.PartitionError, eg.UnsolvedError)):
+        mod.rhs(0.0, mod.x0(at(0, angle, 0.5)))
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])

@@ -52,14 +52,14 @@ FAULTS = (
         "p * b[1] - r * b[0]",
         "p * b[1] + r * b[0]",
         "straight-line loops: Cramer's rule with a wrong sign",
-        "tests/code/test_accelerations.py::test_accelerations_are_those_with_multipliers[freedoms]",
+        "tests/mechanics/test_published_loops.py::test_initial_position_and_accelerations[embedding]",
     ),
     Fault(
         "straight-sound", "LoopBlocks.all_of",
         'condition if sound == self.terms.graph.one else self.terms.graph.apply("and", sound, condition)',
         "self.terms.graph.one",
         "straight-line loops: a bad partition is not told",
-        "tests/code/test_accelerations.py::test_a_dead_centre_matters_where_the_set_is_fixed[embedding]",
+        "tests/mechanics/test_change_points.py::test_in_every_method[recursive-cython]",
     ),
     Fault(
         "bodies-wrench", "LoopSlopes._changed",

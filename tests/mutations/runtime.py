@@ -45,6 +45,13 @@ FAULTS = (
         "module.project(after, t=t, u=forcing(t, after))",
         "after",
         "a reset state is not brought back onto the loops",
+        "tests/runs/test_sensitivities.py::test_mechanisms_against_differences",
+    ),
+    Fault(
+        "c-reset-projection", "C apply_resets",
+        "EOMGEN_PROJECTS(ev)",
+        "!EOMGEN_PROJECTS(ev)",
+        "a run in C does not bring a reset state back onto the loops",
         "tests/runs/test_events.py::test_a_reset_in_a_loop_is_brought_back_onto_it[numpy]",
     ),
     Fault(
