@@ -16,13 +16,15 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.analyses import NEAREST
-from ..base.limits.constraints import ACCEPTED, EXACT, GENTLE
+from ..base.limits.constraints import ACCEPTED
 from ..base.limits.constraints import STATE as RANK
 from ..base.names import hint, joined
+from ..base.numeric.assembly import ClosureSystem, close, closed
 from ..base.numeric.projection import largest, least
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
 from ..runtime.argument_checks import read_names, read_number, read_numbers
+from ..runtime.kernels import constraint_system
 from ..runtime.layout import Layout
 
 if TYPE_CHECKING:
@@ -31,7 +33,8 @@ if TYPE_CHECKING:
 STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
 CLOSING = 25  #: Newton steps onto the constraints, at most
 PASSES = 30  #: of the linear correction of velocities, at most
-DAMPING = 0.5  #: largest scaled step
+LONGEST = 0.5  #: scaled step along the constraints
+DAMPING = 1.0  #: of the first step onto the constraints: far away it goes down the steepest way and stays near
 
 
 @np.errstate(all="ignore")
@@ -134,14 +137,6 @@ def _metric(
     return np.diag(np.sqrt(factors) / layout.scales.q)
 
 
-def _move(layout: Layout, q: Array, d: Array) -> Array:
-    return q + d if layout.space is None else layout.space.move(q, d)
-
-
-def _difference(layout: Layout, a: Array, b: Array) -> Array:
-    return a - b if layout.space is None else layout.space.difference(a, b)
-
-
 def _positions(
     module: BoundModel, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
 ) -> Array:
@@ -158,45 +153,24 @@ def _positions(
     if not n_h:
         return start
     L = _metric(module, start, t, weights, layout.velocity_labels)[np.ix_(free, free)]
-    scales = layout.scales
+    scales, metric = layout.scales, np.zeros((layout.n_v, len(L)))
+    metric[free] = algebra.inv(L.T) / scales.q[free, None]
+    system = ClosureSystem(constraint_system(module.kernels).at(t).position, scales, free.astype(float))
 
-    def rows(q: Array) -> tuple[Array, Array]:
-        C_q = module.kernels.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
-        return module.constraints(q, t=t, rows="all") / scales.c[:n_h], algebra.solve(L, C_q.T).T
-
-    def moved(q: Array, y: Array) -> Array:
-        step = np.zeros(layout.n_v)
-        step[free] = algebra.solve(L.T, y)
-        longest = largest(step / scales.q)
-        return _move(layout, q, step * min(1.0, DAMPING / longest) if longest else step)
-
-    def close(q: Array) -> Array | None:
+    def nearest(q: Array) -> Array | None:
         """The nearest closed position to first order, None if there is none near by."""
-        before = np.inf
-        for _ in range(CLOSING):
-            C, J = rows(q)
-            size = largest(C)
-            if size <= EXACT or (size <= ACCEPTED and size > 0.5 * before):
-                return q
-            if not np.isfinite(size) or not J.any():
-                return None
-            sizes = np.linalg.norm(J, axis=1)
-            sizes = np.where(sizes > RANK * sizes.max(), sizes, np.inf)
-            alike = J / sizes[:, None]  # in any metric, so that the Tikhonov term weighs all rows in the same way
-            G = alike @ alike.T
-            G += max(GENTLE, size) * G.diagonal().max() * np.eye(len(G))  # rows may depend on each other when closed
-            q, before = moved(q, -alike.T @ algebra.solve(G, C / sizes)), size
-        return None
+        q, residual = close(system, q, CLOSING, DAMPING, metric)
+        return q if closed(residual) else None
 
     def change(q: Array) -> Array:
-        return np.asarray(L.T @ _difference(layout, q, start)[free])
+        return np.asarray(L.T @ (scales.q * scales.distance(q, start))[free])
 
-    q = close(start)
+    q = nearest(start)
     if q is None and not held:  # the metric leads astray far from the constraints: begin at the projection
-        q = close(np.asarray(module.project(np.concatenate([start, np.zeros(layout.n_v)]), t=t))[: layout.n_q])
+        q = nearest(np.asarray(module.project(np.concatenate([start, np.zeros(layout.n_v)]), t=t))[: layout.n_q])
     if q is None:
         kept = f" with {', '.join(held)} held" if held else ""
-        C, _ = rows(start)
+        C = system.evaluate(start)[0]
         worst = layout.constraint_labels[int(np.abs(C).argmax())]
         raise ProjectionError(
             f"no consistent position was found{kept}: in the state given, the residual of the constraint {worst} is "
@@ -204,14 +178,14 @@ def _positions(
         )
     share = 1.0
     for _ in range(STEPS if free.any() else 0):
-        _, J = rows(q)
-        _, sizes, Vt = algebra.svd(J, full_matrices=False)
+        _, sizes, Vt = algebra.svd(system.evaluate(q)[1] @ metric, full_matrices=False)
         across = Vt[sizes > RANK * sizes[0]]
         y = change(q)
         slope = y - across.T @ (across @ y)
-        if largest(algebra.solve(L.T, slope) / scales.q[free]) <= NEAREST:
+        step = -share * (metric @ slope)
+        if largest(step) <= share * NEAREST:
             break
-        trial = close(moved(q, -share * slope))
+        trial = nearest(scales.move(q, step * min(1.0, LONGEST / largest(step))))
         if trial is not None and float(change(trial) @ change(trial)) < float(y @ y):
             q, share = trial, min(1.0, 2.0 * share)
         elif share < NEAREST:

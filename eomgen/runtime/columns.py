@@ -312,8 +312,3 @@ def _residuals(
         correction_position=largest(correction[:n]),
         correction_velocity=largest(correction[n:]),
     )
-
-
-def units_of(module: BoundModel, names: Sequence[str]) -> dict[str, str]:
-    """Units of columns, of those that have one."""
-    return {name: module.layout.unit(name) for name in ("t", *names) if module.layout.unit(name)}

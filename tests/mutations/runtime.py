@@ -112,8 +112,8 @@ FAULTS = (
     ),
     Fault(
         "sensitivity-start", "start_sensitivity",
-        "other[lines] + E[lines, :n_q] @ dq",
-        "other[lines]",
+        "other + E[:, :n_q] @ dq",
+        "other",
         "sensitivities at the start: velocities do not follow the position",
         "tests/runs/test_sensitivities.py::test_the_start_follows_the_parameters",
     ),
@@ -239,9 +239,9 @@ FAULTS = (
     ),
     Fault(
         "sensitivity-scales", "start_sensitivity",
-        "dv = scales.q[:, None] * _solve(rows, right, n_v, count, columns)",
-        "dv = _solve(rows, right, n_v, count, columns)",
-        "sensitivities of velocities at the start are not scaled back",
+        "scales.q[:, None] * _solve(rows, right, n_v, count, columns)",
+        "_solve(rows, right, n_v, count, columns)",
+        "sensitivities at the start are not scaled back",
         "tests/runs/test_sensitivities.py::test_the_start_follows_the_parameters",
     ),
     Fault(

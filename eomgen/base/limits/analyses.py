@@ -74,8 +74,6 @@ NULL = 1e-13
 #: Scaled distance by which an interpolant across a singular position may miss a position on it: seven times the error
 #: of its rates there.
 ASTRAY = 1e-5
-#: Scaled way to either side over which the rate of a led coordinate is differenced where it turns back.
-EXTREME = 1e-4
 #: Part of a path in time over which constraints are differenced at a position that stands still: the root of rounding.
 DRIFTED = 1e-6
 #: Scaled distance (rad, lengths) between a guess and a closed position that lie beside each other: angles then turn

@@ -92,11 +92,14 @@ class ClosureSystem(NamedTuple):
         return e, J * self.free
 
 
-def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | None = DAMPING) -> tuple[Array, float]:
+def close(
+    system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | None = DAMPING, metric: Array | None = None
+) -> tuple[Array, float]:
     """Minimise the scaled residual from q.
 
     Damping at first: 0 where q is near a closed position, so that directions that hardly count do not creep; None for
-    steps of least squares, which keep all digits beside singular positions and may lead far away from them.
+    steps of least squares, which keep all digits beside singular positions and may lead far away from them.  Steps are
+    the least ones, or the least combinations of the columns of a ``metric`` (n, k) of scaled motions.
 
     Returns
     -------
@@ -111,16 +114,17 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | 
         size = largest(e)
         if size <= EXACT or not np.isfinite(size):
             break
-        steepness = np.sqrt((J * J).sum(axis=1))
-        weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
+        K = J if metric is None else J @ metric
+        steepness = np.sqrt((K * K).sum(axis=1))
+        weights = 1.0 / np.where(steepness > (STEEP if metric is None else 0.0), steepness, 1.0)
         # far from closed, lengths are measured by the distance: angles would turn in circles over it
         far = remoteness(e, steepness)
-        unit = np.where(long, 4.0 * far, 1.0) if long is not None and far > FAR else np.ones_like(system.scales.q)
-        K, f = J * weights[:, None] * unit, e * weights
+        unit = np.where(long, 4.0 * far, 1.0) if long is not None and far > FAR and metric is None else 1.0
+        K, f = K * weights[:, None] * unit, e * weights
         top = float((K * K).sum(axis=1).max(initial=0.0))
         if top == 0.0 or largest(K.T @ f) <= EXACT * top:
             break  # nothing that may move makes a difference
-        dz = _step(K, f, damping, top)
+        dz = _step(K, f, damping, top) if metric is None else metric @ _step(K, f, damping, top)
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from ...errors import AssemblyError
 from .. import algebra
 from ..algebra import Array
 from ..limits.analyses import BLOCKED, DRIFTED, LEAPS, NULL, UNJUDGED
+from ..limits.numbers import EPS
 from .assembly import DAMPING, ClosureSystem, ConstraintSystem, close, closed
 from .projection import largest
 from .scales import Scales
@@ -55,11 +56,6 @@ class PositionCurve(Protocol):
         """The point next to a guess; None if Newton's iteration finds none."""
 
 
-def predict(scales: Scales, here: Point, bend: Array, h: float) -> Array:
-    """The position a step h ahead, from the direction and its change ``bend`` along s."""
-    return scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / scales.q)
-
-
 def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
     """Positions (n_q, k) at parameters s (k,) between points of a curve, cubics through them and their directions."""
     if len(points) == 1:
@@ -76,48 +72,6 @@ def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
     for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
         result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
     return result
-
-
-# -- singular positions ------------------------------------------------------------------------------------------------
-
-
-def leap(curve: PositionCurve, points: Sequence[Point], here: Point) -> Point | None:
-    """A point behind a singular position that continues the motion smoothly; None if there is none."""
-    scales = curve.scales
-    for size in LEAPS:
-        near = _behind(curve, points, here, size)
-        if near is None:
-            continue
-        rate = largest(near.tangent.rate / scales.q)
-        gap = here.s - near.s
-        s = here.s + gap
-        other = _behind(curve, points, here, 2.0 * size)
-        bend = np.zeros_like(near.tangent.rate)
-        if other is not None and near.s > other.s:
-            bend = (near.tangent.rate - other.tangent.rate) / (near.s - other.s)
-        ahead = predict(scales, near, bend, 2.0 * gap)
-        found = curve.solve(s, ahead)
-        if found is None or rate == 0.0:
-            continue
-        move = largest(scales.distance(found.q, near.q))
-        off = largest(scales.distance(found.q, ahead))
-        turned = 2.0 * gap * largest((found.tangent.rate - near.tangent.rate - 2.0 * gap * bend) / scales.q)
-        if off <= OFF * move and turned <= TURNED * move and move <= 10.0 * size:
-            return found
-    return None
-
-
-def _behind(curve: PositionCurve, points: Sequence[Point], here: Point, size: float) -> Point | None:
-    """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
-    scales = curve.scales
-    for point in reversed(points):
-        distance = largest(scales.distance(here.q, point.q))
-        if distance >= size:
-            part = size / distance
-            s = here.s - part * (here.s - point.s)
-            guess = scales.move(here.q, part * scales.distance(point.q, here.q))
-            return curve.solve(s, guess) or point
-    return None
 
 
 # -- continuation ------------------------------------------------------------------------------------------------------
@@ -172,12 +126,12 @@ class Continuation:
             rate = largest(here.tangent.rate / self.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)
-            found = self.forward(here, h, end if h == left else here.s + h)
+            found = self.forward(-1, h, end if h == left else here.s + h)
             if found is None:
                 self.step = 0.5 * h
                 if self.step > BLOCKED * max(1.0, abs(here.s)):
                     continue
-                found = self._leap(here)
+                found = self._leap()
                 if found is None:
                     self.blocked = True
                     return False
@@ -197,10 +151,12 @@ class Continuation:
         part = (end - before.s) / (last.s - before.s)
         return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
 
-    def forward(self, here: Point, h: float, s: float) -> Point | None:
-        """One step, None if it fails or is not a smooth continuation."""
-        bend = self._bend(here)
-        ahead = predict(self.scales, here, bend, h)
+    def forward(self, k: int, h: float, s: float) -> Point | None:
+        """One step from a point, None if it fails or is not a smooth continuation."""
+        here, before = self.points[k], self.points[max(k - 1, -len(self.points))]
+        turned, gap = here.tangent.rate - before.tangent.rate, here.s - before.s
+        bend = turned / gap if gap > 0.0 else np.zeros_like(turned)  # the second derivative along s
+        ahead = self.scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / self.scales.q)
         if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
             return None
         found = self.curve.solve(s, ahead)
@@ -208,24 +164,29 @@ class Continuation:
             return None
         off = largest(self.scales.distance(found.q, ahead))
         move = largest(self.scales.distance(found.q, here.q))
-        turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
-        worst = largest(np.array([off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED)]))
+        turn = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
+        worst = largest(np.array([off / max(OFF * move, UNJUDGED), turn / max(TURNED * move, UNJUDGED)]))
         if not (worst <= 1.0 and move <= JUMP):
             return None
         if h >= 0.999 * self.step:
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
         return found
 
-    def _leap(self, here: Point) -> Point | None:
-        """The point behind a singular position."""
+    def _leap(self) -> Point | None:
+        """A point behind a singular position, as far from it as one before it, that continues the motion smoothly."""
+        here = self.points[-1]
+        for size in LEAPS:
+            away = (k for k in range(-2, -len(self.points) - 1, -1) if self._moved(k) >= size)
+            if (k := next(away, None)) is not None:
+                gap = here.s - self.points[k].s
+                found = self.forward(k, 2.0 * gap, here.s + gap)
+                if found is not None and self._moved(k) > 0.0:
+                    return found
+        return None
 
-        return leap(self.curve, self.points, here)
-
-    def _bend(self, here: Point) -> Array:
-        """Second derivative along s, from the point before."""
-        before = self.points[max(len(self.points) - 2, 0)]
-        change, gap = here.tangent.rate - before.tangent.rate, here.s - before.s
-        return change / gap if gap > 0.0 else np.zeros_like(change)
+    def _moved(self, k: int) -> float:
+        """Scaled distance of a point from the last one."""
+        return largest(self.scales.distance(self.points[-1].q, self.points[k].q))
 
 
 # -- paths with fixed coordinates --------------------------------------------------------------------------------------
@@ -334,3 +295,43 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
         f"the path is blocked after {100 * last.s:.0f} % of it: the loops cannot close there, or the mechanism jumps, "
         "as at a dead centre of the prescribed coordinate; prescribe another one, or give a position beyond it"
     )
+
+
+# -- places along a curve ----------------------------------------------------------------------------------------------
+
+
+GOLDEN = 0.3819660112501051
+SECTIONS = 60  #: of one search, at most
+
+
+def find_root(value: Callable[[float], float], a: float, b: float, fa: float, fb: float) -> float:
+    """A root between two places with values of different sign.
+
+    Illinois' form of the regula falsi (M. Dowell, P. Jarratt, BIT 11 (1971), 168-174), to four roundings.
+    """
+    for _ in range(SECTIONS):
+        c = b - fb * (b - a) / (fb - fa) if fb != fa else 0.5 * (a + b)
+        fc = value(c)
+        near, a, fa = abs(c - b), *((b, fb) if fb * fc < 0.0 else (a, 0.5 * fa))
+        b, fb = c, fc
+        if not abs(fb) > 0.0 or near <= 4.0 * EPS * (1.0 + abs(b)):
+            break
+    return b
+
+
+def find_least(value: Callable[[float], float], left: float, right: float, width: float) -> float:
+    """Where a value is least between two places, to a width, or 0.  Golden section."""
+    at = 0.5 * (left + right)
+    best = value(at)
+    for _ in range(SECTIONS):
+        if best <= 0.0 or abs(right - left) <= width:
+            break
+        low = abs(at - left) > abs(right - at)
+        t = at + GOLDEN * ((left if low else right) - at)
+        found = value(t)
+        if found < best:
+            left, right = (left, at) if low else (at, right)
+            best, at = found, t
+        else:
+            left, right = (t, right) if low else (left, t)
+    return at

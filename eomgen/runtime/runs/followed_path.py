@@ -16,18 +16,28 @@ stop: a dead centre of theirs, the end of the mechanism's reach).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...base import algebra
 from ...base.algebra import Array
-from ...base.limits.analyses import ALIGNED, BLOCKED, EXTREME, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
+from ...base.limits.analyses import ALIGNED, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
 from ...base.limits.analyses import ASTRAY as ASTRAY_ACROSS
+from ...base.limits.constraints import SETTLED
 from ...base.numeric.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
-from ...base.numeric.continuation import ASTRAY, Continuation, Point, Tangent, interpolate
+from ...base.numeric.continuation import (
+    ASTRAY,
+    SECTIONS,
+    Continuation,
+    Point,
+    Tangent,
+    find_least,
+    find_root,
+    interpolate,
+)
 from ...base.numeric.projection import largest
-from ...base.numeric.roots import SECTIONS, find_least, find_root
 from ...base.numeric.scales import Scales
 from ...errors import EomgenError
 from ..kernels import constraint_system
@@ -125,11 +135,6 @@ class DrivenCoordinates:
         sign = float(np.linalg.slogdet(square)[0]) if len(square) == len(V) else 1.0
         return Tangent(self.scales.q * rate, float(S[-1] / S[0]), sign, V[-1], U[:, -1])
 
-    def determinant(self, t: float, q: Array) -> float:
-        """Signed volume of the independent rows of K; it changes its sign where the motion may branch."""
-        K = self.matrix(q, t)[self._square]
-        return float(np.linalg.det(K)) if K.shape[0] == K.shape[1] else float("nan")
-
     def motion(self, t: float, q: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
         """v, a (n_v,) in real time at a closed position, where y' = y1 and y'' = y2; NaN where they are not defined."""
         layout = self.layout
@@ -202,6 +207,23 @@ class DrivenPath(NamedTuple):
         """The point next to a guess."""
         q = self.driven.position(*self.at(s), guess)
         return None if q is None else Point(s, q, self.tangent(s, q))
+
+    def along(self, s: float, q: Array, direction: Array) -> tuple[float, Array, Array] | None:
+        """The point next to a guess at right angles to a direction (n_v + 1,) of scaled motion and s, and the direction
+        of the curve there: where s turns back, too.  None if Newton's iteration finds none.
+        """
+        for _ in range(STEPS):
+            t, y = self.at(s)
+            e, K = self.driven.closure(t, y).evaluate(q)
+            rows = np.column_stack([K, -self.driven.right(q, t, self.t1, self.y1)])
+            if not np.isfinite(rows).all() or not np.isfinite(e).all():
+                return None
+            step = -algebra.lstsq(np.vstack([rows, direction]), np.append(e, 0.0), rcond=NULL)
+            q, s = self.scales.move(q, step[:-1]), s + float(step[-1])
+            if largest(step) <= SETTLED:
+                there = algebra.svd(rows)[2][-1]
+                return s, q, there * float(np.sign(there @ direction))
+        return None
 
 
 class DrivenContinuation(Continuation):
@@ -369,136 +391,71 @@ def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tang
     return Singular(kind, t, values, q, moving, joints)
 
 
-def cross(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
-    """The interpolant over a change of sign between two points, and where det K = 0 on it; None if there is none."""
-    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
-    for _ in range(60):
-        if largest(scales.distance(after.q, before.q)) <= NARROW:
-            break
-        middle = 0.5 * (before.s + after.s)
-        found = path.solve(middle, ChangePointInterpolant([before, after], scales).at(middle)[0])
-        if found is None or found.tangent.quality < SINGULAR:
-            break
-        before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
-    rough = ChangePointInterpolant([before, after], scales)
-    middle = _root(continuation, rough, before.s, after.s)
-    interpolant = build_interpolant(continuation, before, after, middle)
-    if interpolant is None:
-        return None
-    low, high = interpolant.supports[1].s, interpolant.supports[2].s
-    middle = _root(continuation, interpolant, low, high)
-    t = path.at(middle)[0]
-    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
-    return (interpolant, middle) if quality < SINGULAR else None
+def find_singular(
+    continuation: DrivenContinuation, before: Point, after: Point
+) -> tuple[ChangePointInterpolant, float] | None:
+    """The interpolant over a change point between two points, and where on it K is singular; None if it is nowhere.
 
-
-def _root(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
-    """Where det K changes its sign on an interpolant; where it does not, the nearest to singular."""
-
-    def value(s: float) -> float:
-        return continuation.curve.driven.determinant(continuation.curve.at(s)[0], interpolant.at(s)[0])
-
-    f_low, f_high = value(low), value(high)
-    if not f_low * f_high < 0.0:
-        return _worst(continuation, interpolant, low, high)
-    return find_root(value, low, high, f_low, f_high)
-
-
-def _worst(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
-    """Where an interpolant is nearest to singular, by golden section."""
-
-    def quality(s: float) -> float:
-        return continuation.curve.tangent(s, interpolant.at(s)[0]).quality
-
-    return find_least(quality, low, high, (high - low) * 0.6**SECTIONS)
-
-
-def find_stop(continuation: DrivenContinuation, last: Point) -> tuple[float, Point]:
-    """The stop of a blocked continuation, s and the position there, to full precision where one coordinate is led.
-
-    There the path is followed by the coordinate that still moves, w: s(w) has its extreme at the stop.
+    There det K changes its sign, or the quality has a minimum.
     """
-    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
-    y1, t1 = path.y1, path.t1
-    tangent = last.tangent
-    if t1 or np.count_nonzero(y1) != 1:
-        return last.s, last
-    k = int(np.flatnonzero(y1)[0])
-    free = tangent.free
-    order = [int(i) for i in np.argsort(-np.abs(free)) if driven.layout.velocity_labels[i] in driven.layout.q]
-    for i in order[:1]:
-        name = driven.layout.velocity_labels[i]
-        if name in driven.led:
-            break
-        led = (*driven.led[:k], name, *driven.led[k + 1 :])
-        other = DrivenCoordinates(driven.module, led)
-        t = path.t
-        q = last.q
-        for _ in range(30):  # dy/dw = 0 by secant steps, w the scaled value of the free coordinate
-            y = other.led_values(q, t)
-            step = _to_extreme(other, driven, k, t, q)
-            if step is None or not abs(step) < 1.0:
-                return last.s, last
-            y[k] += step * other.led_scales[k]
-            found = other.position(t, y, scales.move(q, step * _along(other, k, t, q)))
-            if found is None:
-                return last.s, last
-            q = found
-            if abs(step) < BLOCKED:
-                break
-        s = float((driven.led_values(q, t)[k] - path.y[k]) / y1[k])
-        if abs(s - last.s) * abs(y1[k]) / driven.led_scales[k] < UNJUDGED:
-            return s, Point(s, q, driven.tangent(t, q, 0.0, y1))
-    return last.s, last
-
-
-def _along(other: DrivenCoordinates, k: int, t: float, q: Array) -> Array:
-    unit = np.zeros(len(other.led))
-    unit[k] = other.led_scales[k]
-    return other.tangent(t, q, 0.0, unit).rate / other.scales.q
-
-
-def _to_extreme(other: DrivenCoordinates, driven: DrivenCoordinates, k: int, t: float, q: Array) -> float | None:
-    """Newton's step in w to where dy_k/dw = 0, by a central difference of dy_k/dw."""
-    h = EXTREME
-
-    def slope(q: Array) -> float:
-        row = driven.matrix(q, t)[driven.layout.n_c + k]
-        return float(row @ _along(other, k, t, q))
-
-    y = other.led_values(q, t)
-    slopes = []
-    for part in (-h, h):
-        ahead = np.array(y)
-        ahead[k] += part * other.led_scales[k]
-        found = other.position(t, ahead, other.scales.move(q, part * _along(other, k, t, q)))
-        if found is None:
-            return None
-        slopes.append(slope(found))
-    curvature = (slopes[1] - slopes[0]) / (2.0 * h)
-    return -slope(q) / curvature if curvature else None
-
-
-def touch(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
-    """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
-    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
+    path, scales = continuation.curve, continuation.scales
     for _ in range(60):
         if largest(scales.distance(after.q, before.q)) <= NARROW:
             break
-        rough = ChangePointInterpolant([before, after], scales)
-        third = (after.s - before.s) / 3.0
-        found = [path.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
-        one, other = found
+        rough, third = ChangePointInterpolant([before, after], scales), (after.s - before.s) / 3.0
+        one, other = (path.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third))
         if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
             break
-        before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
-    interpolant = build_interpolant(continuation, before, after, 0.5 * (before.s + after.s))
+        signs = [p.tangent.sign for p in (before, one, other, after)]
+        if signs[0] != signs[3]:
+            before, after = next(
+                (a, b) for a, b in pairwise((before, one, other, after)) if a.tangent.sign != b.tangent.sign
+            )
+        else:
+            before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
+    rough = ChangePointInterpolant([before, after], scales)
+    interpolant = build_interpolant(continuation, before, after, _most_singular(path, rough, before.s, after.s))
     if interpolant is None:
         return None
-    middle = _worst(continuation, interpolant, interpolant.supports[1].s, interpolant.supports[2].s)
-    t = path.at(middle)[0]
-    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
+    middle = _most_singular(path, interpolant, interpolant.supports[1].s, interpolant.supports[2].s)
+    quality = path.driven.tangent(path.at(middle)[0], interpolant.at(middle)[0], 0.0, path.y1).quality
     return (interpolant, middle) if quality < SINGULAR else None
+
+
+def _most_singular(path: DrivenPath, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+    """Where on an interpolant the signed quality is 0, or its magnitude least if it keeps its sign."""
+
+    def signed(s: float) -> float:
+        tangent = path.tangent(s, interpolant.at(s)[0])
+        return tangent.sign * tangent.quality
+
+    f_low, f_high = signed(low), signed(high)
+    if f_low * f_high < 0.0:
+        return find_root(signed, low, high, f_low, f_high)
+    return find_least(lambda s: abs(signed(s)), low, high, (high - low) * 0.6**SECTIONS)
+
+
+def find_stop(path: DrivenPath, last: Point) -> Point:
+    """The stop of a blocked continuation to full precision, where s turns back: a root of its rate along the arc."""
+    start = path.along(last.s, last.q, np.append(last.tangent.rate / path.scales.q, 1.0))
+    if start is None:
+        return last
+    s, q, direction = start
+
+    def ahead(h: float) -> tuple[float, Array, Array] | None:
+        return path.along(s + h * direction[-1], path.scales.move(q, h * direction[:-1]), direction)
+
+    def rate(h: float) -> float:
+        there = ahead(h)
+        return float("nan") if there is None else float(there[2][-1])
+
+    for h in LEAPS:
+        if (end := rate(h)) < 0.0 < direction[-1]:
+            found = ahead(find_root(rate, 0.0, h, float(direction[-1]), end))
+            if found is not None and abs(found[0] - last.s) < UNJUDGED:
+                s, q, _ = found
+                return Point(s, q, path.driven.tangent(path.at(s)[0], q, 0.0, path.y1))
+    return last
 
 
 def find_change_points(
@@ -513,9 +470,9 @@ def find_change_points(
         before, after = points[k], points[k + 1]
         here = None
         if id(before) in leapt or before.tangent.sign != after.tangent.sign:
-            here = cross(continuation, _good(points, before, after) if id(before) in leapt else before, after)
+            here = find_singular(continuation, _good(points, before, after) if id(before) in leapt else before, after)
         elif k + 2 < len(points) and _dips(points[k : k + 3]):
-            here = touch(continuation, before, points[k + 2])
+            here = find_singular(continuation, before, points[k + 2])
         if here is not None:
             crossings.append(here)
     found = []
@@ -568,8 +525,9 @@ class FollowedPath:
         self.stop: Singular | None = None
         self.reached = end
         if not whole:
-            self.reached, last = find_stop(continuation, continuation.points[-1])
-            self.stop = name_singular(driven, "stop", path.at(self.reached)[0], last.q, last.tangent)
+            last = find_stop(path, continuation.points[-1])
+            self.reached = last.s
+            self.stop = name_singular(driven, "stop", path.at(last.s)[0], last.q, last.tangent)
         self.nodes = np.array([p.s for p in continuation.points])
 
     @property
@@ -665,14 +623,12 @@ class FollowedPath:
     ) -> tuple[Array, Array, Array]:
         """The motion at or beside a change point, where it must run along the path."""
         q, first, second = interpolant.at(s)
-        t1, path = self.path.t1, self.path.y1
-        nothing = np.full_like(first, np.nan)
-        if t1:
-            if np.allclose(y1, path / t1, rtol=ALIGNED, atol=0.0) and not y2.any():
-                return q, first / t1, second / t1**2
-            return q, nothing, nothing
-        k = int(np.argmax(np.abs(path / self.driven.led_scales)))
-        speed, gain = y1[k] / path[k], y2[k] / path[k]
+        path = self.path.y1
+        speed, gain = 1.0 / (self.path.t1 or 1.0), 0.0
+        if not self.path.t1:
+            k = int(np.argmax(np.abs(path / self.driven.led_scales)))
+            speed, gain = y1[k] / path[k], y2[k] / path[k]
         if np.allclose(y1, speed * path, rtol=ALIGNED) and np.allclose(y2, gain * path, rtol=ALIGNED):
             return q, speed * first, speed**2 * second + gain * first
+        nothing = np.full_like(first, np.nan)
         return q, nothing, nothing

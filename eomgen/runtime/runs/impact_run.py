@@ -14,12 +14,13 @@ from ...base.algebra import Array
 from ...base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
 from ...base.value_rules import read_count
 from ...errors import SimulationError, cannot, no_such, off_range
-from ..columns import Columns, Residuals, describe, units_of
+from ..columns import Columns, Residuals, describe
 from ..inputs import Forcing
 from ..refusals import require_support
 from ..trajectory import Span, Start, Trajectory
 from .events import WAIT, Events, RunEvent
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
+from .recording import header_of
 from .run_arguments import find_state, set_up
 from .simulate import simulate
 
@@ -337,16 +338,13 @@ def _record(
     _refuse_beyond(gaps, t, x)
     columns = Columns(module, t, x, forcing.sample(t, x))
     off = np.max([[*part.residuals] for part in parts] or [[*Residuals()]], axis=0)
-    header: dict[str, Any] = {
-        **describe(module),
-        **({key: parts[-1].metadata[key] for key in ("method", "rtol", "atol")} if parts else {}),
-        "span": [float(t[0]), float(t[-1])],
-        "status": 0 if ended == "end" else 1,
-        **{key: sum(getattr(part, key) for part in parts) for key in ("nfev", "njev", "nlu")},
-        "residuals": dict(zip(Residuals._fields, off.tolist(), strict=True)),
-        "event_names": list(gaps.names),
-        "units": units_of(module, columns.names),
-    }
+    options = parts[-1].metadata if parts else {}
+    counts = {key: sum(getattr(part, key) for part in parts) for key in ("nfev", "njev", "nlu")}
+    status, ends_at = 0 if ended == "end" else 1, (float(t[0]), float(t[-1]))
+    known = header_of(
+        module.layout, options.get("method"), options, gaps.names, Residuals(*off.tolist()), status, "", counts, ends_at
+    )
+    header = {**describe(module), **known}
     hits: dict[str, list[tuple[float, Array]]] = {name: [] for name in gaps.names}
     for time, impact in events.impacts:
         for name, impulse in zip(impact.names, impact.impulses, strict=True):

@@ -44,7 +44,7 @@ def record(
     residuals, x = project(module, solution.t, solution.x, forcing)
     described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
     found = solution[5:9]  # status, message, counts and ends: not the states before projection, which take much memory
-    header: Any = partial(_header, module.layout, method, options, event_names, residuals, *found)
+    header: Any = partial(header_of, module.layout, method, options, event_names, residuals, *found)
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described, header = described().copy, header()
@@ -70,8 +70,8 @@ def record(
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described, again)
 
 
-def _header(
-    layout: Any, title: str, options: Any, names: Any, residuals: Any, status: int, message: str, counts: Any, ends: Any
+def header_of(
+    layout: Any, title: Any, options: Any, names: Any, residuals: Any, status: int, message: str, counts: Any, ends: Any
 ) -> dict[str, Any]:  # fmt: skip
     """What a trajectory tells of its run."""
     return {

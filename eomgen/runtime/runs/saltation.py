@@ -33,7 +33,7 @@ from ...errors import NoDerivativeError, cannot
 from ..constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
 from ..inputs import Forcing
 from .events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
-from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, assembly_rows, keep_consistent
+from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, SlopesNow, assembly_rows, keep_consistent
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -116,6 +116,18 @@ class Variational:
             return moved._replace(u=du)
         return moved._replace(t=dt, u=du + np.multiply.outer(by_t, dt))
 
+    def at(self, t: float, x: Array) -> BoundModel:
+        """The module with the inputs there."""
+        return self.module.bind(u=self.forcing(t, x))
+
+    def input_slopes(self, t: float, x: Array) -> SlopesNow | None:
+        """Derivatives of the inputs that vary; None without any."""
+        return self.inputs(t, x) if self.forcing else None
+
+    def consistent(self, t: float, x: Array, S: Array) -> Array:
+        """The nearest S (n_x, k) that keeps the constraints."""
+        return keep_consistent(self.at(t, x), t, x, S, self.columns, self.input_slopes(t, x))
+
     def __call__(self, t: float, z: Array) -> Array:
         """z' of z."""
         x, S = self.split(z)
@@ -133,7 +145,7 @@ class Variational:
 
     def outputs(self, t: float, x: Array, S: Array) -> Array:
         """Derivatives (n_y, k) of the outputs."""
-        layout, here = self.module.layout, self.module.bind(u=self.forcing(t, x))
+        layout, here = self.module.layout, self.at(t, x)
         n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
         x_dot, S_dot = self.slopes(t, x, S)
         Y, move = here.kernels.output_derivatives(t, x, x_dot[n_q:]), self.move(t, x, S)
@@ -283,7 +295,7 @@ def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move:
     if not n_h:
         return np.zeros_like(dq)
     x = np.concatenate([q, np.zeros(layout.n_v)])
-    E = assembly_rows(module, t, x, run.inputs(t, x) if run.forcing else None)[:n_h]
+    E = assembly_rows(module, t, x, run.input_slopes(t, x))[:n_h]
     drift = module.velocity_constraints(x, t=t, rows="all")[:n_h]
     off = E[:, :n_q] @ dq + np.multiply.outer(drift, move.t) + E[:, n_x + layout.n_u :] @ move.p
     off = off + E[:, n_x : n_x + layout.n_u] @ run.du
@@ -382,8 +394,7 @@ class Saltation:
         self.found.append(EventSlopes(self.names[index], t, x, x, dt, moved, moved))
 
     def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
-        forcing = self.run.forcing
-        here = self.module.bind(u=forcing(t, x))
+        forcing, here = self.run.forcing, self.run.at(t, x)
         if self.events.model[index].action == RESET:
             found = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
             self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
@@ -495,10 +506,8 @@ class Saltation:
 
     def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
         """A state and its derivatives, brought onto the constraints."""
-        module, forcing = self.module, self.run.forcing
-        x = np.asarray(module.project(x, t=t, u=forcing(t, x)))
-        slopes = self.run.inputs(t, x) if forcing else None
-        return x, keep_consistent(module.bind(u=forcing(t, x)), t, x, S, self.run.columns, slopes)
+        x = np.asarray(self.module.project(x, t=t, u=self.run.forcing(t, x)))
+        return x, self.run.consistent(t, x, S)
 
     # -- what has no derivative -----------------------------------------------------------------------------------
     def _refuse_ends(self, t: float, own: int) -> None:

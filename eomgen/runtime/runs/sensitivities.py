@@ -31,9 +31,7 @@ from .run_arguments import check_tolerances, find_state, longest_step, ordered_t
 from .saltation import Saltation, Variational
 from .sensitivity_start import (
     Sensitivities,
-    SlopesNow,
     held_names,
-    keep_consistent,
     refuse_lost_branches,
     split_columns,
     start_sensitivity,
@@ -121,7 +119,7 @@ def sensitivities(
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
     follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
-    S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0), follows)
+    S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
     solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
@@ -166,8 +164,7 @@ def sensitivities(
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
         t, x = float(time), trajectory.x[:, j]
-        here = bound.bind(u=forcing(t, x))
-        dx[..., j] = keep_consistent(here, t, x, raw[..., j], columns, _inputs(run, t, x))
+        dx[..., j] = run.consistent(t, x, raw[..., j])
         if layout.n_y:
             dy[..., j] = run.outputs(t, x, dx[..., j])
     return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
@@ -205,10 +202,6 @@ def _require_same(found: Trajectory, alone: Trajectory) -> None:
                 "derivatives, because it comes and goes within one step of the solver; give max_step",
                 code="EG-EVENT",
             )
-
-
-def _inputs(run: Variational, t: float, x: Array) -> SlopesNow | None:
-    return run.inputs(t, x) if run.forcing else None
 
 
 def _note_end(salts: Saltation, solution: Solution) -> None:

@@ -382,38 +382,31 @@ def start_sensitivity(
             raise ill_placed(f"{name} cannot change alone; use the angular velocity, or rotation: euler_angles")
         wanted[name][column] = 1.0
     N = scales.rates(x[:n_q], np.eye(n_v))
-    # positions
-    rows, right = [*scales.jacobian(E[:n_h, :n_q] @ N)], [*(-other[:n_h] / scales.c[:n_h, None])]
     turns = _turns(layout, x[:n_q], wanted)
-    for name in held:
-        if name in layout.q:
-            for row in initial.gradients(x[:n_q], name):
-                k = int(np.flatnonzero(row)[0])
-                rows.append(row)
+    places = {name: [int(np.flatnonzero(row)[0]) for row in initial.gradients(x[:n_q], name)]
+              for name in held if name in layout.q}  # fmt: skip
+
+    def solve(
+        J: Array, off: Array, lines: slice, own: Mapping[str, list[int]], cut: Sequence[str], first: int
+    ) -> Array:
+        """The changes (n_v, k) for which all lines of an assembly's equations of one level stay 0."""
+        rows, right = [*scales.jacobian(J[lines])], [*(-off[lines] / scales.c[: lines.stop - lines.start, None])]
+        for name in held:
+            for k in own.get(name, ()):
+                rows.append(np.eye(n_v)[k])
                 right.append(turns.get(k, wanted[name]) / scales.q[k])
-        elif name in layout.loops:
-            k = layout.loops.index(name)
-            line, size = n_h + n_c + k, layout.loop_scales[k]
-            rows.append(E[line, :n_q] @ N * scales.q / size)
-            right.append((wanted[name] - other[line]) / size)
-    dz = scales.q[:, None] * _solve(rows, right, n_v, count, columns)
-    dq = scales.rates(x[:n_q], dz)
-    # velocities
-    lines = slice(n_h, n_h + n_c)
-    rows = [*scales.jacobian(E[lines, n_q:n_x])]
-    right = [*(-(other[lines] + E[lines, :n_q] @ dq) / scales.c[:, None])]
-    for name in held:
-        if name in layout.v:
-            k = layout.v.index(name)
-            rows.append(np.eye(n_v)[k])
-            right.append(wanted[name] / scales.q[k])
-        elif name in layout.loop_rates:
-            k = layout.loop_rates.index(name)
-            line, size = n_h + n_c + layout.n_loop_coordinates + k, layout.loop_scales[k]
-            rows.append(E[line, n_q:n_x] * scales.q / size)
-            right.append((wanted[name] - other[line] - E[line, :n_q] @ dq) / size)
-    dv = scales.q[:, None] * _solve(rows, right, n_v, count, columns)
-    return np.vstack([dq, dv])
+            if name in cut:
+                line, size = first + cut.index(name), layout.loop_scales[cut.index(name)]
+                rows.append(J[line] * scales.q / size)
+                right.append((wanted[name] - off[line]) / size)
+        return np.asarray(scales.q[:, None] * _solve(rows, right, n_v, count, columns))
+
+    m = n_h + n_c
+    dq = scales.rates(x[:n_q], solve(E[:, :n_q] @ N, other, slice(0, n_h), places, layout.loops, m))
+    turns, rates = {}, {name: [layout.v.index(name)] for name in held if name in layout.v}
+    other = other + E[:, :n_q] @ dq
+    m += layout.n_loop_coordinates
+    return np.vstack([dq, solve(E[:, n_q:n_x], other, slice(n_h, n_h + n_c), rates, layout.loop_rates, m)])
 
 
 def _turns(layout: Layout, q: Array, wanted: Mapping[str, Array]) -> dict[int, Array]:

@@ -150,7 +150,7 @@ def simulate(
     if usual is None and (
         (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof)
     ):
-        from .driven import follow_drivers
+        from .kinematic import follow_drivers
 
         steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **settings}
         motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, steps)
