@@ -98,9 +98,9 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
         if ensembles:
             fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": call}
-            files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", fused)
+            files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", {**fused, "series": False})
             if shown["series"]:
-                files[f"{name}_series_lanes{width}.c"] = render("c/series_lanes.c.j2", fused)
+                files[f"{name}_series_lanes{width}.c"] = render("c/contracted.c.j2", fused)
     return files
 
 

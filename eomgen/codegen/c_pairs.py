@@ -276,12 +276,9 @@ def _law(
 
 def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
     """The function of two polygons or the inside of an outline, which calls that of the numbers that matter."""
-    first, second, sloped = tables[kind.first], tables[kind.second], part == "slopes"
-    if len(kind.corners) == 1:
-        deep = {"name": name, "first": first["length"], "pieces": kind.corners[0], "sloped": sloped}
-        return render("c/pairs_deep.c.j2", deep)
+    first, second = tables[kind.first], tables[kind.second]
     context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
-    return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": sloped})
+    return render("c/pairs_chosen.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": part == "slopes"})
 
 
 def pair_declarations(program: Program) -> list[str]:

@@ -117,8 +117,8 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
     """What is generated in Python besides the core, and what is carried of eomgen."""
     carried = carry((*CARRIED, *(CARRIED_ANALYSES if context["analyses"] else ())))
     names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
-    own = {name: render(f"python/{name}.j2", context | {"folders": folders_of(carried)}) for name in names}
-    return {"py.typed": "", **own, **carried}
+    own = context | {"folders": folders_of(carried), "compiled": True}
+    return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **carried}
 
 
 def carry(names: Iterable[str]) -> dict[str, str]:
@@ -165,6 +165,9 @@ def _context(program: Program, analyses: bool) -> dict[str, Any]:
         "forms": forms,
         "methods": methods,
         "analyses": analyses,
+        "folders": (),
+        "compiled": False,
+        "requirements": ("numpy>=2.0",),
         "p_values": number_texts(metadata.get("p_values")),
         "u_values": number_texts(metadata.get("u_values")),
     }

@@ -275,7 +275,7 @@ def contact_areas(program: Program) -> list[tuple[str, int]]:
 
 
 def contact_tables(program: Program) -> dict[str, Any] | None:
-    """What ``held.c.j2`` writes."""
+    """What ``equations.c.j2`` writes of them."""
     held = program.contacts
     if held is None:
         return None

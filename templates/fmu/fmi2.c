@@ -41,6 +41,10 @@ typedef struct {
 #define SERIALIZE SerializeFMUstate
 #define DESERIALIZE DeSerializeFMUstate
 #define GET_RATES GetDerivatives
+#define GET_REAL GetReal
+#define SET_REAL SetReal
+#define LENGTH(n)
+#define REQUIRE_NUMBERS(given, length, array) REQUIRE_ARRAY(length, array)
 #include "fmi_calls.h"
 
 static void report(const fmu_instance *f, int status, const char *text)
@@ -104,28 +108,7 @@ CALL(SetupExperiment)(fmi2Component c, fmi2Boolean tolerance_given, fmi2Real tol
     return fail(INSTANCE, fmu_start(INSTANCE, start, tolerance_given, tolerance));
 }
 
-CALL(EnterInitializationMode)(fmi2Component c)
-{
-    REQUIRE(FMU_INSTANTIATED)
-    INSTANCE->m.phase = FMU_INITIALIZING;
-    return FMU_OK;
-}
-
-CALL(GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
-{
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(n, vr)
-    REQUIRE_ARRAY(n, value)
-    return fail(INSTANCE, fmu_get(INSTANCE, vr, n, value));
-}
-
-CALL(SetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
-{
-    REQUIRE(LIVING & ~FMU_TERMINATED)
-    REQUIRE_ARRAY(n, vr)
-    REQUIRE_ARRAY(n, value)
-    return fail(INSTANCE, fmu_set(INSTANCE, vr, n, value));
-}
+TO_PHASE(EnterInitializationMode, FMU_INSTANTIATED, FMU_INITIALIZING)
 
 /* A call that takes variables, or orders of derivatives, that no model has. */
 #define NONE(name, reason, ...) \
@@ -142,17 +125,6 @@ NONE(SetBoolean, "all variables are of type Real", const fmi2Boolean value[])
 NONE(SetString, "all variables are of type Real", const fmi2String value[])
 NONE(SetRealInputDerivatives, "inputs are constant within a step", const fmi2Integer order[], const fmi2Real value[])
 NONE(GetRealOutputDerivatives, "there are no derivatives of outputs by time", const fmi2Integer order[], fmi2Real value[])
-
-CALL(GetDirectionalDerivative)(fmi2Component c, const fmi2ValueReference unknowns[], size_t n_unknowns,
-    const fmi2ValueReference knowns[], size_t n_knowns, const fmi2Real seed[], fmi2Real result[])
-{
-    REQUIRE(FMU_INITIALIZING | FMU_EVENTS | FMU_CONTINUOUS | FMU_STEPPING | FMU_TERMINATED)
-    REQUIRE_ARRAY(n_unknowns, unknowns)
-    REQUIRE_ARRAY(n_unknowns, result)
-    REQUIRE_ARRAY(n_knowns, knowns)
-    REQUIRE_ARRAY(n_knowns, seed)
-    return fail(INSTANCE, fmu_directional(INSTANCE, unknowns, n_unknowns, knowns, n_knowns, seed, result));
-}
 
 CALL(NewDiscreteStates)(fmi2Component c, fmi2EventInfo *info)
 {
@@ -183,23 +155,16 @@ CALL(CancelStep)(fmi2Component c)
     return fail(INSTANCE, fmu_say(INSTANCE, FMU_ERROR, "steps are finished when fmi2DoStep returns"));
 }
 
-CALL(GetRealStatus)(fmi2Component c, fmi2StatusKind kind, fmi2Real *value)
-{
-    enum { LAST_SUCCESSFUL_TIME = 2 };
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(1, value)
-    *value = INSTANCE->m.t;
-    return (int)kind == LAST_SUCCESSFUL_TIME ? FMU_OK : FMU_DISCARD;
-}
-
-CALL(GetBooleanStatus)(fmi2Component c, fmi2StatusKind kind, fmi2Boolean *value)
-{
-    enum { TERMINATED = 3 };
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(1, value)
-    *value = INSTANCE->m.ended;
-    return (int)kind == TERMINATED ? FMU_OK : FMU_DISCARD;
-}
+#define STATUS(name, type, of, is) \
+    CALL(name)(fmi2Component c, fmi2StatusKind kind, type *value) \
+    { \
+        REQUIRE(LIVING) \
+        REQUIRE_ARRAY(1, value) \
+        *value = INSTANCE->m.is; \
+        return (int)kind == (of) ? FMU_OK : FMU_DISCARD; \
+    }
+STATUS(GetRealStatus, fmi2Real, 2 /* last successful time */, t)
+STATUS(GetBooleanStatus, fmi2Boolean, 3 /* terminated */, ended)
 
 #define NO_STATUS(name, type) \
     CALL(name)(fmi2Component c, fmi2StatusKind kind, type *value) \

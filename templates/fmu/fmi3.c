@@ -36,6 +36,10 @@ typedef void (*fmi3UnlockPreemptionCallback)(void);
 #define SERIALIZE SerializeFMUState
 #define DESERIALIZE DeserializeFMUState
 #define GET_RATES GetContinuousStateDerivatives
+#define GET_REAL GetFloat64
+#define SET_REAL SetFloat64
+#define LENGTH(n) , size_t n
+#define REQUIRE_NUMBERS REQUIRE_LENGTH
 #include "fmi_calls.h"
 
 static void report(const fmu_instance *f, int status, const char *text)
@@ -108,22 +112,6 @@ CALL(EnterInitializationMode)(fmi3Instance c, fmi3Boolean tolerance_given, fmi3F
 
 /* ---- values ---- */
 
-CALL(GetFloat64)(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 values[], size_t n_values)
-{
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(n, vr)
-    REQUIRE_LENGTH(n_values, n, values)
-    return fail(INSTANCE, fmu_get(INSTANCE, vr, n, values));
-}
-
-CALL(SetFloat64)(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[], size_t n_values)
-{
-    REQUIRE(LIVING & ~FMU_TERMINATED)
-    REQUIRE_ARRAY(n, vr)
-    REQUIRE_LENGTH(n_values, n, values)
-    return fail(INSTANCE, fmu_set(INSTANCE, vr, n, values));
-}
-
 /* A call for variables of a type that there is none of. */
 #define NONE(name, count, ...) \
     CALL(name)(fmi3Instance c, const fmi3ValueReference vr[], size_t n, __VA_ARGS__) \
@@ -152,18 +140,6 @@ NONE(GetClock, n, fmi3Clock values[])
 NONE(SetClock, n, const fmi3Clock values[])
 NONE(GetOutputDerivatives, n + n_values, const int32_t orders[], fmi3Float64 values[], size_t n_values)
 
-CALL(GetDirectionalDerivative)(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
-    const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[], size_t n_seed, fmi3Float64 result[],
-    size_t n_result)
-{
-    REQUIRE(FMU_INITIALIZING | FMU_EVENTS | FMU_CONTINUOUS | FMU_STEPPING | FMU_TERMINATED)
-    REQUIRE_ARRAY(n_unknowns, unknowns)
-    REQUIRE_ARRAY(n_knowns, knowns)
-    REQUIRE_LENGTH(n_seed, n_knowns, seed)
-    REQUIRE_LENGTH(n_result, n_unknowns, result)
-    return fail(INSTANCE, fmu_directional(INSTANCE, unknowns, n_unknowns, knowns, n_knowns, seed, result));
-}
-
 /* ---- model exchange ---- */
 
 CALL(UpdateDiscreteStates)(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals_changed,
@@ -181,21 +157,16 @@ CALL(UpdateDiscreteStates)(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *term
     return fail(INSTANCE, status);
 }
 
-CALL(GetNumberOfEventIndicators)(fmi3Instance c, size_t *n)
-{
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(1, n)
-    *n = FMU_N_EVENTS;
-    return FMU_OK;
-}
-
-CALL(GetNumberOfContinuousStates)(fmi3Instance c, size_t *n)
-{
-    REQUIRE(LIVING)
-    REQUIRE_ARRAY(1, n)
-    *n = FMU_N_X;
-    return FMU_OK;
-}
+#define COUNT(name, count) \
+    CALL(name)(fmi3Instance c, size_t *n) \
+    { \
+        REQUIRE(LIVING) \
+        REQUIRE_ARRAY(1, n) \
+        *n = count; \
+        return FMU_OK; \
+    }
+COUNT(GetNumberOfEventIndicators, FMU_N_EVENTS)
+COUNT(GetNumberOfContinuousStates, FMU_N_X)
 
 /* ---- co-simulation ---- */
 

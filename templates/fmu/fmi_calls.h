@@ -1,6 +1,6 @@
 /* The functions that FMI 2.0 and 3.0 have alike. Included by the file of a version, which names them by FMI(name) and its
-   types by HANDLE, BOOLEAN and REFERENCE. With FMI_HEADERS that file takes the headers of the standard, and not types of
-   its own, so that a compiler compares the functions with them. */
+   types by HANDLE, BOOLEAN and STATE; LENGTH is the argument that the length of an array is in 3.0. With FMI_HEADERS that
+   file takes the headers of the standard, and not types of its own, so that a compiler compares the functions with them. */
 #if defined(FMI_HEADERS)
 #define FMU_EXPORT
 #elif defined(_WIN32)
@@ -72,32 +72,51 @@ CALL(ExitInitializationMode)(HANDLE c)
     return fail(INSTANCE, status);
 }
 
-CALL(EnterEventMode)(HANDLE c)
-{
-    REQUIRE(FMU_CONTINUOUS | FMU_EVENTS)
-    INSTANCE->m.phase = FMU_EVENTS;
-    return FMU_OK;
-}
-
-CALL(EnterContinuousTimeMode)(HANDLE c)
-{
-    REQUIRE(FMU_EVENTS)
-    INSTANCE->m.phase = FMU_CONTINUOUS;
-    return FMU_OK;
-}
-
-CALL(Terminate)(HANDLE c)
-{
-    REQUIRE(FMU_EVENTS | FMU_CONTINUOUS | FMU_STEPPING)
-    INSTANCE->m.phase = FMU_TERMINATED;
-    return FMU_OK;
-}
+#define TO_PHASE(name, phases, next) \
+    CALL(name)(HANDLE c) \
+    { \
+        REQUIRE(phases) \
+        INSTANCE->m.phase = next; \
+        return FMU_OK; \
+    }
+TO_PHASE(EnterEventMode, FMU_CONTINUOUS | FMU_EVENTS, FMU_EVENTS)
+TO_PHASE(EnterContinuousTimeMode, FMU_EVENTS, FMU_CONTINUOUS)
+TO_PHASE(Terminate, FMU_EVENTS | FMU_CONTINUOUS | FMU_STEPPING, FMU_TERMINATED)
 
 CALL(Reset)(HANDLE c)
 {
     REQUIRE(FMU_ANY)
     fmu_reset(INSTANCE);
     return FMU_OK;
+}
+
+/* ---- values ---- */
+
+CALL(GET_REAL)(HANDLE c, const FMI(ValueReference) vr[], size_t n, double values[] LENGTH(n_values))
+{
+    REQUIRE(LIVING)
+    REQUIRE_ARRAY(n, vr)
+    REQUIRE_NUMBERS(n_values, n, values)
+    return fail(INSTANCE, fmu_get(INSTANCE, vr, n, values));
+}
+
+CALL(SET_REAL)(HANDLE c, const FMI(ValueReference) vr[], size_t n, const double values[] LENGTH(n_values))
+{
+    REQUIRE(LIVING & ~FMU_TERMINATED)
+    REQUIRE_ARRAY(n, vr)
+    REQUIRE_NUMBERS(n_values, n, values)
+    return fail(INSTANCE, fmu_set(INSTANCE, vr, n, values));
+}
+
+CALL(GetDirectionalDerivative)(HANDLE c, const FMI(ValueReference) unknowns[], size_t n_unknowns,
+    const FMI(ValueReference) knowns[], size_t n_knowns, const double seed[] LENGTH(n_seed), double result[] LENGTH(n_result))
+{
+    REQUIRE(FMU_INITIALIZING | FMU_EVENTS | FMU_CONTINUOUS | FMU_STEPPING | FMU_TERMINATED)
+    REQUIRE_ARRAY(n_unknowns, unknowns)
+    REQUIRE_ARRAY(n_knowns, knowns)
+    REQUIRE_NUMBERS(n_seed, n_knowns, seed)
+    REQUIRE_NUMBERS(n_result, n_unknowns, result)
+    return fail(INSTANCE, fmu_directional(INSTANCE, unknowns, n_unknowns, knowns, n_knowns, seed, result));
 }
 
 /* ---- copies of the state ---- */

@@ -1,7 +1,7 @@
 """A closed outline and a point in the plane -> the piece that holds the nearest point of the outline.
 
 The law of what is deep inside an outline reads the numbers of this piece alone, so that its text is the same for any
-number of pieces.  It is found here by loops, and in C by those of ``templates/c/pairs_outlines.c.j2``.
+number of pieces.  It is found here by loops, and in C by those of ``templates/c/pairs_shapes.c.j2``.
 """
 
 from __future__ import annotations

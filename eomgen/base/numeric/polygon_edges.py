@@ -2,7 +2,7 @@
 
 The law of a pair of polygons reads these few numbers (:mod:`~eomgen.contact.polygons` says why these), so that
 its text is the same for any number of corners.  They are found here by loops, and in C by those of
-``templates/c/pairs_polygons.c.j2``.
+``templates/c/pairs_shapes.c.j2``.
 """
 
 from __future__ import annotations

@@ -180,15 +180,15 @@ def _flattened(files: Iterable[str], texts: Mapping[str, str], there: set[str]) 
 def cuda_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     """``__init__.py``, ``<name>.cu``, and what of eomgen they need."""
     facts = describe_device(program)
-    context = context | {"facts": facts, "requirements": CUDA_REQUIREMENTS, "timed": TIMED_ON_DEVICE}
+    context = context | {"facts": facts, "timed": TIMED_ON_DEVICE}
     init = render("cuda/__init__.py.j2", context)
     carried = carry(CARRIED)
-    context |= {"folders": folders_of(carried)}
+    context |= {"folders": folders_of(carried), "requirements": (*context["requirements"], *CUDA_REQUIREMENTS)}
     return {
         "py.typed": "",
         "__init__.py": init,
         f"{program.name}.cu": emit_device_text(program),
-        "pyproject.toml": render("cuda/pyproject.toml.j2", context),
+        "pyproject.toml": render("python/pyproject.toml.j2", context),
         "README.md": render("cuda/README.md.j2", context),
         **carried,
     }

@@ -61,11 +61,11 @@ def emit_traced(program: Program, library: str) -> str:
 
 
 def _package(program: Program, context: dict[str, Any], library: str) -> dict[str, str]:
-    context = _context(program, library) | {k: v for k, v in context.items() if k == "description"}
+    context = context | _context(program, library)
     return {
         "py.typed": "",
         "__init__.py": render("traced/__init__.py.j2", context),
-        "pyproject.toml": render("traced/pyproject.toml.j2", context),
+        "pyproject.toml": render("python/pyproject.toml.j2", context),
         "README.md": render("traced/README.md.j2", context),
     }
 
@@ -89,7 +89,7 @@ def _context(program: Program, library: str) -> dict[str, Any]:
         "metadata": metadata,
         "library": library,
         "library_name": LIBRARIES[library][0],
-        "requirement": LIBRARIES[library][1],
+        "requirements": LIBRARIES[library][1:],
         "steps": STEPS,
         "p_values": _numbers(metadata.get("p_values")),
         "u_values": _numbers(metadata.get("u_values")),
