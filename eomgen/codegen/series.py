@@ -19,8 +19,6 @@ from .program import Block, Program
 MOST_ORDER = 23
 #: Right-hand sides of more terms have no series: DOP853 is faster then, as work grows with the square of the order.
 MOST_TERMS = 600
-#: Integer powers up to this are products.
-MOST_FACTORS = 16
 
 
 class Term(NamedTuple):
@@ -143,20 +141,7 @@ class _Terms:
             factor = self._terms[q]
             if factor.kind == "div" and factor.varies and self._terms[factor.operands[0]] == self._one:
                 return self._apply("div", p, factor.operands[1])
-        exponent = self._terms[operands[1]] if kind == "pow" else None
-        if exponent is not None and exponent.kind == "number" and abs(exponent.value) in range(1, MOST_FACTORS + 1):
-            return self._power(operands[0], int(exponent.value))
         return self._apply(kind, *operands)
-
-    def _power(self, base: int, exponent: int) -> int:
-        """Products, which have coefficients where the base is 0 as well."""
-        if exponent < 0:
-            return self._apply("div", self._number(1.0), self._power(base, -exponent))
-        if exponent == 1:
-            return base
-        half = self._power(base, exponent // 2)
-        square = self._apply("mul", half, half)
-        return self._apply("mul", square, base) if exponent % 2 else square
 
     def _apply(self, kind: str, *operands: int) -> int:
         """The term of an operation, with what its recurrence needs."""
