@@ -311,9 +311,10 @@ def _prescribed(author: Author) -> list[Piece]:
         return [Sentence(f"{told} Nothing has mass and no forces act, so that the constraints exert none.")]
     pieces: list[Piece] = [
         Sentence(
-            f"{told} The constraints exert the forces $\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
+            f"{told} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
             "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
-            "equation; that of a driver is the force or torque with which it drives its coordinate."
+            "equation; that of a driver, with the opposite sign, is the force or torque with which it drives its "
+            "coordinate."
         )
     ]
     pieces += author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)

@@ -200,6 +200,10 @@ def test_the_torque_of_a_driver_is_that_of_the_closed_form() -> None:
     m.driver("drive", "theta", "omega*t + alpha*t**2/2")
     document = m.derive().explain()
     shown = section(document, "Equations of motion")
+    assert r"$-\mathbf{C}_q^T \boldsymbol{\lambda} = \mathbf{M} \ddot{\mathbf{q}} - \mathbf{f}$" in shown
+    arm = m.compile(target="numpy")
+    torque = 2.0 * 0.6**2 / 3 * 0.8 + 2.0 * 9.81 * 0.3  # at theta = 0: -lambda, with the sign of that sentence
+    assert arm.multipliers(0.0, arm.x0()) == pytest.approx([-torque])
     assert r"\frac{1}{3} m l^2" in shown
     assert r"-\frac{1}{2} m g l \cos \theta" in shown
     assert {"tree_system", "poses[rod]"} <= set(compared(document))
