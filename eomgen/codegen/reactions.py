@@ -19,9 +19,10 @@ from ..base.operations import CONDITION, OPERATIONS
 from ..elements.forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
 from ..elements.forces.friction import is_carried, multiplier_of, reaction_of
 from ..errors import ModelError, Problem
-from ..expr.core import Expr, operands, reachable, substitute, symbols_of
+from ..expr.core import Expr, common_graph, operands, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import compile_evaluator
+from ..expr.identity import vanishes
 from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import ConstraintFunctions
 from ..mechanics.kinematics import ForceTerms
@@ -76,7 +77,7 @@ def refuse_undetermined(
     ------
     ModelError
     """
-    if is_zero(list(jacobian(list(values.values()), list(idle)).values())):
+    if not _depends(list(values.values()), {}, idle):
         return
     open_ = _open(kinematics, every, idle)
     if not open_:
@@ -100,8 +101,8 @@ def refuse_undetermined(
 
 def _depends(found: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
     """Whether what is asked for depends on such multipliers."""
-    slopes = jacobian(substitute(list(found), dict(values)), list(on))
-    return not is_zero(list(slopes.values()))
+    slopes = list(jacobian(substitute(list(found), dict(values)), list(on)).values())
+    return not all(vanishes(_with_every_choice(slopes), UNTOUCHED, pieces=True))
 
 
 def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr]) -> list[Expr]:
@@ -141,7 +142,9 @@ def _probed(expressions: Sequence[Expr]) -> np.ndarray:
 
 def _with_every_choice(expressions: Sequence[Expr]) -> list[Expr]:
     """Expressions in which a choice is a combination of its values, so that what acts far from a state is seen too."""
-    graph = expressions[0].graph
+    graph = common_graph(expressions)
+    if graph is None:
+        return []
     new: dict[int, Expr] = {}
     for i in reachable(graph, (x.id for x in expressions)):
         operation = graph.nodes[i][0]
@@ -159,12 +162,6 @@ def _with_every_choice(expressions: Sequence[Expr]) -> list[Expr]:
         for k, x in enumerate(values):
             new[i] = new[i] + graph.symbol(f"choice {key}.{k}") * x
     return [new[x.id] for x in expressions]
-
-
-def is_zero(expressions: Sequence[Expr]) -> bool:
-    """Whether expressions vanish whatever their symbols are."""
-    left = [x for x in expressions if not x.is_zero]
-    return not left or bool((np.abs(_probed(left)) < UNTOUCHED).all())
 
 
 def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import partial, reduce
 from typing import Any
@@ -15,7 +14,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.matrixbase import MatrixBase
 
-from ..base.operations import CONDITION, OPERATIONS, operations_with
+from ..base.operations import CONDITION, OPERATIONS
 from ..errors import EomgenError
 from .core import LEAVES, Expr, Graph, common_graph, reachable
 from .pairs import PairCall, pair_call
@@ -379,63 +378,6 @@ def _builders() -> dict[Any, Build]:
 # -- to SymPy ----------------------------------------------------------------------------------------------------------
 
 
-def raise_named(
-    exprs: Sequence[Expr], symbols: Callable[[str], Any] = sympy.Symbol, prefix: str = "z", limit: int = 50
-) -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """SymPy expressions with names for what is used more than once and for what grows large.
-
-    Parameters
-    ----------
-    exprs : sequence of Expr
-        Expressions of one graph.
-    symbols : callable, optional
-        Name -> the SymPy symbol (or ``q(t)``) that stands for it.
-    prefix : str, optional
-        Intermediates are called ``z0``, ``z1``, ...; names that the expressions use are passed over.
-    limit : int, optional
-        Operations in one expression beyond which a part gets a name.
-
-    Returns
-    -------
-    intermediates : list of (sympy.Symbol, sympy.Expr)
-        In an order in which each uses only those before it.
-    expressions : list of sympy.Expr
-        One per expression given.
-    """
-    graph = common_graph(exprs)
-    if graph is None:
-        return [], []
-    nodes = graph.nodes
-    roots = [x.id for x in exprs]
-    order = reachable(graph, roots)
-    uses = dict.fromkeys(order, 0)
-    for i in order:
-        if nodes[i][0] not in LEAVES:
-            for k in nodes[i][1:]:
-                uses[k] += 1
-    for i in roots:
-        uses[i] += 1
-    conditions = operations_with(lambda row: row.kind == CONDITION)
-    taken = {nodes[i][1] for i in order if nodes[i][0] == "sym"}
-    made: dict[int, Any] = {}
-    size: dict[int, int] = {}
-    intermediates: list[tuple[Any, Any]] = []
-    number = 0
-    for i in order:
-        kind, *args = nodes[i]
-        made[i] = _raised(graph, i, made, symbols)
-        size[i] = 0 if kind in LEAVES else 1 + sum(size[k] for k in args)
-        # conditions and signs are read best where they stand
-        if size[i] > (0 if uses[i] > 1 else limit) and kind not in conditions and kind != "neg":
-            while f"{prefix}{number}" in taken:
-                number += 1
-            name = sympy.Symbol(f"{prefix}{number}", real=True)
-            number += 1
-            intermediates.append((name, made[i]))
-            made[i], size[i] = name, 0
-    return intermediates, [as_number(made[i]) for i in roots]
-
-
 def inlined_size(exprs: Sequence[Expr]) -> int:
     """Operations in the expressions written out without sharing (at most 10^9 is counted)."""
     graph = common_graph(exprs)
@@ -448,16 +390,6 @@ def inlined_size(exprs: Sequence[Expr]) -> int:
         node = nodes[i]
         size[i] = 0 if node[0] in LEAVES else min(10**9, 1 + sum(size[k] for k in node[1:]))
     return min(10**9, sum(size[i] for i in roots))
-
-
-def _raised(graph: Graph, i: int, made: Mapping[int, Any], symbols: Callable[[str], Any]) -> Any:
-    """One node, its operands made already; comparisons and logic become SymPy booleans."""
-    kind, *args = graph.nodes[i]
-    if kind == "const":
-        return _raised_number(args[0])
-    if kind == "sym":
-        return symbols(args[0])
-    return raise_operation(graph, kind, [made[k] for k in args])
 
 
 def raise_operation(graph: Graph, kind: str, operands: Sequence[Any]) -> Any:
@@ -512,15 +444,3 @@ def as_number(value: Any) -> Any:
 
 def _as_truth(value: Any) -> Any:
     return value if _is_truth(value) else sympy.Ne(value, 0)
-
-
-def _raised_number(value: float) -> Any:
-    """The rational with a denominator up to 1000, or multiple of pi, whose double this is; else the double itself."""
-    exact = Fraction(value)
-    near = exact.limit_denominator(1000)
-    if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:
-        return sympy.Rational(near.numerator, near.denominator)
-    turns = Fraction(value / math.pi).limit_denominator(360)
-    if 0 < abs(turns.numerator) <= 1000 and turns.numerator / turns.denominator * math.pi == value:
-        return sympy.Rational(turns.numerator, turns.denominator) * sympy.pi
-    return sympy.Float(value)

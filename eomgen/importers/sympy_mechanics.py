@@ -16,7 +16,7 @@ from ..errors import ExpressionError, ModelError, Problem, ill_typed, incomplete
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
-from ..expr.rounding_bounds import with_bounds
+from ..expr.identity import with_bounds
 from ..model.description import Description
 from ..model.names import nearest
 from ..model.printed_names import give_latex

@@ -13,7 +13,7 @@ from ..base.numeric.assembly import RESTARTS, Assembly, ConstraintSystem, CutJoi
 from ..base.numeric.scales import Scales, Space
 from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.evaluate import compile_evaluator
-from ..expr.rounding_bounds import is_rounding, terms_of, with_bounds, with_likely_bounds
+from ..expr.identity import is_rounding, terms_of, with_bounds, with_likely_bounds
 from .kinematics import Kinematics
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
 # many links have the typical length of their columns as their size, or all others would be lost beside them. A relation
 # written by a user may be multiplied by anything, areas in m^2 or numbers of teeth; its size is the length of its
 # scaled gradient, so that a factor does not matter (row equilibration: A. van der Sluis, Numerische Mathematik 14,
-# 1969). A gradient that is not told from rounding of the terms that were added in it (:mod:`~..expr.rounding_bounds`)
+# 1969). A gradient that is not told from rounding of the terms that were added in it (:mod:`~..expr.identity`)
 # is no size: such a row counts as nothing beside those terms. Factors that are parameters stay symbols.
 
 

@@ -21,7 +21,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import gradient, jacobian, jvp
 from ..expr.evaluate import evaluate
-from ..expr.rounding_bounds import vanishing
+from ..expr.identity import random_point, vanishes
 from ..expr.vectors import Vec3
 from ..model.mechanism import JointSpec, Mechanism
 from .motion import MarkerMotion
@@ -121,16 +121,14 @@ def _in_plane(gap: Vec3, axis: Vec3) -> Vec3:
     Axes in which a component vanishes already are kept, and so is a gap that is in no plane.
     """
     graph = gap[0].graph
-    if any(vanishing(gap)):
+    if any(vanishes(gap)):
         return gap
-    names = sorted(symbols_of(axis))
-    values = dict(zip(names, np.random.default_rng(5).uniform(0.2, 1.4, len(names)).tolist(), strict=True))
-    across = np.array(evaluate(list(axis), values), dtype=float)
+    across = np.array(evaluate(axis, random_point(axis, np.random.default_rng(5))), dtype=float)
     first = np.cross(across, np.eye(3)[int(np.argmin(np.abs(across)))])
     first /= np.linalg.norm(first)
     rows = [[graph.constant(x) for x in row.tolist()] for row in (first, np.cross(across, first), across)]
     turned = [vec.dot((x, y, z), gap) for x, y, z in rows]
-    return (turned[0], turned[1], turned[2]) if vanishing(turned[2:])[0] else gap
+    return (turned[0], turned[1], turned[2]) if vanishes(turned[2:])[0] else gap
 
 
 def differentiate_constraints(
@@ -140,7 +138,7 @@ def differentiate_constraints(
     sizes = {"length": length.value or 0.0, "angle": 1.0}
     identical = {
         r: zero or _is_closed(r, sizes[r.kind])
-        for r, zero in zip(rows, vanishing([r.expression for r in rows]), strict=True)
+        for r, zero in zip(rows, vanishes([r.expression for r in rows]), strict=True)
     }
     kept = [r for r in rows if not identical[r]]
     kept.sort(key=lambda r: r.level != "position")
@@ -150,7 +148,7 @@ def differentiate_constraints(
     along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
     if not state.in_order:  # q' may keep a constraint by itself, as that of Euler parameters keeps their norm
-        kept_by_rates = zip(velocity, kept, vanishing(velocity), strict=False)
+        kept_by_rates = zip(velocity, kept, vanishes(velocity), strict=False)
         velocity = [graph.zero if row.written and zero else x for x, row, zero in kept_by_rates]
     entries = state.slopes(values, velocity)
     m = len(values)

@@ -19,7 +19,7 @@ from ..elements.constraints.rolling import LYING
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import compile_evaluator
-from ..expr.rounding_bounds import vanishing
+from ..expr.identity import vanishes
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .loops import place_of
@@ -114,9 +114,9 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
     problems = []
     for i, (label, row, written) in enumerate(zip(c.labels, c.jacobian, c.written, strict=True)):
         slopes = [x for x in row if not x.is_zero]
-        if kinematics.given_rates and i < len(c.slopes) and not all(vanishing(substitute(c.slopes[i], known))):
+        if kinematics.given_rates and i < len(c.slopes) and not all(vanishes(substitute(c.slopes[i], known))):
             continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
-        if (written and slopes) or not all(vanishing(substitute(slopes, known))):
+        if (written and slopes) or not all(vanishes(substitute(slopes, known))):
             used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
             what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
             remedy = "remove it"

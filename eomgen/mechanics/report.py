@@ -7,7 +7,7 @@ from dataclasses import asdict, fields, is_dataclass
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from ..elements.frames import Frame, Marker
 from ..errors import MissingDependencyError, bad_file
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable, symbols_of
-from ..expr.evaluate import compile_evaluator
+from ..expr.identity import vanishes
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .mobility import Mobility, initial_values
@@ -97,7 +97,6 @@ def _sizes(functions: ConstraintFunctions, names: list[str]) -> tuple[Array, Arr
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
 SHOWN = 6
-TRIED = 3  #: states at which a body's angular velocity is looked at
 
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
@@ -201,14 +200,8 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
         marker = Marker(k, Frame.identity(graph), body.name)
         spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
         across += vec.cross(spin, body.plane or spin)
-    symbols = sorted(symbols_of(across))
-    if not symbols:
-        return []
-    values = np.random.default_rng(1).uniform(0.5, 1.5, (TRIED, len(symbols)))
-    with np.errstate(all="ignore"):
-        evaluate = compile_evaluator(across, symbols)
-        sizes = np.abs([evaluate(row.tolist()) for row in values]).max(axis=0).reshape(-1, 3).max(axis=1)
-    return [body.name for (_, body), size in zip(bodies, sizes, strict=True) if size > ACROSS]
+    zero = vanishes(across, ACROSS, pieces=True)
+    return [body.name for k, (_, body) in enumerate(bodies) if not all(zero[3 * k : 3 * k + 3])]
 
 
 def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]:
@@ -245,26 +238,7 @@ class Places(NamedTuple):
     layers: int
 
 
-class Counted(Protocol):
-    """What a :class:`~.report.MechanismReport` is drawn from."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def tree(self) -> list[dict[str, str]]: ...
-    @property
-    def joints(self) -> list[dict[str, Any]]: ...
-    @property
-    def elements(self) -> list[dict[str, Any]]: ...
-    @property
-    def loop_joints(self) -> list[str]: ...
-    @property
-    def degrees_of_freedom(self) -> int: ...
-    @property
-    def independent(self) -> list[str]: ...
-
-
-def place(report: Counted) -> Places:
+def place(report: MechanismReport) -> Places:
     """Bodies in the layer of their distance to ground in the tree, each above the middle of what it carries."""
     carried: dict[str, list[str]] = {"ground": []}
     for branch in report.tree:
@@ -288,7 +262,7 @@ def place(report: Counted) -> Places:
     return Places(found, max(columns, 1), layers)
 
 
-def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any:
+def draw(report: MechanismReport, file: str | Path | None = None, ax: Any = None) -> Any:
     """Draw it; see :meth:`.report.MechanismReport.draw`."""
     if ax is None and file is None:  # one that a notebook or a window shows
         ax = _part("pyplot").figure(figsize=_size(place(report)), layout="constrained").add_subplot()
@@ -304,7 +278,7 @@ def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any
     return ax
 
 
-def new_figure(report: Counted) -> Any:
+def new_figure(report: MechanismReport) -> Any:
     """A figure of it without a window."""
     figure = _part("figure").Figure(figsize=_size(place(report)), layout="constrained")
     _fill(report, figure.add_subplot())
@@ -322,7 +296,7 @@ def _size(places: Places) -> tuple[float, float]:
     return min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0)
 
 
-def _fill(report: Counted, ax: Any) -> None:
+def _fill(report: MechanismReport, ax: Any) -> None:
     places = place(report)
     font = max(SMALLEST, min(LARGEST, 10.0 * 40.0 / WIDE / max(places.columns, 27)))
     tree = {branch["joint"] for branch in report.tree}
@@ -393,7 +367,7 @@ def _element(ax: Any, places: Places, element: dict[str, Any], index: int, font:
                 color=ELEMENT, zorder=5)  # fmt: skip
 
 
-def _finish(ax: Any, report: Counted, middle: float, half: float, layers: int) -> None:
+def _finish(ax: Any, report: MechanismReport, middle: float, half: float, layers: int) -> None:
     """Title, legend and limits."""
     freedoms = report.degrees_of_freedom
     words = f"{freedoms} degree{'' if freedoms == 1 else 's'} of freedom"

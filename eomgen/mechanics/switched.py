@@ -17,7 +17,7 @@ from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
 from ..expr.differentiate import jacobian
-from ..expr.rounding_bounds import vanishing
+from ..expr.identity import vanishes
 from ..expr.vectors import Vec3
 from ..model.mechanism import Switched
 from .kinematics import ForceTerms, Kinematics
@@ -131,4 +131,4 @@ def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6])
             second: Vec3 = (column[3], column[4], column[5])
             work = vec.dot((D[0], D[1], D[2]), first) + vec.dot((D[3], D[4], D[5]), second)
             total[j] = total[j] - work
-    return [graph.zero if vanishing([x])[0] else x for x in total]
+    return [graph.zero if vanishes([x])[0] else x for x in total]

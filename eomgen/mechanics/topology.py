@@ -27,7 +27,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import compile_evaluator
-from ..expr.rounding_bounds import settled_vector, size_of
+from ..expr.identity import settled_vector, size_of
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
 from ..model.mechanism import JointSpec, Mechanism

@@ -15,8 +15,8 @@ from ..elements.frames import GROUND, Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
 from ..expr.differentiate import gradient
-from ..expr.evaluate import compile_evaluator
-from ..expr.rounding_bounds import settled_rotation, settled_vector, size_of
+from ..expr.evaluate import evaluate
+from ..expr.identity import random_point, settled_rotation, settled_vector, size_of, vanishes
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
 from ..expr.vectors import Mat3, Vec3
@@ -27,13 +27,10 @@ from .topology import Branch, Topology
 
 
 Turns = tuple[Expr, list[tuple[int, float]]]  #: an angle, and the coordinates in it with their factors
-TRIALS = 3  #: random points at which an identity is tried
 
 
 def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
     """The angle about z of a rotation that is about z at every q, else None.
-
-    Whether it is, is tried at random values of all symbols: an identity that holds there holds everywhere.
 
     Returns
     -------
@@ -46,16 +43,9 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | Non
     held = (graph.symbol(name).id for name in symbols_of([angle]))
     turning = sorted(places[i] for i in held if i in places)
     slopes = gradient(angle, [q[j] for j in turning])
-    tried = [rotation[2][2], *slopes]
-    names = sorted(symbols_of(tried))
-    evaluate = compile_evaluator(tried, names)
-    random = np.random.default_rng(7)
-    found = []
-    for _ in range(TRIALS):
-        with np.errstate(all="ignore"):
-            found.append(np.array(evaluate(random.uniform(0.2, 1.4, len(names))), dtype=float))
-    steps = np.round(found[0][1:])
-    if any(not abs(x[0] - 1.0) < PLANE or not (np.abs(x[1:] - steps) < PLANE).all() for x in found):
+    steps = np.round(evaluate(slopes, random_point(slopes, np.random.default_rng(7)))) if slopes else ()
+    off = [rotation[2][2] - 1.0, *(x - float(step) for x, step in zip(slopes, steps, strict=True))]
+    if not all(vanishes(off, PLANE, pieces=True)):
         return None
     terms = [(j, float(step)) for j, step in zip(turning, steps, strict=True) if step]
     start = substitute([angle], {q[j]: graph.zero for j in turning})[0]

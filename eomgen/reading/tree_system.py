@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.operations import operations_with
 from ..expr.core import LEAVES, Expr, reachable, substitute, symbols_of
-from ..expr.rounding_bounds import is_rounding, with_bounds
+from ..expr.identity import is_rounding, with_bounds
 from ..expr.schedule import count
 from .quantities import Quantities, Rows
 

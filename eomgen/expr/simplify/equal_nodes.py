@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.limits.numbers import ALIKE
 from ..core import LEAVES, Expr, Graph, operands, reachable, substitute
-from ..rounding_bounds import is_rounding, with_bounds
+from ..identity import is_rounding, with_bounds
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone

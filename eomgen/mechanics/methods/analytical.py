@@ -7,7 +7,7 @@ from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import gradient, jvp
-from ...expr.rounding_bounds import vanishing
+from ...expr.identity import vanishes
 from ...expr.schedule import count
 from ...expr.vectors import Vec3
 from .. import Kinematics
@@ -28,7 +28,7 @@ def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple
         momenta = gradient(bare.expression, v)
         at_rest, *first_degree = substitute([bare.expression, *momenta], dict.fromkeys(v, graph.zero))
         quadratic = bare.expression - at_rest
-        if not all(vanishing(first_degree)):
+        if not all(vanishes(first_degree)):
             quadratic = graph.zero
             for rate, inertial in zip(v, jvp(momenta, dict(zip(v, v, strict=True))), strict=True):  # M v
                 quadratic = quadratic + 0.5 * (rate * inertial)
