@@ -111,8 +111,8 @@ def _of_analyses(program: Program) -> frozenset[str]:
     if "rhs" not in first:  # a module for analyses
         return frozenset()
     drivers = {k.name: k.blocks for k in program.drivers}
-    needed = {block for name in first for block in drivers.get(name, (program.twins.get(name, name),))}
-    return frozenset(b.name for b in program.blocks if b.name not in needed and b.name not in program.twins)
+    needed = {block for name in first for block in drivers.get(name, (program.aliases.get(name, name),))}
+    return frozenset(b.name for b in program.blocks if b.name not in needed and b.name not in program.aliases)
 
 
 def _model_file(
@@ -173,7 +173,7 @@ def _print(program: Program, apart: Collection[str], branches: bool = False) -> 
     ``branches``: statements of alike branches as vectors.
     """
     printed = {"precompute": _print_precompute(program)} if program.hoisted else {}
-    printed |= {b.name: _print_function(program, b, branches) for b in program.blocks if b.name not in program.twins}
+    printed |= {b.name: _print_function(program, b, branches) for b in program.blocks if b.name not in program.aliases}
     for name in _linked(program, apart):
         text = printed[name].text.replace(f"static flag {name}_block(", f"flag {program.name}_{name}_block(")
         printed[name] = printed[name]._replace(text=text)
@@ -204,7 +204,7 @@ def _printed_for_lanes(program: Program, printed: Mapping[str, Printed]) -> dict
 
 
 def _context(program: Program, printed: Mapping[str, Printed], work: int, apart: Collection[str]) -> dict[str, Any]:
-    twins, in_lanes = program.twins, program.metadata["lanes"]
+    aliases, in_lanes = program.aliases, program.metadata["lanes"]
     areas, n_work = work_areas(program, work)
     n_const = count_constants(program, printed.get("precompute"))
     sizes = program.sizes
@@ -242,8 +242,8 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "kernels": [
             {
                 "name": k.name,
-                "block": twins.get(k.name, k.name) if isinstance(k, Block) else "",
-                "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
+                "block": aliases.get(k.name, k.name) if isinstance(k, Block) else "",
+                "call": f"{aliases.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
                 "solver": ""
                 if isinstance(k, Block)
                 else "rhs_or_solved"

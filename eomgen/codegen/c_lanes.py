@@ -47,15 +47,15 @@ def rhs_blocks(program: Program) -> list[str]:
     """Names of the blocks of the right-hand side in lanes; none if it has no lanes."""
     if loops_in_lanes(program):
         return [name for name in CLOSED if name in program.block_names]
-    rhs = program.twins.get("rhs", "rhs")
+    rhs = program.aliases.get("rhs", "rhs")
     return [rhs] if rhs in public_blocks(program) else []
 
 
 def public_blocks(program: Program) -> set[str]:
     """Names of the blocks behind public functions that are straight-line code and have lanes."""
     made = {k.name for k in program.kernels}
-    wanted = {program.twins.get(name, name) for name in (*LANES, *(DERIVATIVES if made <= {*DERIVATIVES} else ()))}
-    return wanted & {program.twins.get(k.name, k.name) for k in program.kernels if isinstance(k, Block)}
+    wanted = {program.aliases.get(name, name) for name in (*LANES, *(DERIVATIVES if made <= {*DERIVATIVES} else ()))}
+    return wanted & {program.aliases.get(k.name, k.name) for k in program.kernels if isinstance(k, Block)}
 
 
 def lane_blocks(program: Program) -> dict[str, Block]:
@@ -68,8 +68,8 @@ def lane_blocks(program: Program) -> dict[str, Block]:
 
 def lane_kernels(program: Program) -> list[str]:
     """Names of the public functions that have lanes."""
-    blocks, twins, closed = public_blocks(program), program.twins, loops_in_lanes(program)
-    return [k.name for k in program.kernels if twins.get(k.name, k.name) in blocks or (closed and k.name == "rhs")]
+    blocks, aliases, closed = public_blocks(program), program.aliases, loops_in_lanes(program)
+    return [k.name for k in program.kernels if aliases.get(k.name, k.name) in blocks or (closed and k.name == "rhs")]
 
 
 def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[str, Printed]) -> dict[str, str]:

@@ -48,21 +48,21 @@ def runs_of(table: Sequence[Sequence[int]]) -> list[RowRun]:
     """A table as runs, which give its rows one after the other."""
     rows = [tuple(row) for row in table]
     found: list[RowRun] = []
-    alone: list[Row] = []  # rows that fit no run
+    single: list[Row] = []  # rows that fit no run
     at = 0
     while at < len(rows):
         period, times = _longest(rows, at)
         if times * period > 2 * period:  # a run holds each row of its period twice
-            if alone:
-                found.append(RowRun(alone, (), 1))
-                alone = []
+            if single:
+                found.append(RowRun(single, (), 1))
+                single = []
             steps = [_step(rows[at + k], rows[at + period + k]) for k in range(period)]
             found.append(RowRun(rows[at : at + period], steps, times))
             at += period * times
         else:
-            alone.append(rows[at])
+            single.append(rows[at])
             at += 1
-    return [*found, RowRun(alone, (), 1)] if alone else found
+    return [*found, RowRun(single, (), 1)] if single else found
 
 
 def _step(first: Row, second: Row) -> Row:
@@ -269,9 +269,9 @@ def _law(
         step = own if letter in "ls" else shape
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
-    alone = replace(program, graph=graph)
+    inner = replace(program, graph=graph)
     pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
-    return print_pieces(alone, name, pieces, places).text, used_helpers(alone, outputs)
+    return print_pieces(inner, name, pieces, places).text, used_helpers(inner, outputs)
 
 
 def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
@@ -295,23 +295,16 @@ def _declared(program: str, used: UsedSum, again: bool, held: bool) -> str:
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
     text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(plain_numbers(function)))}];\n"
-    if used.sums:
-        text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
-        text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", (n, 0, results))
-    if used.lists:
-        text += f"EOMGEN_PIECE void {prefix}_spots(const double *given, double *out, double *work);\n"
-        text += _each(f"pairs_{function.name}_spots", f"{prefix}_spots", (n, 0, function.spots))
-    if used.meets:
-        text += (
-            f"EOMGEN_PIECE void {prefix}_meeting(const double *given, const double *accelerations, double *out, "
-            "double *work);\n"
-        )
-        text += _each(f"pairs_{function.name}_meeting", f"{prefix}_meeting", (n, MOTION * function.bodies, MEETING))
-    if used.slopes:
-        text += (
-            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"
-        )
-        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results))
+    parts = {
+        "sum": (used.sums, "", (n, 0, results)),
+        "spots": (used.lists, "", (n, 0, function.spots)),
+        "meeting": (used.meets, "const double *accelerations, ", (n, MOTION * function.bodies, MEETING)),
+        "slope": (used.slopes, "const double *rates, ", (n, n, results)),
+    }
+    for part, (wanted, more, sizes) in parts.items():
+        if wanted:
+            text += f"EOMGEN_PIECE void {prefix}_{part}(const double *given, {more}double *out, double *work);\n"
+            text += _each(f"pairs_{function.name}_{part}", f"{prefix}_{part}", sizes)
     if held:
         text += f"EOMGEN_PIECE void {prefix}_held(const double *given, double *out, double *work);\n"
     if again:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +13,11 @@ from ..expr.core import Expr
 from .c_layout import places_again
 from .c_text import BlockPrinter, Printed, direct_results, function_text, print_block
 from .program import Block, Program
-from .segments import FEW, Place, SegmentKind, Segments, find_segments
+from .segments import Place, SegmentKind, Segments, find_segments
 from .statements import CIRCULAR, Operand, Pairs, Pieces, PrintedFunction, conditions, find_pairs, references
 
 CALLED = 24  #: runs in one function; more go through a table of runs
 ROW = 12  #: numbers in a line of a table
-CARRIED = 6  #: values that a loop keeps in variables from one body to the next at most
 #: A function is made of loops where that takes the text of so many times fewer statements.
 ALIKE = 2
 
@@ -53,11 +51,7 @@ def _print(
     if ALIKE * found.written > found.carried_out:
         return None
     found.lists.again = again
-    carried = _find_carried(found)
-    printed = [
-        _print_kind(program, found, kind, along, f"{name}_{n}")
-        for n, (kind, along) in enumerate(zip(found.kinds, carried, strict=True))
-    ]
+    printed = [_print_kind(program, found, kind, f"{name}_{n}") for n, kind in enumerate(found.kinds)]
     made = {i for k in found.kinds for segment in k.members for i in segment}
     direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
     bare = tuple(sorted({y.id for y in checks} - made))
@@ -129,42 +123,7 @@ def _print_list(found: Segments, i: int, name: str) -> str:
     return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
 
 
-class FromBefore(NamedTuple):
-    """What every member of a kind reads from the one before it, so that it stays in a variable."""
-
-    reads: dict[int, int]  #: what the first member reads -> number of the export of the member before
-    first: dict[int, int]  #: number of the export -> where the first member reads it
-    alone: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
-
-
-def _find_carried(found: Segments) -> list[FromBefore]:
-    """Of every kind; kinds that carry much are left as they are, since registers are few."""
-    result = []
-    read: set[int] = set()
-    for kind in found.kinds:
-        stride, n = len(kind.exports), len(kind.members)
-        reads, first = {}, {}
-        for column in zip(*kind.reads, strict=True):
-            places = [int(at) if array == "w" else -1 for array, at in (found.places[j] for j in column)]
-            e = places[1] - kind.start if n > 1 else -1
-            follows = 0 <= e < stride and all(at == kind.start + m * stride + e for m, at in enumerate(places[1:]))
-            if follows and e not in first and n > FEW:
-                reads[column[0]], first[e] = e, places[0]
-                read.add(places[0])  # which may lie inside a chain of another kind
-            else:
-                read.update(places)
-        if len(reads) > CARRIED:
-            read.update(kind.start + m * stride + e for e in first for m in range(n))
-            reads, first = {}, {}
-        result.append((reads, first))
-    return [
-        FromBefore(reads, first, frozenset(e for e in first if read.isdisjoint(
-            range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
-        for kind, (reads, first) in zip(found.kinds, result, strict=True)
-    ]  # fmt: skip
-
-
-def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: FromBefore, name: str) -> str:
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
     if found.lists.is_list(kind.members[0][0]):
         return _print_list(found, kind.members[0][0], name)
@@ -180,8 +139,6 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
             values = tuple(value for _, value in where)
             if len(set(values)) > 1:
                 fixed[i] = f"k[{numbers.setdefault(values, len(numbers))}]"
-        elif i in carried.reads:
-            fixed[i] = f"r{carried.reads[i]}"
         elif array == "w":
             loads[i] = table.text([at for _, at in where])
         else:
@@ -191,7 +148,6 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     stores = {
         statements[index]: table.text([kind.start + e + m * stride for m in range(n)])
         for e, index in enumerate(kind.exports)
-        if e not in carried.alone
     }
     results = {
         i: tuple(table.text([found.results[one[k]][at] for one in kind.members]) for at in range(len(found.results[i])))
@@ -203,10 +159,7 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     inlined = conditions(program.graph, statements, kept, checks)
     printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
     printer.lists = found.lists
-    printer.named = frozenset(statements[kind.exports[e]] for e in carried.first)
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
-    lines += [f"r{e} = {printer.real(statements[kind.exports[e]])};" for e in carried.first]
-    before, after = _print_carried(kind, carried)
     head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
     head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []
     body = "\n".join(f"        {line}" for line in head + lines)
@@ -217,23 +170,10 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: F
     if numbers:
         every = list(zip(*numbers, strict=True))
         tables += f"EOMGEN_SHARED const double {name}_numbers[{n}][{len(numbers)}] = {{\n{_rows(every)}\n}};\n"
-    opening, closing = ("".join(f"    {line}\n" for line in part) for part in (before, after))
     signature = f"static EOMGEN_APART flag {name}(EOMGEN_ARGUMENTS, int first, int last)"
     loop = f"    for (int m = first; m < last; m++) {{\n{body}\n    }}\n"
-    inside = f"    EOMGEN_BEGIN\n{opening}{loop}{closing}    EOMGEN_RETURN"
+    inside = f"    EOMGEN_BEGIN\n{loop}    EOMGEN_RETURN"
     return f"{tables}{signature}\n{{\n{inside}\n}}\n"
-
-
-def _print_carried(kind: SegmentKind, carried: FromBefore) -> tuple[list[str], list[str]]:
-    """What comes before and after the loop over members."""
-    stride = len(kind.exports)
-    before, after = [], []
-    for e, place in carried.first.items():
-        last = f"{kind.start + e - stride} + {stride}"
-        before.append(f"real r{e} = w[first ? {last}*first : {place}];")
-        if e in carried.alone:
-            after.append(f"w[{last}*last] = r{e};")
-    return before, after
 
 
 def _rows(rows: Sequence[Sequence[float]]) -> str:

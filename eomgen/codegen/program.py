@@ -240,7 +240,7 @@ class Program:
         return frozenset(nodes[i][0] for i in reachable(self.graph, roots)) & calls.keys()
 
     @cached_property
-    def twins(self) -> dict[str, str]:
+    def aliases(self) -> dict[str, str]:
         """Blocks that compute exactly what an earlier one does -> the name of that one; never blocks of drivers."""
         needed = {name for d in self.drivers for name in d.blocks}
         first: dict[tuple[object, ...], str] = {}

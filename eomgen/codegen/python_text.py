@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..base.numeric.user_functions import Curve, Surface
 from ..base.operations import CONDITION, OPERATIONS
 from ..expr.core import symbols_of
 from ..expr.differentiate import square_under_root
+from ..expr.functions import Function
 from ..expr.pairs import PairCall, PairFunction, PairPart, pair_call
 from .program import Block, Program
 from .statements import Pieces, PrintedFunction, cut, references
@@ -172,6 +174,16 @@ def print_block(program: Program, block: Block) -> str:
     end = ["return checked(out, lost)" if block.checks else "return out"]
     ports = " ".join(port.name for port in block.ports)
     return _print_pieces(printer, block.name, f"[{ports}] -> ({block.n_out}, ...)", pieces, start, end)
+
+
+def print_table(function: Function, curve: str, surface: str) -> str:
+    """``call_<name>``, a table of the model, as these two make it."""
+    table, head = function.evaluator, f"call_{function.name}"
+    if isinstance(table, Curve):
+        return f"{head} = {curve}({table.knots.tolist()}, {table.coefficients.tolist()}, {table.period!r})"
+    assert isinstance(table, Surface)
+    nodes = table.nodes.reshape(-1, 4).tolist()
+    return f"{head} = {surface}({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"
 
 
 def print_precompute(program: Program) -> str:

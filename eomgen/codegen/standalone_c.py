@@ -45,7 +45,7 @@ def operations_of(program: Program, name: str) -> str:
     """What one call of a public function carries out, in words."""
     kernel = next(k for k in program.kernels if k.name == name)
     if isinstance(kernel, Block):
-        return f"{_counted(program.counts[program.twins.get(name, name)])}"
+        return f"{_counted(program.counts[program.aliases.get(name, name)])}"
     together = _counted(sum((program.counts[part] for part in kernel.blocks), Operations()))
     if not program.has_loops and name == "rhs" and "tree" not in program.block_names and not program.tree_by_columns:
         return f"{together}, and {factoring_operations(program.parent)} to solve for the accelerations"

@@ -41,36 +41,19 @@ cdef extern from "eomgen_contacts.h" nogil:
         EOMGEN_MORE_ROOM
         EOMGEN_NO_INPUT
     ctypedef struct eomgen_rigid:
-        int n_q, n_v, n_u, n_rows, n_c, n_h, n_plain, n_balls, n_lists, n_shapes, n_spots, d, m
-        const int *rows
-        const int *plain
-        const int *balls
-        const int *lists
+        int n_q, n_v, n_u, n_rows, n_c, n_h, n_plain, n_balls, n_lists, n_shapes, n_spots, m, most, begins, wide, room, needed
+        int known, missed, iterations, contacts, status, list
+        const_ints rows, plain, balls, lists
         const signed char *moved
-        eomgen_source mass, jacobian, drift, closure, near, axes, bias, meeting
+        eomgen_source mass
         int (*inputs)(void *, double, const double *, double *) noexcept nogil
         void *forcing
-        double *u
-        double *w
-        double tolerance
-        int most, begins, wide, room, needed
-        int *numbers
-        double *x
-        double *x_m
-        double *next
-        double *held
-        double *many
-        int known
-        int *keys
-        double *last
-        double *acting
-        double residual, depth
-        int missed, iterations, contacts
-        const eomgen_source *source
-        const double *where
-        double when
+        ints numbers, keys
+        reals u, w, x, x_m, next, held, many, last, acting
+        double tolerance, residual, depth, when
         double law[2]
-        int status, list
+        const eomgen_source *source
+        const_reals where
     int eomgen_contacts_wide()
     long eomgen_rigid_fixed(const eomgen_rigid *)
     long eomgen_rigid_further(const eomgen_rigid *)
@@ -134,11 +117,6 @@ cdef class RigidStepper:
         u (n_u,) for t and x.
     within : (float, float)
         Times between which tables are read.
-
-    Attributes
-    ----------
-    residual, depth, missed, iterations, contacts
-        The largest residual (m/s) and penetration (m), steps that missed the tolerance, the most iterations and contacts.
     """
 
     cdef eomgen_rigid s
@@ -244,24 +222,10 @@ cdef class RigidStepper:
         return self.s.list, self.s.needed, self.s.law[0], self.s.law[1]
 
     @property
-    def residual(self):
-        return self.s.residual
-
-    @property
-    def depth(self):
-        return self.s.depth
-
-    @property
-    def missed(self):
-        return self.s.missed
-
-    @property
-    def iterations(self):
-        return self.s.iterations
-
-    @property
-    def contacts(self):
-        return self.s.contacts
+    def figures(self):
+        """The largest residual (m/s) and penetration (m), steps that missed the tolerance, the most iterations and contacts."""
+        return {"contact_iterations": self.s.iterations, "contacts": self.s.contacts, "missed_steps": self.s.missed,
+                "contact_residual": self.s.residual, "penetration": self.s.depth}
 
 
 cdef const void *pointer(cnp.ndarray table):

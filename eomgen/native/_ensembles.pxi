@@ -4,46 +4,26 @@ cdef extern from "eomgen_ensembles.h" nogil:
     ctypedef struct eomgen_ensemble:
         const eomgen_method *method
         const eomgen_model *model
-        eomgen_function rhs
-        eomgen_function jacobian, meeting
-        int n_q
+        eomgen_function rhs, jacobian, meeting
         const eomgen_series *series
         void (*lane_rhs)() noexcept
         void (*lane_series)() noexcept
-        int lane_width
-        int n
-        ptrdiff_t count
-        const double *x0
-        const double *p
-        const double *u
-        ptrdiff_t p_stride, u_stride
-        const double *nodes
-        int n_nodes
+        int lane_width, n, n_q, n_nodes, stop
+        ptrdiff_t count, p_stride, u_stride, n_eval, n_notes, done
+        const_reals x0, p, u, nodes, atol, t_eval
         double rtol, max_step, first_step
-        const double *atol
         int64_t max_steps
-        const double *t_eval
-        ptrdiff_t n_eval
-        double *samples
-        double *x
-        double *t
-        int *status
+        reals samples, x, t, notes, failure_time
+        ints status, failure
         int64_t *steps
         int64_t *rejected
         int64_t *evaluations
-        ptrdiff_t n_notes
-        double *notes
         int64_t *noted
-        int *failure
-        double *failure_time
-        ptrdiff_t next, done
-        int stop
     ctypedef struct eomgen_thread:
         const eomgen_signal *signals
         eomgen_events *events
-        double *notes
+        reals notes, memory
         ptrdiff_t notes_room
-        double *memory
     ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *, const eomgen_thread *) noexcept
     void eomgen_ensemble_work(eomgen_ensemble *, const eomgen_thread *) noexcept
 

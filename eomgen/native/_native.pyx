@@ -63,55 +63,36 @@ cdef extern from "eomgen.h" nogil:
         const eomgen_series *series
         const char *compiler
 
+ctypedef double *reals
+ctypedef const double *const_reals
+ctypedef int *ints
+ctypedef const int *const_ints
+
 cdef extern from "eomgen_steppers.h" nogil:
     ctypedef struct eomgen_tape:
         int n, n_out
-        const int *code
-        const double *numbers
-        const int *out
-        double *results
+        const_ints code, out
+        const_reals numbers
+        reals results
     ctypedef struct eomgen_signal:
         int n, order
-        const double *times
-        const double *values
+        const_reals times, values
         const eomgen_tape *tape
     ctypedef struct eomgen_run:
-        eomgen_function rhs
-        const double *c
-        double *u
+        eomgen_function rhs, jacobian, meeting
+        const_reals c, atol, closed
+        reals u, w, y, y_old, f, next, K, F, failure_state
         const eomgen_signal *signals
-        int n_u
-        double *w
-        int n
-        double rtol, max_step, t_bound, direction
-        const double *atol
-        double t, t_old, step, h_abs
-        double *y
-        double *y_old
-        double *f
-        const double *closed
-        double *next
-        double *K
-        double *F
-        int interpolates
-        long evaluations, rejected
-        int failure
-        double failure_time
-        double *failure_state
-        double hold
-        long steps, most_steps
-        long until_callback
+        const eomgen_series *series
+        int n, n_u, n_q, n_beside, interpolates, failure, stopped
+        double rtol, max_step, t_bound, direction, t, t_old, step, h_abs, hold, failure_time
+        long evaluations, rejected, steps, until_callback, differentiations, factorizations
         long (*callback)(void *, const double *) noexcept nogil
         void *callback_data
-        eomgen_function jacobian, meeting
-        int n_q, n_beside
         int (*ask)(void *, double, const double *, double *, double *) noexcept nogil
-        long differentiations, factorizations
-        const eomgen_series *series
-        int order, side, expanded, stopped
     ctypedef struct eomgen_method:
         const char *name
-        int rows_K, rows_F, error_order, squares, expands
+        int rows_K, rows_F, squares, expands
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
         void (*prepare)(eomgen_run *) noexcept nogil
         void (*begin)(eomgen_run *) noexcept nogil
@@ -124,7 +105,6 @@ cdef extern from "eomgen_steppers.h" nogil:
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
     int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
     void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
-    void eomgen_play(const eomgen_tape *, double, const double *, const double *, const double *, double *) noexcept
     const char **eomgen_operations
 
 cdef extern from *:

@@ -286,53 +286,23 @@ from time import perf_counter
 
 cdef extern from "eomgen_loop.h" nogil:
     ctypedef struct eomgen_events:
-        int n, n_model, n_tape
-        eomgen_function values
+        int n, n_model, n_tape, n_resets, crowd, for_slope
+        eomgen_function values, resets, project
         const eomgen_tape *tape
         int (*outside)(void *, double, const double *, double *) noexcept nogil
         void *asker
-        const int *direction
+        const_ints direction, action, reset_of, reset_x
         const long *most
-        const int *action
-        eomgen_function resets, project
-        int n_resets
-        const int *reset_of
-        const int *reset_x
-        double *values_reset
-        double *g
-        double *g_new
-        double *slope
-        double *slope_new
-        double *size
-        double *trial
-        double *y
+        reals values_reset, g, g_new, slope, slope_new, size, trial, y, bracket, latest
         long *count
-        int *leaving
-        double *bracket
-        int *whose
-        int *fired
-        int *touch
-        int crowd
-        double *latest
-        double last_reset
-        int crowded, for_slope
+        ints leaving, whose, fired, touch
     ctypedef struct eomgen_trajectory:
-        const double *nodes
-        long n_nodes
-        const double *t_eval
-        long n_eval
+        const_reals nodes, t_eval
         eomgen_events *events
         double span
-        long room
-        double *times
-        double *states
-        long pieces_room
-        double *pieces
-        long notes_room
-        double *notes
-        long trail_room
-        double *trail
-        long node, done, stored, n_pieces, n_notes, n_trail, resets
+        reals times, states, pieces, notes, trail
+        long n_nodes, n_eval, room, pieces_room, notes_room, trail_room
+        long node, stored, n_pieces, n_notes, n_trail, resets
         int begun
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED, EOMGEN_STOPPED
     int eomgen_advance(const eomgen_method *, eomgen_run *, eomgen_trajectory *) noexcept

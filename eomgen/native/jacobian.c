@@ -249,24 +249,6 @@ static void every_column(const eom_at *at, double *restrict out)
     }
 }
 
-/* A = L L^T in place; nonzero where the preferred coordinates hardly move. */
-static int factor_shares(int f, double *restrict A)
-{
-    for (int i = 0; i < f; i++) {
-        for (int j = 0; j <= i; j++) {
-            double sum = A[i * f + j];
-            for (int k = 0; k < j; k++) {
-                sum -= A[i * f + k] * A[j * f + k];
-            }
-            if (i == j && !(sum > CONSTRAINTS_SPANNING)) {
-                return 1;
-            }
-            A[i * f + j] = i == j ? sqrt(sum) : sum / A[j * f + j];
-        }
-    }
-    return 0;
-}
-
 static int few_columns(const eom_at *at, double *restrict out)
 {
     double *const span = AT(SPAN), *const A = AT(SHARES), *const y = AT(CHANGE);
@@ -282,24 +264,15 @@ static int few_columns(const eom_at *at, double *restrict out)
             A[i * F + k] = of_v[order[i]] * s[order[k]] / s[order[i]];
         }
     }
-    if (factor_shares(F, A) != 0) {
+    if (cholesky(F, F, CONSTRAINTS_SPANNING, A) != 0) { /* the preferred coordinates hardly move */
         return 1;
     }
     fill(NX * NX, 0.0, out);
     for (int column = 0; column < N; column++) {
         for (int k = 0; k < F; k++) {
             y[k] = span[2 * k * NX + column] * s[order[k]] / (s[column] * s[column]);
-            for (int j = 0; j < k; j++) {
-                y[k] -= A[k * F + j] * y[j];
-            }
-            y[k] /= A[k * F + k];
         }
-        for (int k = F - 1; k >= 0; k--) {
-            for (int j = k + 1; j < F; j++) {
-                y[k] -= A[j * F + k] * y[j];
-            }
-            y[k] /= A[k * F + k];
-        }
+        cholesky_solve(F, F, A, y);
         for (int k = 0; k < F; k++) {
             const double part = y[k] * s[order[k]], *const of_v = span + 2 * k * NX, *const of_q = of_v + NX;
             for (int i = 0; i < NX; i++) {

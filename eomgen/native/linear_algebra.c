@@ -58,16 +58,16 @@ static void multiply_add(int rows, int columns, const double *restrict a, const 
     }
 }
 
-/* G = L L^T in place, lower triangle of the first `rows` rows of the m x m matrix; status 3 where G is not positive
-   definite. */
-static int cholesky(int rows, int m, double *restrict g)
+/* G = L L^T in place, lower triangle of the first `rows` rows of the m x m matrix; status 3 where a pivot is not above
+   the least. */
+static int cholesky(int rows, int m, double least, double *restrict g)
 {
     for (int j = 0; j < rows; j++) {
         double d = g[j * m + j];
         for (int k = 0; k < j; k++) {
             d -= g[j * m + k] * g[j * m + k];
         }
-        if (!(d > 0.0)) {
+        if (!(d > least)) {
             return isnan(d) ? EOMGEN_NON_FINITE : EOMGEN_PROJECTION_FAILED;
         }
         d = sqrt(d);
@@ -120,7 +120,7 @@ static int factor_gram(int rows, int n, int m, const double *restrict J, double 
     for (int i = 0; i < rows; i++) {
         G[i * m + i] += largest > CONSTRAINTS_UNMOVED * CONSTRAINTS_UNMOVED ? relative * largest : 1.0;
     }
-    return cholesky(rows, m, G);
+    return cholesky(rows, m, 0.0, G);
 }
 
 /* b = A^-1 b with A = L D L^T of f rows. */

@@ -313,7 +313,7 @@ static int form_normal(const eom_at *at, const double *restrict q)
     for (int i = 0; i < MH; i++) {
         G[i * M + i] += largest > CONSTRAINTS_UNMOVED * CONSTRAINTS_UNMOVED ? CONSTRAINTS_TIKHONOV * largest : 1.0;
     }
-    return cholesky(MH, M, G);
+    return cholesky(MH, M, 0.0, G);
 }
 
 /* change -= the least one of q that changes the scaled residual by r + J d, which the best velocities d leave of r. The

@@ -1,7 +1,7 @@
 /* What the C text of a model needs where it is compiled for a device. NVRTC has none of the headers of C, but the functions
    of math.h and string.h without them. Every thread has a state, or a run, of its own. */
 #define EOMGEN_PORTABLE       /* no vector types */
-#define EOMGEN_ALONE          /* nobody is called back, no expressions come at run time */
+#define EOMGEN_DEVICE          /* nobody is called back, no expressions come at run time */
 #define EOMGEN_WITHOUT_TABLES
 #ifdef __CUDACC_RTC__
 typedef long long int64_t;

@@ -494,10 +494,7 @@ static int of_start(fmu_instance *f, double *dx, const double *du, const double 
     }
     const double h = spacing_along(m, dx, du, dp);
     f->before = *m;
-    for (int k = -3; k <= 3 && h > 0.0 && status == FMU_OK; k++) {
-        if (k == 0) {
-            continue;
-        }
+    for (int k = -3; k <= 3 && h > 0.0 && status == FMU_OK; k += k == -1 ? 2 : 1) {
         for (int i = 0; i < FMU_N_X; i++) {
             m->x[i] += k * h * dx[i];
             m->guessed[i] = !FMU_INDEPENDENT[i];
@@ -553,10 +550,7 @@ static int of_outputs(fmu_instance *f, const double *dx, const double *du, const
     (void)d_rates;
     memset(sum, 0, FMU_N_Y * sizeof(double));
     int status = 0;
-    for (int k = -3; k <= 3 && h > 0.0 && status == 0; k++) {
-        if (k == 0) {
-            continue;
-        }
+    for (int k = -3; k <= 3 && h > 0.0 && status == 0; k += k == -1 ? 2 : 1) {
         for (int i = 0; i < FMU_N_X; i++) {
             x[i] = m->x[i] + k * h * dx[i];
         }

@@ -203,8 +203,8 @@ FAULTS = (
     ),
     Fault(
         "lanes-samples", "C sample_lanes",
-        "e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][l];",
-        "e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][0];",
+        "take_lane(n, run->z, l, e->samples",
+        "take_lane(n, run->z, 0, e->samples",
         "samples of all lanes are those of the first",
         "tests/code/test_steps.py::test_every_run_of_an_ensemble_has_its_own_closed_form[False-DOP853]",
     ),

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ...base.numeric.user_functions import Curve, Surface, Twin
+from ...base.numeric.user_functions import Twin
 from ...base.without_gc import timed, without_gc
 from ...errors import cannot
 from ...expr.functions import Function
@@ -17,7 +17,7 @@ from ..c_layout import describe_equations, work_areas
 from ..files import SourceSet, render
 from ..pair_sums import used_sums
 from ..program import Program
-from ..python_text import print_block, print_pair_sum, print_precompute
+from ..python_text import print_block, print_pair_sum, print_precompute, print_table
 
 #: Ports of directions along which blocks are derivatives.
 DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
@@ -34,7 +34,7 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
     imports = [f"from .base.numeric.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
-    definitions = [_table_text(f) for f, _ in calls.values() if f.native is None]
+    definitions = [print_table(f, "Curve", "Surface") for f, _ in calls.values() if f.native is None]
     sums = used_sums(program)
     if sums:
         imports.append("from .base.numeric.pair_sums import PairSum")
@@ -45,18 +45,6 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
             imports.append("from .base.numeric.polygon_edges import facing")
         definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions
-
-
-def _table_text(function: Function) -> str:
-    table = function.evaluator
-    head = f"call_{function.name}"
-    if isinstance(table, Curve):
-        rows = "".join(f"        {tuple(row)},\n" for row in table.coefficients.tolist())
-        return f"{head} = Curve(\n    {table.knots.tolist()},\n    (\n{rows}    ),\n    {table.period!r},\n)"
-    assert isinstance(table, Surface)
-    rows = "".join(f"        {tuple(row)},\n" for row in table.nodes.reshape(-1, 4).tolist())
-    lines = f"{table.x.tolist()},\n    {table.y.tolist()}"
-    return f"{head} = Surface(\n    {lines},\n    (\n{rows}    ),\n    {table.slope!r},\n)"
 
 
 def twins(program: Program) -> dict[str, Twin]:
@@ -81,13 +69,13 @@ def emit_numpy(program: Program) -> SourceSet:
     imports, definitions = define_functions(program)
     text = json.dumps(program.metadata, allow_nan=False)
     context = {
-        "twins": program.twins,
+        "aliases": program.aliases,
         "name": program.name,
         "metadata_lines": [repr(text[k : k + 100]) for k in range(0, len(text), 100)],
         "imports": imports,
         "definitions": definitions,
         "functions": [
-            *(print_block(program, b) for b in program.blocks if b.name not in program.twins),
+            *(print_block(program, b) for b in program.blocks if b.name not in program.aliases),
             print_precompute(program),
         ],
         "blocks": [(b, sum(len(port.symbols) for port in b.ports if port.name in DIRECTIONS)) for b in program.blocks],

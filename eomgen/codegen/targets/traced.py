@@ -17,12 +17,11 @@ from ...base.numeric.scales import Space
 from ...base.numeric.user_functions import Curve, Surface
 from ...base.targets import TRACED_KERNELS
 from ...errors import MissingDependencyError, cannot
-from ...expr.functions import Function
 from ..c_functions import used_calls
 from ..files import example_state, render
 from ..pair_sums import refuse_sums
 from ..program import Program
-from ..python_text import print_block_of_lists, print_constants_of_lists
+from ..python_text import print_block_of_lists, print_constants_of_lists, print_table
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
 LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}
@@ -82,7 +81,7 @@ def _context(program: Program, library: str) -> dict[str, Any]:
     public = _public(program, minimal)
     moving = [k for k in program.preferred if k < n_v - program.n_states]
     independent_q = [program.coordinate_of[k] for k in moving]
-    twins = program.twins
+    aliases = program.aliases
     return {
         "name": program.name,
         "doc": str(metadata.get("doc") or "").strip(),
@@ -96,10 +95,10 @@ def _context(program: Program, library: str) -> dict[str, Any]:
         "x0": _numbers(example_state(program)),
         "curves": Curve in kinds,
         "surfaces": Surface in kinds,
-        "definitions": [_table(f) for f in functions],
+        "definitions": [print_table(f, "curve", "surface") for f in functions],
         "functions": [
-            *(print_block_of_lists(program, b, "block_") for b in program.blocks if b.name not in twins),
-            *(f"block_{name} = block_{first}\n" for name, first in twins.items()),
+            *(print_block_of_lists(program, b, "block_") for b in program.blocks if b.name not in aliases),
+            *(f"block_{name} = block_{first}\n" for name, first in aliases.items()),
             print_constants_of_lists(program),
         ],
         "has_loops": has_loops,
@@ -171,16 +170,6 @@ def _numbers(values: Any) -> str:
     """The text of a tuple of numbers."""
     texts = ['float("nan")' if x is None or x != x else repr(float(x)) for x in values or ()]
     return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
-
-
-def _table(function: Function) -> str:
-    table = function.evaluator
-    head = f"call_{function.name}"
-    if isinstance(table, Curve):
-        return f"{head} = curve({table.knots.tolist()}, {table.coefficients.tolist()}, {table.period!r})"
-    assert isinstance(table, Surface)
-    nodes = table.nodes.reshape(-1, 4).tolist()
-    return f"{head} = surface({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"
 
 
 def functions(program: Program) -> ModuleType:

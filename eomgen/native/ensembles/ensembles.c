@@ -94,7 +94,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
 }
 
 /* One trajectory after the other from a queue that threads share. */
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
 EOMGEN_PIECE extern const eomgen_lane_worker eomgen_lane_worker2, eomgen_lane_worker4, eomgen_lane_worker8;
 
 static const eomgen_lane_worker *const lane_workers[] = {

@@ -140,9 +140,7 @@ static void prepare_single(eomgen_run *run)
 {
     const lane_single *const single = (const lane_single *)run;
     const lane_run *const lanes = single->lanes;
-    for (int i = 0; i < single->method.rows_K * run->n; i++) {
-        run->K[i] = lanes->K[i][single->l];
-    }
+    take_lane(single->method.rows_K * run->n, lanes->K, single->l, run->K);
     single->lanes->all->method->prepare(run);
 }
 
@@ -227,14 +225,10 @@ static EOMGEN_APART void play_lanes(lane_run *lanes, real t, const real *y)
         if (!lanes->awake[l]) {
             continue;
         }
-        for (int i = 0; i < lanes->n; i++) {
-            state[i] = y[i][l];
-        }
+        take_lane(lanes->n, y, l, state);
         run->hold = lanes->hold[l];
         eomgen_force(run, t[l], state);
-        for (int i = 0; i < lanes->n_u; i++) {
-            lanes->u[i][l] = run->u[i];
-        }
+        put_lane(lanes->n_u, run->u, l, lanes->u);
     }
 }
 
@@ -243,9 +237,7 @@ static const double *inputs_single(const lane_run *lanes, int l)
 {
     eomgen_run *const run = &single_of(lanes, l)->run;
     double *const state = run->failure_state;
-    for (int i = 0; i < lanes->n; i++) {
-        state[i] = lanes->y[i][l];
-    }
+    take_lane(lanes->n, lanes->y, l, state);
     run->hold = lanes->hold[l];
     eomgen_force(run, lanes->t[l], state);
     return run->u;
@@ -255,9 +247,8 @@ static const double *inputs_single(const lane_run *lanes, int l)
 static eomgen_run *take_out(const lane_run *lanes, int l)
 {
     eomgen_run *const run = &single_of(lanes, l)->run;
-    for (int i = 0; i < lanes->n; i++) {
-        run->y[i] = lanes->y[i][l], run->y_old[i] = lanes->y_old[i][l], run->f[i] = lanes->f[i][l];
-    }
+    take_lane(lanes->n, lanes->y, l, run->y), take_lane(lanes->n, lanes->y_old, l, run->y_old);
+    take_lane(lanes->n, lanes->f, l, run->f);
     run->t = lanes->t[l], run->t_old = lanes->t_old[l], run->t_bound = lanes->t_bound[l], run->hold = lanes->hold[l];
     run->h_abs = lanes->size[l], run->until_callback = -1, run->interpolates = 0, run->stopped = 0;
     run->evaluations = 0, run->failure = 0;
@@ -271,13 +262,11 @@ static void put_back(lane_run *lanes, int l, const eomgen_run *run, int changed)
     if (run->failure != 0) {
         lanes->failure[l] = run->failure, lanes->failure_time[l] = run->failure_time;
     }
-    for (int i = 0; changed && i < lanes->n; i++) {
-        lanes->y[i][l] = run->y[i], lanes->f[i][l] = run->f[i];
-        if (lanes->closed != NULL) {
-            lanes->next[i][l] = run->next[i];
-        }
-    }
     if (changed) {
+        put_lane(lanes->n, run->y, l, lanes->y), put_lane(lanes->n, run->f, l, lanes->f);
+        if (lanes->closed != NULL) {
+            put_lane(lanes->n, run->next, l, lanes->next);
+        }
         lanes->t[l] = run->t, lanes->size[l] = run->h_abs;
     }
 }
@@ -308,8 +297,7 @@ static EOMGEN_APART int end_lane_step(eomgen_ensemble *e, lane_run *lanes, int l
     return status;
 }
 
-/* The queue of trajectories and the rounds of steps. */
-/* Store what is asked for up to now of the lanes that have moved. */
+/* The queue of trajectories and the rounds of steps. Store what is asked for up to now of the lanes that have moved. */
 static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run *run, flag moved, double direction)
 {
     const int n = run->n;
@@ -324,10 +312,7 @@ static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run
                     wanted[l] = -1;
                     break;
                 }
-                for (int i = 0; i < n; i++) {
-                    e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->y[i][l];
-                }
-                run->done[l]++;
+                take_lane(n, run->y, l, e->samples + (run->index[l] * e->n_eval + run->done[l]++) * n);
             }
         }
         if (!any_of(wanted)) {
@@ -342,10 +327,9 @@ static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run
         }
         method->interpolate(run, times, run->z);
         for (int l = 0; l < W; l++) {
-            for (int i = 0; wanted[l] && i < n; i++) {
-                e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][l];
+            if (wanted[l]) {
+                take_lane(n, run->z, l, e->samples + (run->index[l] * e->n_eval + run->done[l]++) * n);
             }
-            run->done[l] += wanted[l] != 0;
         }
     }
 }
@@ -356,9 +340,7 @@ static void end_lane(eomgen_ensemble *e, lane_run *run, int l, int status)
     for (ptrdiff_t j = run->done[l] * run->n; j < e->n_eval * run->n; j++) {
         e->samples[k * e->n_eval * run->n + j] = (double)NAN;
     }
-    for (int i = 0; i < run->n; i++) {
-        e->x[k * run->n + i] = run->y[i][l];
-    }
+    take_lane(run->n, run->y, l, e->x + k * run->n);
     e->t[k] = run->t[l], e->status[k] = status;
     e->steps[k] = run->steps[l], e->rejected[k] = run->rejected[l], e->evaluations[k] = run->evaluations[l];
     e->failure[k] = run->failure[l], e->failure_time[k] = run->failure_time[l];
@@ -392,15 +374,9 @@ static EOMGEN_APART void fill_lane(eomgen_ensemble *e, lane_run *run, int l, dou
         run->steps[l] = run->rejected[l] = run->evaluations[l] = 0;
         run->size_before[l] = 0.0;
         const int status = e->model->precompute(e->p + k * e->p_stride, constants);
-        for (int i = 0; i < e->model->n_const; i++) {
-            run->c[i][l] = constants[i];
-        }
-        for (int i = 0; i < e->model->n_u; i++) {
-            run->u[i][l] = e->u[k * e->u_stride + i];
-        }
-        for (int i = 0; i < run->n; i++) {
-            run->y[i][l] = e->x0[k * run->n + i];
-        }
+        put_lane(e->model->n_const, constants, l, run->c);
+        put_lane(e->model->n_u, e->u + k * e->u_stride, l, run->u);
+        put_lane(run->n, e->x0 + k * run->n, l, run->y);
         run->t[l] = run->t_old[l] = e->nodes[0];
         if (run->singles != NULL) {
             fill_single(e, run, l, k, constants);
@@ -427,7 +403,6 @@ static void advance_nodes(eomgen_ensemble *e, lane_run *run, double direction, d
     }
 }
 
-/* The step that each lane tries: its size with the sign of the run, 0 for those without a trajectory. */
 /* The longest step that a lane may take next, as eomgen_longest has it. */
 static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *run, int l, double direction, double least)
 {
@@ -437,20 +412,17 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
     for (int i = 0; i < run->n; i++) {
         x[i] = i < e->n_q ? run->y[i][l] : run->y[i][l] * direction;
     }
-    for (int i = e->n_q; i < run->n; i++) {
-        x[run->n - e->n_q + i] = run->f[i][l];
-    }
+    take_lane(run->n - e->n_q, run->f + e->n_q, l, x + run->n);
     for (int i = 0; i < run->n_u; i++) {
         const int table = run->signals != NULL && run->signals[i].n > 0 && !run->plays;
         u[i] = run->plays ? inputs_single(run, l)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
     }
-    for (int i = 0; i < model->n_const; i++) {
-        c[i] = run->c[i][l];
-    }
+    take_lane(model->n_const, run->c, l, c);
     const int status = e->meeting(run->t[l], x, u, c, found, w);
     return status == 0 && found[0] < e->max_step ? fmin(e->max_step, fmax(found[0], RUNS_UNHURRIED * least)) : e->max_step;
 }
 
+/* The step that each lane tries: its size with the sign of the run, 0 for those without a trajectory. */
 static void choose_steps(eomgen_ensemble *e, lane_run *run, double direction, double *constants)
 {
     const real t = run->t, spacing = abs_of(t) * 0x1p-52; /* of numbers there, or more */

@@ -52,26 +52,33 @@ typedef struct {
     void (*interpolate)(const lane_run *run, real t, real *y);
 } lane_method;
 
+/* Numbers of one lane, and back. */
+static inline void take_lane(int n, const real *from, int l, double *to)
+{
+    for (int i = 0; i < n; i++) {
+        to[i] = from[i][l];
+    }
+}
+
+static inline void put_lane(int n, const double *from, int l, real *to)
+{
+    for (int i = 0; i < n; i++) {
+        to[i][l] = from[i];
+    }
+}
+
 /* x' of one lane by the function of one state, into k; its status. */
 static int evaluate_single(lane_run *run, int l, real t, const real *y, real *k)
 {
     const eomgen_model *const model = run->all->model;
     double *const x = run->single, *const out = x + run->n, *const u = out + run->n, *const c = u + run->n_u, *const w = c + model->n_const;
-    for (int i = 0; i < run->n; i++) {
-        x[i] = y[i][l];
-    }
-    for (int i = 0; i < run->n_u; i++) {
-        u[i] = run->u[i][l];
-    }
-    for (int i = 0; i < model->n_const; i++) {
-        c[i] = run->c[i][l];
-    }
+    take_lane(run->n, y, l, x);
+    take_lane(run->n_u, run->u, l, u);
+    take_lane(model->n_const, run->c, l, c);
     const int status = run->all->rhs(t[l], x, u, c, out, w);
-    for (int i = 0; i < run->n; i++) {
-        k[i][l] = out[i];
-        if (run->closed != NULL) {
-            run->closed[i][l] = w[model->closed_at + i];
-        }
+    put_lane(run->n, out, l, k);
+    if (run->closed != NULL) {
+        put_lane(run->n, w + model->closed_at, l, run->closed);
     }
     return status;
 }

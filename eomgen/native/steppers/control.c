@@ -7,7 +7,7 @@
 
 int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
 {
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (run->ask != NULL) {
         run->stopped = run->stopped || run->ask(run->callback_data, t, y, NULL, k) != 0;
         return 0;
@@ -89,7 +89,7 @@ static void keep_closed(eomgen_run *run)
 void eomgen_start(const eomgen_method *method, eomgen_run *run)
 {
     run->interpolates = 0;
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (run->ask != NULL) {
         method->begin(run);
         return;
@@ -100,7 +100,7 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
     if (!(run->h_abs > 0.0) && !method->expands) {
         run->h_abs = first_step(method, run);
     }
-#ifndef EOMGEN_ALONE /* which has no such methods */
+#ifndef EOMGEN_DEVICE /* which has no such methods */
     if (method->begin != NULL) {
         method->begin(run);
     }
@@ -121,7 +121,7 @@ static int too_small(const eomgen_run *run, double h)
 double eomgen_longest(eomgen_run *run)
 {
     double longest = run->max_step;
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (run->meeting != NULL) { /* backwards in time velocities are opposite, accelerations are not */
         double *const motion = run->K;
         const int n = run->n - run->n_beside;
@@ -144,7 +144,7 @@ double eomgen_longest(eomgen_run *run)
 
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (method->step != NULL) {
         return method->step(run);
     }
@@ -239,7 +239,7 @@ double eomgen_table_value(const eomgen_signal *s, double t, double hold)
 
 void eomgen_force(eomgen_run *run, double t, const double *y)
 {
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (run->ask != NULL) {
         run->stopped = run->ask(run->callback_data, t, y, run->u, NULL) != 0 || run->stopped;
         return;
@@ -247,7 +247,7 @@ void eomgen_force(eomgen_run *run, double t, const double *y)
 #endif
     for (int i = 0; i < run->n_u; i++) {
         const eomgen_signal *const s = run->signals + i;
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
         if (s->n > 0 && s->tape != NULL) {
             eomgen_play(s->tape, t, y, run->u, run->c, run->u + i);
             continue;
@@ -263,7 +263,7 @@ void eomgen_force(eomgen_run *run, double t, const double *y)
 
 #include "eomgen_real.h"
 
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
 /* Expressions given at run time, one instruction after the other: the operations of the graph that models are made of. */
 /* EOMGEN_TAPE(X) lists X(name, value of a, b, c) for each row of the table of operations; leaves come before. */
 #define NAME_OF(NAME, VALUE) #NAME,

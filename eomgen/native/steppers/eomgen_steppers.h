@@ -119,7 +119,7 @@ void eomgen_note(eomgen_run *run, int status, double t, const double *y);
 void eomgen_failed(eomgen_run *run, int status, double t, const double *y, double *k);
 
 /* What a run calls by a pointer; on a device, whose stack has to be known beforehand, by its name. There nobody is called
-   back either, and no expressions come at run time: EOMGEN_ALONE. */
+   back either, and no expressions come at run time: EOMGEN_DEVICE. */
 #ifndef EOMGEN_RHS
 #define EOMGEN_RHS(run) (run)->rhs
 #endif

@@ -23,7 +23,7 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
             g[i] = (double)NAN;
         }
     }
-#ifndef EOMGEN_ALONE
+#ifndef EOMGEN_DEVICE
     if (ev->tape != NULL) {
         eomgen_play(ev->tape, t, y, run->u, run->c, g + ev->n_model);
     }
@@ -228,21 +228,33 @@ static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, d
     return n + 1;
 }
 
-/* A reset left the value at zero: it has to be seen on its side before it can come back. Where a step ends on the other
-   side and never shows it there, it came back within the accuracy of the step: resets that die away. */
-static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+/* Whether a value that is zero where a step begins is seen on a side: 1, or 2 where it then comes back, within a bracket. */
+static int leave_zero(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double side, double *bracket)
 {
     double t = run->t_old, g = 0.0;
     int seen = 0;
     for (int k = RUNS_HALVED; k >= 0; k--) {
         const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
         const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
-        if (seen && value * ev->leaving[i] <= 0.0) {
-            ev->leaving[i] = 0;
-            return add(ev, n, i, t, next, g, value);
+        if (seen && value * side <= 0.0) {
+            bracket[0] = t, bracket[1] = next, bracket[2] = g, bracket[3] = value;
+            return 2;
         }
-        seen = seen || value * ev->leaving[i] > 0.0;
+        seen = seen || value * side > 0.0;
         t = next, g = value;
+    }
+    return seen;
+}
+
+/* A reset left the value at zero: it has to be seen on its side before it can come back. Where a step ends on the other
+   side and never shows it there, it came back within the accuracy of the step: resets that die away. */
+static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+{
+    double bracket[4];
+    const int seen = leave_zero(method, run, ev, i, ev->leaving[i], bracket);
+    if (seen == 2) {
+        ev->leaving[i] = 0;
+        return add(ev, n, i, bracket[0], bracket[1], bracket[2], bracket[3]);
     }
     const double moment = RUNS_INSTANT * fmax(fabs(run->t), RUNS_EARLIEST); /* a step this short shows rounding only */
     const int side = ev->leaving[i], back = !seen && ev->g_new[i] * side < 0.0 && fabs(run->t - run->t_old) > moment;
@@ -258,17 +270,10 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
 static int brackets_from_zero(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
 {
     const double side = run->direction * ev->slope[i] > 0.0 ? 1.0 : -1.0;
-    double t = run->t_old, g = 0.0;
-    int seen = 0;
-    for (int k = RUNS_HALVED; k >= 0; k--) {
-        const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
-        const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
-        if (seen && value * side <= 0.0) {
-            n = add(ev, n, i, run->t_old, run->t_old, -side, 0.0);
-            return add(ev, n, i, t, next, g, value);
-        }
-        seen = seen || value * side > 0.0;
-        t = next, g = value;
+    double bracket[4];
+    if (leave_zero(method, run, ev, i, side, bracket) == 2) {
+        n = add(ev, n, i, run->t_old, run->t_old, -side, 0.0);
+        return add(ev, n, i, bracket[0], bracket[1], bracket[2], bracket[3]);
     }
     return add(ev, n, i, run->t_old, run->t, 0.0, ev->g_new[i]);
 }
@@ -416,7 +421,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_traj
         eomgen_between(method, run, zero, row + 2);
         ev->count[i]++;
         ev->latest[i] = zero;
-        if (ev->touch[i] != 0 && (ev->action[i] != EOMGEN_GO_ON || fabs(run->t - zero) <= RUNS_LATE * fabs(run->step))) {
+        if (ev->touch[i] != 0 && (ev->action[i] != EOMGEN_GO_ON || fabs(run->t - zero) <= RUNS_STEP_END * fabs(run->step))) {
             ev->leaving[i] = ev->touch[i]; /* so that it is not found again beside this zero */
         }
         if (ev->most[i] > 0 && ev->count[i] >= ev->most[i]) {

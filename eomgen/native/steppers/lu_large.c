@@ -102,38 +102,6 @@ static int lu_columns_complex(int n, int begin, int end, double *restrict a, dou
     return 0;
 }
 
-static int lu_factor_complex(int n, double *restrict a, double *restrict c, int *restrict order)
-{
-    return lu_columns_complex(n, 0, n, a, c, order);
-}
-
-static void lu_solve_complex(int n, const double *restrict a, const double *restrict c, const int *restrict order,
-                             double *restrict b, double *restrict d)
-{
-    for (int k = 0; k < n; k++) {
-        const double x = b[order[k]], y = d[order[k]];
-        b[order[k]] = b[k], d[order[k]] = d[k];
-        b[k] = x, d[k] = y;
-    }
-    for (int i = 1; i < n; i++) {
-        double x = b[i], y = d[i];
-        for (int k = 0; k < i; k++) {
-            x -= a[i * n + k] * b[k] - c[i * n + k] * d[k];
-            y -= a[i * n + k] * d[k] + c[i * n + k] * b[k];
-        }
-        b[i] = x, d[i] = y;
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        double x = b[i], y = d[i];
-        for (int k = i + 1; k < n; k++) {
-            x -= a[i * n + k] * b[k] - c[i * n + k] * d[k];
-            y -= a[i * n + k] * d[k] + c[i * n + k] * b[k];
-        }
-        const double re = a[i * n + i], im = c[i * n + i];
-        b[i] = x * re - y * im, d[i] = x * im + y * re;
-    }
-}
-
 /* As lu_large.c, of a + i c. */
 #if defined(EOMGEN_VECTORS)
 #define TURN(p, q, row) \
@@ -176,11 +144,9 @@ static void take_panel_complex(int rows, int depth, int columns, int step, const
 
 static int factor_complex(int n, double *restrict a, double *restrict c, int *restrict order)
 {
-    if (n < LARGE_FROM) {
-        return lu_factor_complex(n, a, c, order);
-    }
-    for (int begin = 0; begin < n; begin += PANEL) {
-        const int end = n - begin < PANEL ? n : begin + PANEL, right = begin * n + end;
+    const int wide = n < LARGE_FROM ? n : PANEL;
+    for (int begin = 0; begin < n; begin += wide) {
+        const int end = n - begin < wide ? n : begin + wide, right = begin * n + end;
         if (lu_columns_complex(n, begin, end, a, c, order)) {
             return 1;
         }
@@ -207,22 +173,22 @@ static void take_rows_complex(int n, int row, int first, int last, const double 
     b[row] = p, d[row] = q, b[row + 1] = r, d[row + 1] = s;
 }
 
-static void take_one_complex(int n, int i, int k, const double *restrict a, const double *restrict c, double *restrict b,
-                             double *restrict d)
+/* The same of one entry. */
+static void take_one_complex(int n, int i, int first, int last, const double *restrict a, const double *restrict c,
+                             double *restrict b, double *restrict d)
 {
-    const double x = b[k], y = d[k];
-    b[i] -= a[i * n + k] * x - c[i * n + k] * y;
-    d[i] -= a[i * n + k] * y + c[i * n + k] * x;
+    double x = b[i], y = d[i];
+    for (int k = first; k < last; k++) {
+        x -= a[i * n + k] * b[k] - c[i * n + k] * d[k];
+        y -= a[i * n + k] * d[k] + c[i * n + k] * b[k];
+    }
+    b[i] = x, d[i] = y;
 }
 
 static void solve_complex(int n, const double *restrict a, const double *restrict c, const int *restrict order,
                           double *restrict b, double *restrict d)
 {
-    const int all = n - n % 2;
-    if (n < LARGE_FROM) {
-        lu_solve_complex(n, a, c, order, b, d);
-        return;
-    }
+    const int all = n < LARGE_FROM ? 0 : n - n % 2;
     for (int k = 0; k < n; k++) {
         const double x = b[order[k]], y = d[order[k]];
         b[order[k]] = b[k], d[order[k]] = d[k];
@@ -232,18 +198,14 @@ static void solve_complex(int n, const double *restrict a, const double *restric
         if (i < all && i % 2 == 0) {
             take_rows_complex(n, i, 0, i, a, c, b, d);
         }
-        for (int k = i < all ? i - i % 2 : 0; k < i; k++) {
-            take_one_complex(n, i, k, a, c, b, d);
-        }
+        take_one_complex(n, i, i < all ? i - i % 2 : 0, i, a, c, b, d);
     }
     for (int i = n - 1; i >= 0; i--) {
         const int end = i < all ? i - i % 2 + 2 : n;
         if (i < all && i % 2 == 1) {
             take_rows_complex(n, i - 1, end, n, a, c, b, d);
         }
-        for (int k = i + 1; k < end; k++) {
-            take_one_complex(n, i, k, a, c, b, d);
-        }
+        take_one_complex(n, i, i + 1, end, a, c, b, d);
         const double x = b[i], y = d[i], re = a[i * n + i], im = c[i * n + i];
         b[i] = x * re - y * im, d[i] = x * im + y * re;
     }

@@ -211,35 +211,9 @@ def solver_class(core: Any, name: str) -> Any:
             settings = stepper_options(self.n, abs(t_bound - t0), options)
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
 
-        @property
-        def nfev(self) -> int:
-            """Evaluations of the right-hand side so far."""
-            stepper = self.__dict__.get("_stepper")
-            return 0 if stepper is None else int(stepper.evaluations)
-
-        @nfev.setter
-        def nfev(self, value: int) -> None:
-            """OdeSolver sets it to 0 before there is a stepper."""
-
-        @property
-        def njev(self) -> int:
-            """Evaluations of the Jacobian so far."""
-            stepper = self.__dict__.get("_stepper")
-            return 0 if stepper is None else int(stepper.differentiations)
-
-        @njev.setter
-        def njev(self, value: int) -> None:
-            """OdeSolver sets it to 0 before there is a stepper."""
-
-        @property
-        def nlu(self) -> int:
-            """Matrices factored so far."""
-            stepper = self.__dict__.get("_stepper")
-            return 0 if stepper is None else int(stepper.factorizations)
-
-        @nlu.setter
-        def nlu(self, value: int) -> None:
-            """OdeSolver sets it to 0 before there is a stepper."""
+        nfev = _count("evaluations", "Evaluations of the right-hand side so far.")
+        njev = _count("differentiations", "Evaluations of the Jacobian so far.")
+        nlu = _count("factorizations", "Matrices factored so far.")
 
         def _step_impl(self) -> tuple[bool, str | None]:
             stepper = self._stepper
@@ -253,6 +227,16 @@ def solver_class(core: Any, name: str) -> Any:
 
     Solver.__name__ = Solver.__qualname__ = name
     return Solver
+
+
+def _count(name: str, what: str) -> property:
+    """A count of a stepper; OdeSolver sets it to 0 before there is one."""
+
+    def count(self: Any) -> int:
+        stepper = self.__dict__.get("_stepper")
+        return 0 if stepper is None else int(getattr(stepper, name))
+
+    return property(count, lambda self, value: None, None, what)
 
 
 def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:

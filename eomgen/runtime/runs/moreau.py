@@ -515,18 +515,16 @@ def step_rigidly(
     finally:
         if watch is not None:
             watch.close()
-    met = steps.stepper
-    if met.missed and not is_told_by_the_caller():
+    met = steps.stepper.figures
+    if met["missed_steps"] and not is_told_by_the_caller():
         warnings.warn(
-            f"{met.missed} of {steps.taken} steps leave a residual of the contact laws of up to {met.residual:.3g} "
-            f"m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
-            f"{iterations}: allow more iterations, or a larger tolerance",
+            f"{met['missed_steps']} of {steps.taken} steps leave a residual of the contact laws of up to "
+            f"{met['contact_residual']:.3g} m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, "
+            f"after contact_iterations = {iterations}: allow more iterations, or a larger tolerance",
             ContactWarning,
             stacklevel=calls_within() + 1,
         )
-    counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken}
-    counts |= {"contact_iterations": met.iterations, "contacts": met.contacts, "missed_steps": met.missed}
-    counts |= {"contact_residual": met.residual, "penetration": met.depth}
+    counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken, **met}
     ends = (start, end)
     told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
     dense = partial(_between, times, states)
