@@ -16,7 +16,7 @@ from ..base.names import acceleration_name
 from ..errors import EomgenError
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate as of_graph
-from ..expr.rounding_bounds import with_bounds
+from ..expr.identity import with_bounds
 from ..verify.cases import Case, random_cases
 from .author import Author
 
