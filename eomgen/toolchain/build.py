@@ -44,8 +44,9 @@ QUIET = 1.0  #: seconds that lanes may be compiled without a line on stderr
 
 
 def compile_sources(
-    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None = None
-) -> CacheEntry:
+    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None = None,
+    key: str | None = None,
+) -> CacheEntry:  # fmt: skip
     """Compile a model, or find it in the cache.
 
     Parameters
@@ -61,6 +62,8 @@ def compile_sources(
     options : Options
     progress : callable, optional
         Takes a line for each step.
+    key : str, optional
+        Of the entry, from :func:`key_of_program`; that of the sources and flags by default.
 
     Raises
     ------
@@ -90,7 +93,7 @@ def compile_sources(
         "native": describe_native(compiler, tuple(machine_flags(options, compiler))) if options.native else "",
         **_setting(compiler),
     }  # fmt: skip
-    cache, key = Cache(cache_directory()), compute_key(parts)
+    cache, key = Cache(cache_directory()), key or compute_key(parts)
     if (entry := cache.find(key)) is not None:
         return entry
     with cache.attempt(key) as directory:
@@ -299,17 +302,18 @@ def compile_lanes(file: Path) -> CacheEntry | None:
 # -- a program that was compiled before --------------------------------------------------------------------------------
 
 
-def note_of(fingerprint: str | None, options: Options) -> str | None:
-    """Under which note the build of a program is known, so that its sources need not be written again.
+def key_of_program(fingerprint: str | None, options: Options) -> str | None:
+    """Key of the build of a program, so that its sources need not be written to find it.
 
-    None: it is not; the program has no fingerprint, the options ask for what the compiler knows of this processor, or
-    the files of eomgen are not the code that runs.
+    None: it follows from the sources; the program has no fingerprint, the options ask for what the compiler knows of
+    this processor, or the files of eomgen are not the code that runs.
     """
     writers = None if fingerprint is None or options.native else digest_writers()
     if writers is None:
         return None
     parts = {
-        "kind": "note", "program": fingerprint, "writers": writers, "options": asdict(options), "lanes": lane_width(),
+        "kind": "program", "program": fingerprint, "writers": writers, "lanes": lane_width(),
+        "options": asdict(options) | {"jobs": None},
         "compiler": compiler_files(options.compiler), "platform": f"{sys.platform}-{platform.machine()}",
     }  # fmt: skip
     return compute_key(parts)

@@ -114,10 +114,6 @@ class Cache:
         """Bytecode of templates."""
         return Kept(self.root / "templates")
 
-    @property
-    def _notes(self) -> Kept:
-        return Kept(self.root / "shortcuts")
-
     def find(self, key: str) -> CacheEntry | None:
         """The entry of a key if it is there and every file is as it was published; notes that it was used.
 
@@ -258,7 +254,6 @@ class Cache:
                 total -= entry.size
                 removed.append(entry)
         self.sweep()
-        self._forget()
         return removed
 
     def clear(self) -> int:
@@ -269,7 +264,6 @@ class Cache:
             self._remove(directory)
         shutil.rmtree(self.templates.folder, ignore_errors=True)
         self.sweep()
-        self._forget()
         return len(directories)
 
     def discard(self, key: str) -> None:
@@ -287,13 +281,6 @@ class Cache:
                     with files.hold(attempt):
                         shutil.rmtree(attempt)
 
-    def _forget(self) -> None:
-        """Remove the notes of builds that are gone."""
-        for note in self._notes.names():
-            key = (self._notes.read(note) or b"").decode("ascii", "replace")
-            if not key or not os.path.isdir(self._entries / key):
-                self._notes.remove(note)
-
     def _remove(self, entry: Path) -> None:
         """Remove an entry, which disappears at once and is then taken apart."""
         try:
@@ -304,19 +291,6 @@ class Cache:
             shutil.rmtree(away, ignore_errors=True)
         except OSError as error:
             raise bad_cache(f"the cache entry {entry} cannot be removed: {error}") from error
-
-    # A note under the digest of a program, and of all that its sources and flags follow from, tells the key of its
-    # build: sources need not be written again. It is a hint where to look; the entry itself is checked as ever.
-
-    def find_noted(self, note: str | None) -> CacheEntry | None:
-        """The entry that a note tells, if it is there."""
-        key = (self._notes.read(note) or b"").decode("ascii", "replace") if note else ""
-        return self.find(key) if key else None
-
-    def note(self, note: str | None, key: str) -> None:
-        """Keep a note; a cache that cannot be written still serves."""
-        if note:
-            self._notes.write(note, key.encode())
 
 
 def _describe(directory: Path, manifest: Mapping[str, Any]) -> CacheEntry:

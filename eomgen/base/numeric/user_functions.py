@@ -49,15 +49,7 @@ class Curve:
                 k = np.clip(pieces(self.knots, x), 1, len(self.knots) - 1)
             else:
                 k = pieces(self.knots, x)
-            h = x - self.knots[np.maximum(k - 1, 0)]
-            a, b, c, d = np.moveaxis(self.coefficients[k], -1, 0)
-            if order == 0:
-                return ((a * h + b) * h + c) * h + d
-            if order == 1:
-                return (3.0 * a * h + 2.0 * b) * h + c
-            if order == 2:
-                return 6.0 * a * h + 2.0 * b
-            return 6.0 * a + 0.0 * h if order == 3 else 0.0 * h
+            return cubic(x - self.knots[np.maximum(k - 1, 0)], np.moveaxis(self.coefficients[k], -1, 0), order)
 
 
 class Surface:
@@ -81,44 +73,76 @@ class Surface:
     def __call__(self, x: Value, y: Value, order_x: int = 0, order_y: int = 0) -> Value:
         with np.errstate(all="ignore"):
             x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-            i, i1, along_x = self._weights(self.x, x, order_x)
-            j, j1, along_y = self._weights(self.y, y, order_y)
-            nodes = self.nodes
-            corners = []
-            for line in (j, j1):
-                f, fx, fy, fxy = np.moveaxis(nodes[i, line], -1, 0)
-                g, gx, gy, gxy = np.moveaxis(nodes[i1, line], -1, 0)
-                corners += [_combined(along_x, f, fx, g, gx), _combined(along_x, fy, fxy, gy, gxy)]
-            return _combined(along_y, *corners)
-
-    def _weights(self, knots: np.ndarray, x: np.ndarray, order: int) -> tuple[Any, Any, tuple[Any, ...]]:
-        """Lower and upper grid line of each x, and the weights of :func:`_combined` (cubic Hermite basis)."""
-        k = pieces(knots, x)
-        low, high = np.maximum(k - 1, 0), np.minimum(k, len(knots) - 1)
-        inside = low < high
-        h = x - knots[low]
-        length = np.where(inside, knots[high] - knots[low], 1.0)
-        s = h / length
-        none = 0.0 * s
-        if order == 0:
-            w = (1.0 + none, s * s * (3.0 - 2.0 * s), h * (1.0 - s) * (1.0 - s), h * s * (s - 1.0))
-            beyond = (1.0 + none, none, self.slope * h, none)
-        elif order == 1:
-            w = (none, 6.0 * s * (1.0 - s) / length, (1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0))
-            beyond = (none, none, self.slope + none, none)
-        elif order == 2:
-            w = (none, 6.0 * (1.0 - 2.0 * s) / (length * length), (6.0 * s - 4.0) / length, (6.0 * s - 2.0) / length)
-            beyond = (none, none, none, none)
-        else:
-            size = 1.0 if order == 3 else 0.0
-            square = 6.0 * size / (length * length) + none
-            w = (none, -12.0 * size / (length * length * length) + none, square, square)
-            beyond = (none, none, none, none)
-        return low, high, tuple(np.where(inside, a, b) for a, b in zip(w, beyond, strict=True))
+            (i, i1), (j, j1) = _between(self.x, x), _between(self.y, y)
+            low, high = (
+                [*np.moveaxis(self.nodes[line, j], -1, 0), *np.moveaxis(self.nodes[line, j1], -1, 0)]
+                for line in (i, i1)
+            )
+            along_x, along_y = (x, self.x[i], self.x[i1]), (y, self.y[j], self.y[j1])
+            return bicubic(along_x, along_y, low, high, self.slope, order_x, order_y)
 
 
-def _combined(w: tuple[Any, ...], f: Value, slope: Value, g: Value, slope_g: Value) -> Value:
+def _between(lines: np.ndarray, x: np.ndarray) -> tuple[Any, Any]:
+    """Lower and upper grid line of each x, the same one outside."""
+    k = pieces(lines, x)
+    return np.maximum(k - 1, 0), np.minimum(k, len(lines) - 1)
+
+
+# What follows is written into modules for CasADi and JAX as it stands, whose ``np`` has these functions too.
+
+
+def cubic(h: Value, row: Sequence[Value], order: int) -> Value:
+    """A cubic, or a derivative of it, at the distance h from its left end."""
+    a, b, c, d = row
+    if order == 0:
+        return ((a * h + b) * h + c) * h + d
+    if order == 1:
+        return (3.0 * a * h + 2.0 * b) * h + c
+    if order == 2:
+        return 6.0 * a * h + 2.0 * b
+    return 6.0 * a + 0.0 * h if order == 3 else 0.0 * h
+
+
+def hermite(x: Value, x0: Value, x1: Value, slope: float, order: int) -> list[Value]:
+    """Weights of a value, of a difference of values, and of the slopes at both ends; outside, of the edge."""
+    inside = np.less(x0, x1)
+    h = x - x0
+    length = np.where(inside, x1 - x0, 1.0)
+    s = h / length
+    none = 0.0 * s
+    if order == 0:
+        w = (1.0 + none, s * s * (3.0 - 2.0 * s), h * (1.0 - s) * (1.0 - s), h * s * (s - 1.0))
+        beyond = (1.0 + none, none, slope * h, none)
+    elif order == 1:
+        w = (none, 6.0 * s * (1.0 - s) / length, (1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0))
+        beyond = (none, none, slope + none, none)
+    elif order == 2:
+        w = (none, 6.0 * (1.0 - 2.0 * s) / (length * length), (6.0 * s - 4.0) / length, (6.0 * s - 2.0) / length)
+        beyond = (none, none, none, none)
+    else:
+        size = 1.0 if order == 3 else 0.0
+        square = 6.0 * size / (length * length) + none
+        w = (none, -12.0 * size / (length * length * length) + none, square, square)
+        beyond = (none, none, none, none)
+    return [np.where(inside, a, b) for a, b in zip(w, beyond, strict=True)]
+
+
+def combined(w: Sequence[Value], f: Value, slope: Value, g: Value, slope_g: Value) -> Value:
+    """What the weights make of the values and slopes at both ends."""
     return w[0] * f + w[1] * (g - f) + w[2] * slope + w[3] * slope_g
+
+
+def bicubic(
+    x: tuple[Value, Value, Value], y: tuple[Value, Value, Value], low: Sequence[Value], high: Sequence[Value],
+    slope: float, order_x: int, order_y: int,
+) -> Value:  # fmt: skip
+    """A value from the four nodes around; low and high hold those of the lower and upper line along x."""
+    along_x, along_y = hermite(*x, slope, order_x), hermite(*y, slope, order_y)
+    corners = []
+    for k in (0, 4):
+        (f, fx, fy, fxy), (g, gx, gy, gxy) = low[k : k + 4], high[k : k + 4]
+        corners += [combined(along_x, f, fx, g, gx), combined(along_x, fy, fxy, gy, gxy)]
+    return combined(along_y, *corners)
 
 
 def base_orders(orders: Orders, known: Sequence[Orders]) -> Orders:

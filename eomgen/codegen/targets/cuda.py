@@ -67,7 +67,7 @@ def emit_device_text(program: Program) -> str:
     texts["eomgen_methods.h"] = read_sources(["steppers/dop853"])
     there: set[str] = set()
     model = _flattened([name for name in sources if name.endswith(".c")], texts, there)
-    header = _flattened(["eomgen_real.h", "eomgen_steppers.h"], texts, there)
+    header = _flattened(["eomgen_real.h", "eomgen_steppers.h", "eomgen_loop.h"], texts, there)
     methods = {name: _flattened([name], texts, there) for name in SOURCES}
     steppers = _flattened(["steppers"], texts, there)
     if program.metadata.get("events"):  # all in one takes NVRTC a minute

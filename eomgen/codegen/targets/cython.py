@@ -9,7 +9,7 @@ from typing import Any
 from ...base.without_gc import timed, without_gc
 from ...errors import ModelError, Problem, ToolchainError, no_such
 from ...expr.functions import Function
-from ...toolchain.build import compile_sources, note_of
+from ...toolchain.build import compile_sources, key_of_program
 from ...toolchain.cache import Cache, cache_directory
 from ...toolchain.compiler import Options
 from ...toolchain.load import load_core
@@ -27,8 +27,8 @@ def load(
         raise no_such(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     chosen, cache = Options(**options), Cache(cache_directory())
     with without_gc(), timed(seconds, "emit"):
-        note = note_of(fingerprint(program), chosen)
-        entry = cache.find_noted(note)
+        key = key_of_program(fingerprint(program), chosen)
+        entry = None if key is None else cache.find(key)
         if entry is None:
             from ..c import emit_c
             from ..files import keep_bytecode
@@ -38,10 +38,9 @@ def load(
     with timed(seconds, "compile"):
         if entry is None:
             try:
-                entry = compile_sources("model", sources, program.name, chosen)
+                entry = compile_sources("model", sources, program.name, chosen, key=key)
             except ToolchainError as error:
                 raise _blame_source(error, functions.values()) or error from None
-            cache.note(note, entry.key)
     with without_gc(), timed(seconds, "load"):
         return load_core(entry)
 

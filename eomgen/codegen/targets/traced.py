@@ -6,7 +6,9 @@ which the libraries differ (``templates/casadi``, ``templates/jax``).  Projectio
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from hashlib import sha256
+from inspect import getsource, signature
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -14,7 +16,7 @@ from ...base.files import find_module, load_source
 from ...base.kernel_table import NAMED
 from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
 from ...base.numeric.scales import Space
-from ...base.numeric.user_functions import Curve, Surface
+from ...base.numeric.user_functions import Curve, Surface, bicubic, combined, cubic, hermite
 from ...base.targets import TRACED_KERNELS
 from ...errors import MissingDependencyError, cannot
 from ..c_functions import used_calls
@@ -25,6 +27,8 @@ from ..python_text import print_block_of_lists, print_constants_of_lists, print_
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
 LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}
+#: Functions written into the module for a kind of table.
+TABLES: dict[type, list[Callable[..., Any]]] = {Curve: [cubic], Surface: [hermite, combined, bicubic]}
 OF_LOOPS = {"rhs": "rhs_of_loops", "project": "project_state", "outputs": "outputs_of_loops"}
 
 
@@ -95,6 +99,7 @@ def _context(program: Program, library: str) -> dict[str, Any]:
         "x0": _numbers(example_state(program)),
         "curves": Curve in kinds,
         "surfaces": Surface in kinds,
+        "tables": [_source(f) for kind, used in TABLES.items() if kind in kinds for f in used],
         "definitions": [print_table(f, "curve", "surface") for f in functions],
         "functions": [
             *(print_block_of_lists(program, b, "block_") for b in program.blocks if b.name not in aliases),
@@ -170,6 +175,12 @@ def _numbers(values: Any) -> str:
     """The text of a tuple of numbers."""
     texts = ['float("nan")' if x is None or x != x else repr(float(x)) for x in values or ()]
     return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
+
+
+def _source(function: Callable[..., Any]) -> str:
+    """The text of a function without the types of its arguments."""
+    text, names = getsource(function), ", ".join(signature(function).parameters)
+    return f"def {function.__name__}({names}):\n    {text[text.index(chr(34) * 3) :]}"
 
 
 def functions(program: Program) -> ModuleType:
