@@ -220,7 +220,7 @@ def linearize(
 
 def _without_switches(layout: Layout, tangent: TangentSpace) -> TangentSpace:
     """The same without the states that are 0 while a constraint is open, which no motion changes."""
-    switched = [layout.v.index(f"{name}_closed") for name in layout.metadata.get("switched", ())]
+    switched = [layout.v.index(state) for state in layout.switches.values()]
     kept = ~np.isin(tangent.velocities, switched)
     n_z = len(tangent.positions)
     T = np.hstack([tangent.T[:, :n_z], tangent.T[:, n_z:][:, kept]])

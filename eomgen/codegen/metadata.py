@@ -233,9 +233,9 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "coordinate_kinds": list(kinematics.kinds),
         "velocity_kinds": [*kinematics.velocity_kinds, *("state" for _ in states)],
         "quaternion_slots": [list(slot) for slot in kinematics.quaternion_slots],
-        **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
+        **({"coordinate_of": list(kinematics.coordinate_of)} if m.written is not None else {}),
         "independent_places": list(mobility.places),
-        **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
+        **({"energy_known": False} if m.written is not None and m.written.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
@@ -245,7 +245,11 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "not_finite_where": {x.name: x.not_finite_where for x in forces if x.not_finite_where},
         "reaction_laws": list(kinematics.reaction_laws),
-        **({"switched": [s.constraint.name for s in m.switched if s.constraint is not None]} if m.switched else {}),
+        **(
+            {"switched": {s.constraint.name: s.state for s in m.switched if s.constraint is not None}}
+            if m.switched
+            else {}
+        ),
         "held_rows": [list(row) for row in kinematics.held_rows],
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],

@@ -35,7 +35,7 @@ def solve_rows(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> 
         return found
     n = len(found.still) - len(rows)
     inner = [row[count:] for row in found.gain[n:]]
-    on = [closed(row) for row in rows]
+    on = [row.on for row in rows]
     A = switched_matrix(inner, on)
     right = [[-(s * w) for s, w in zip(on, found.still[n:], strict=True)]]
     right += [[-(s * row[j]) for s, row in zip(on, found.gain[n:], strict=True)] for j in range(count)]
@@ -43,12 +43,6 @@ def solve_rows(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> 
     still = [combined(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
     gain = [[combined(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
     return LinearValues(still, gain)
-
-
-def closed(row: SwitchedRow) -> Expr:
-    """1 while the constraint of a row is closed."""
-    graph = row.rest.graph
-    return graph.apply("lt", 0.5, graph.symbol(row.state))
 
 
 def switched_matrix(inner: Matrix, on: Sequence[Expr]) -> Matrix:
@@ -125,7 +119,7 @@ class AfterEvents:
         lasting = list[RowAfter]()
         if not {*k.names, *k.velocity_names}.isdisjoint(given):
             lasting = self._lasting(own, new)
-            held = [one._replace(on=closed(row)) for one, row in zip(own, self.rows, strict=True)] if closes else own
+            held = [one._replace(on=row.on) for one, row in zip(own, self.rows, strict=True)] if closes else own
             acting = [*(lasting if len(lasting) <= MOST else ()), *held]
             v = self._moved(v, v, acting, [self._shortest(one) for one in acting])
         if closes:  # an impact
@@ -148,7 +142,7 @@ class AfterEvents:
 
     def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""
-        on = given.get(row.state, closed(row))
+        on = given.get(row.state, row.on)
         rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
         return RowAfter(on, J, rate, error, error - before, self._size(row.kind))

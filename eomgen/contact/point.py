@@ -30,7 +30,7 @@ from ..elements.forces.normal_laws import (
     PartlyDamped,
     read_normal_law,
 )
-from ..elements.frames import Marker
+from ..elements.frames import Marker, velocity_at
 from ..elements.kinds import Fields, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
@@ -149,10 +149,7 @@ class Contact(Force):
     def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
         """Normal, penetration, arms, sliding velocity and the rate of penetration."""
         normal, depth, first, second = self.touch(view)
-        v1, v2 = (
-            vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
-            for marker, arm in ((self.first, first), (self.second, second))
-        )
+        v1, v2 = velocity_at(view, self.first, first), velocity_at(view, self.second, second)
         relative = vec.sub(v2, v1)
         parting = vec.dot(normal, relative)
         return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting

@@ -14,6 +14,7 @@ from ..base.limits.contacts import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEAR
 from ..base.records import dataclass
 from ..elements.forces.force import Load, View, beyond_zero, where
 from ..elements.forces.normal_laws import NormalLaw
+from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.vectors import Vec3
@@ -118,10 +119,7 @@ class SoilCell(Contact):
         outward = vec.add(vec.scale(nx, ahead), vec.scale(ny, up))
         along = vec.sub(vec.scale(nx, up), vec.scale(ny, ahead))
         _, depth, first, second = self.touch(view)
-        v1, v2 = (
-            vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
-            for marker, arm in ((self.first, first), (self.second, second))
-        )
+        v1, v2 = velocity_at(view, self.first, first), velocity_at(view, self.second, second)
         velocity = vec.sub(v2, v1)
         rate, sliding = vec.dot(outward, velocity) * column.steep, vec.dot(along, velocity)
         law, shear = self._laws()

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.limits.contacts import FOREMOST, SHORT_WAY
 from ..base.records import dataclass
 from ..elements.forces.force import Load, MarkerLoad, View, beyond_zero, where
+from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
 from ..expr.vectors import Vec3
@@ -95,8 +96,7 @@ class SoilWheel(Contact):
         normal, depth, first, second = self.touch(view)
         along = vec.cross(normal, self.lateral)
         reach = vec.sub(first, second)
-        ground = vec.add(view.velocity(self.first), vec.cross(view.angular_velocity(self.first), reach))
-        velocity = vec.sub(view.velocity(self.second), ground)
+        velocity = vec.sub(view.velocity(self.second), velocity_at(view, self.first, reach))
         spin = vec.sub(view.angular_velocity(self.second), view.angular_velocity(self.first))
         return _Rolling(
             *(normal, along, reach, depth, -vec.dot(normal, velocity), vec.dot(along, velocity)),

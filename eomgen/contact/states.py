@@ -254,10 +254,10 @@ class On(MarkerReference):
         many = items(value)
         return refer.marker(value) if many is None else [refer.marker(one) for one in many]
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         if isinstance(value, list | tuple):
-            return [visitor.marker(one, slot) for one in value]
-        return None if value is None else visitor.marker(value, slot)
+            return [visitor.marker(one) for one in value]
+        return None if value is None else visitor.marker(value)
 
 
 _RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
@@ -396,16 +396,16 @@ class ContactShapes(Field):
             return shape
         return {**shape, "on": _ON["on"].reference(shape["on"], refer)}
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         parts = [value] if isinstance(value, Mapping) else value or ()
-        return [self._mapped(part, slot, visitor) for part in parts]
+        return [self._mapped(part, visitor) for part in parts]
 
     @staticmethod
-    def _mapped(part: Any, slot: Any, visitor: Any) -> Any:
+    def _mapped(part: Any, visitor: Any) -> Any:
         if not isinstance(part, Mapping):
             return part
-        made = {k: v if k == "shape" else visitor.vector(v, slot.named(k)) for k, v in part.items() if k != "on"}
-        on = _ON["on"].map(part.get("on"), slot, visitor)
+        made = {k: v if k == "shape" else visitor.vector(v) for k, v in part.items() if k != "on"}
+        on = _ON["on"].map(part.get("on"), visitor)
         return made if on is None else {**made, "on": on}
 
     def part(self, words: Sequence[str]) -> Field | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from ..base.records import dataclass
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
@@ -22,6 +24,10 @@ class Frame:
         turned = vec.product(self.rotation, inner.rotation)
         return Frame(turned, vec.add(self.position, vec.times(self.rotation, inner.position)))
 
+    def turned(self, turn: Mat3) -> Frame:
+        """The frame with its axes turned, by a rotation in them."""
+        return Frame(vec.product(self.rotation, turn), self.position)
+
     @classmethod
     def identity(cls, graph: Graph) -> Frame:
         """The axes and the origin of the body itself."""
@@ -35,6 +41,30 @@ class Marker:
     body: int
     frame: Frame
     label: str
+
+    def turned(self, turn: Mat3) -> Marker:
+        """The marker with its axes turned."""
+        return Marker(self.body, self.frame.turned(turn), self.label)
+
+
+class MotionView(Protocol):
+    """Motion of markers, as expressions in ground axes, which the kinematics stage provides."""
+
+    graph: Graph
+
+    def position(self, marker: Marker) -> Vec3: ...
+    def velocity(self, marker: Marker) -> Vec3: ...
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def angular_velocity(self, marker: Marker) -> Vec3: ...
+
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap."""
+        ...
+
+
+def velocity_at(view: MotionView, marker: Marker, arm: Vec3) -> Vec3:
+    """The velocity of a marker's body at an arm from its origin, both in ground axes, as a view of the motion tells."""
+    return vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
 
 
 @dataclass(frozen=True)

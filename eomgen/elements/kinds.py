@@ -170,7 +170,7 @@ class Field:
         """A value of a call in Python as a model file would write it: names of markers and joints for handles."""
         return value
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         """A value as a visitor changes what it holds; what has not the form of the kind stays as it is."""
         return _named(value, getattr(visitor, self.names_of)) if self.names_of else value
 
@@ -229,6 +229,11 @@ def _named(value: Any, change: Callable[[str], str]) -> Any:
     return change(value) if isinstance(value, str) else _each(value, lambda name: _named(name, change))
 
 
+def expressions(self: Field, value: Any, visitor: Any) -> Any:
+    """Changing what a value of expressions holds, whatever lists and mappings they stand in."""
+    return visitor.vector(value)
+
+
 # -- words, names and plain numbers -----------------------------------------------------------------------------------
 class Text(Field):
     """A text."""
@@ -246,7 +251,7 @@ class Latex(Text):
 
     argument, annotation = "str", "str"
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         if isinstance(value, Mapping):
             return {_named(name, visitor.coordinate): visitor.latex(part) for name, part in value.items()}
         return _each(value, visitor.latex) if isinstance(value, list | tuple) else visitor.latex(value)
@@ -413,8 +418,7 @@ class Scalar(Field):
     def absent(self, reader: Any) -> Any:
         return reader.stand_in if self.required else None
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return visitor.vector(value, slot)
+    map = expressions
 
 
 class Vector(Scalar):
@@ -451,19 +455,13 @@ class Scalars(Field):
     count = 0  #: how many, where that is fixed
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
-        parts = items(value)
-        if parts is None or len(parts) != self.count:
-            reader.wrong(path, value, self)
-            return None
-        found = []
-        for k, part in enumerate(parts):
-            found.append(reader.expression(f"{path}[{k}]", part, self.level))
-            if self.allowed is not None:
-                reader.requirements.inside(f"{path}[{k}]", found[-1], self.allowed, self.remedy or _RULES[self.allowed])
-        return tuple(found)
+        found = reader.several(path, value, self.count, self, self.level)
+        if self.allowed is not None:
+            for k, part in enumerate(found or ()):
+                reader.requirements.inside(f"{path}[{k}]", part, self.allowed, self.remedy or _RULES[self.allowed])
+        return None if found is None else tuple(found)
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return visitor.vector(value, slot)
+    map = expressions
 
 
 class Two(Scalars):
@@ -528,10 +526,10 @@ class Rates(Field):
 
     schema = _mapping(ref("expression"))
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        return {_named(name, visitor.coordinate): visitor.scalar(x, slot.at(name)) for name, x in value.items()}
+        return {_named(name, visitor.coordinate): visitor.scalar(x) for name, x in value.items()}
 
 
 class CoordinateForces(Rates):
@@ -539,8 +537,8 @@ class CoordinateForces(Rates):
 
     schema = any_of(array(ref("expression")), _mapping(ref("expression")))
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return super().map(value, slot, visitor) if isinstance(value, Mapping) else visitor.vector(value, slot)
+    def map(self, value: Any, visitor: Any) -> Any:
+        return super().map(value, visitor) if isinstance(value, Mapping) else visitor.vector(value)
 
 
 class Factors(Rates):
@@ -587,10 +585,7 @@ class Wheels(Field):
             reader.requirements.inside(f"{path}.{name}", size, POSITIVE, "give a size greater than 0")
         return found
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        return {name: visitor.scalar(part, slot.at(name)) for name, part in value.items()}
+    map = expressions
 
 
 class Inertia(Wheels):
@@ -620,9 +615,6 @@ class Inertia(Wheels):
                 return ((a, zero, zero), (zero, b, zero), (zero, zero, c))
         reader.wrong(path, value, self)
         return ((reader.stand_in,) * 3,) * 3
-
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return super().map(value, slot, visitor) if isinstance(value, Mapping) else visitor.vector(value, slot)
 
     def is_default(self, value: Any) -> bool:
         return super().is_default(value) or is_zero(value)
@@ -691,16 +683,16 @@ class Markers(Field):
         """A marker may be written as its position alone."""
         return super().part(words) or MARKER["at"]
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
+    def map(self, value: Any, visitor: Any) -> Any:
         pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
         try:
-            return {name: self._placed(placed, slot, visitor) for name, placed in pairs}
+            return {name: self._placed(placed, visitor) for name, placed in pairs}
         except (TypeError, ValueError):  # no pairs, or names that are no names
             return value
 
     @staticmethod
-    def _placed(placed: Any, slot: Any, visitor: Any) -> Any:
-        return visitor.placement(slot.entry.name, placed if isinstance(placed, Mapping) else {"at": placed}, slot)
+    def _placed(placed: Any, visitor: Any) -> Any:
+        return visitor.placement(visitor.entry.name, placed if isinstance(placed, Mapping) else {"at": placed})
 
 
 class MarkerReference(Field):
@@ -715,8 +707,8 @@ class MarkerReference(Field):
     def reference(self, value: Any, refer: Any) -> Any:
         return refer.marker(value)
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return visitor.marker(value, slot)
+    def map(self, value: Any, visitor: Any) -> Any:
+        return visitor.marker(value)
 
 
 class Pair(Field):
@@ -731,8 +723,8 @@ class Pair(Field):
     def reference(self, value: Any, refer: Any) -> Any:
         return [refer.marker(part) for part in items(value) or [value]]
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return _each(value, lambda part: visitor.marker(part, slot))
+    def map(self, value: Any, visitor: Any) -> Any:
+        return _each(value, visitor.marker)
 
 
 CYLINDER: Fields = {
@@ -802,14 +794,14 @@ class Via(Field):
             return refer.marker(stop)
         return {key: refer.marker(x) if key == "around" else x for key, x in stop.items()}
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return _each(value, lambda stop: self._mapped(stop, slot, visitor))
+    def map(self, value: Any, visitor: Any) -> Any:
+        return _each(value, lambda stop: self._mapped(stop, visitor))
 
     @staticmethod
-    def _mapped(stop: Any, slot: Any, visitor: Any) -> Any:
+    def _mapped(stop: Any, visitor: Any) -> Any:
         if not (isinstance(stop, Mapping) and "around" in stop):
-            return visitor.marker(stop, slot)
-        inside = {key: CYLINDER[key].map(x, slot.named(key), visitor) for key, x in stop.items() if key in CYLINDER}
+            return visitor.marker(stop)
+        inside = {key: CYLINDER[key].map(x, visitor) for key, x in stop.items() if key in CYLINDER}
         return {**stop, **inside}
 
 
@@ -890,8 +882,8 @@ class About(Field):
 
     schema = any_of(ref("reference"), ref("vector"))
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return value if isinstance(value, str) else visitor.vector(value, slot)
+    def map(self, value: Any, visitor: Any) -> Any:
+        return value if isinstance(value, str) else visitor.vector(value)
 
 
 class BodyParts(Field):
@@ -899,16 +891,16 @@ class BodyParts(Field):
 
     words = ("type", "axis", "subtract", "file", "shape")  #: keys that are words, not scalars
 
-    def map(self, value: Any, slot: Any, visitor: Any) -> Any:
-        return _each(value, lambda part: self._mapped(part, slot, visitor))
+    def map(self, value: Any, visitor: Any) -> Any:
+        return _each(value, lambda part: self._mapped(part, visitor))
 
-    def _mapped(self, part: Any, slot: Any, visitor: Any) -> Any:
+    def _mapped(self, part: Any, visitor: Any) -> Any:
         if not isinstance(part, Mapping):
             return part
         placed = {key: x for key, x in part.items() if key in MARKER}
         words = {key: x for key, x in part.items() if key in self.words}
-        own = {k: visitor.vector(x, slot.named(k)) for k, x in part.items() if k not in words and k not in placed}
-        return {**words, **own, **visitor.placement(slot.entry.name, placed, slot)}
+        own = {k: visitor.vector(x) for k, x in part.items() if k not in words and k not in placed}
+        return {**words, **own, **visitor.placement(visitor.entry.name, placed)}
 
 
 POINT: Fields = {

@@ -20,7 +20,7 @@ from .document import FormulaLine, Piece, Section, Sentence
 
 def energies(author: Author) -> Section | None:
     """T and V, of every method."""
-    if author.mechanism.given is not None:
+    if author.mechanism.written is not None:
         return None
     T, V = author.letter("T"), author.letter("V")
     pieces = [

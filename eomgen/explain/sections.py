@@ -9,10 +9,10 @@ from typing import Any
 import sympy
 
 from ..base.inline_pictures import trimmed_png
+from ..elements.constraints.switching import event_of
 from ..elements.frames import GROUND
 from ..errors import EomgenError, UnavailableError
 from ..expr.core import Expr
-from ..model.build_states import CLOSES, OPENS
 from ..model.mechanism import JointSpec, Switched
 from ..model.placement import axis_word
 from .author import Author, in_numbers, nodes
@@ -431,8 +431,8 @@ def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
     events = {event.name: event for event in author.mechanism.events}
     told = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
     pieces: list[Piece] = [Sentence(told)]
-    for ending, what in ((CLOSES, "It closes by a plastic impact"), (OPENS, "It opens")):
-        if (event := events.get(f"{name}{ending}")) is not None:
+    for key, what in (("closes", "It closes by a plastic impact"), ("opens", "It opens")):
+        if (event := events.get(event_of(name, key))) is not None:
             (value,) = author.write("events", [event.expression]).expressions
             pieces += [
                 Sentence(f"{what} where this falls to 0:"),

@@ -17,7 +17,7 @@ from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from
 from ..errors import ModelError, Problem
 from ..model.description import GROUND_NAME, Description, Values
 from ..model.names import LONGEST, clean_name, fault_of_model_name, nearest, unique
-from ..model.placement import TURNS
+from ..model.placement import TURNS, axis_word
 from ..model.scope import RATES
 from .robot import (
     IDENTITY,
@@ -718,10 +718,8 @@ def _scaled(law: str, total: str, bounds: Range) -> str:
 
 def _axis(axis: tuple[float, float, float]) -> Any:
     """A word for an axis along a coordinate axis, else its three numbers."""
-    for word, columns in TURNS.items():
-        if np.array_equal(columns[2], axis):
-            return word
-    return [float(x) for x in axis]
+    word = axis_word(axis)
+    return word if word in TURNS else [float(x) for x in axis]
 
 
 def _turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:

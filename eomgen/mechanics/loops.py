@@ -182,10 +182,10 @@ def _is_closed(row: Row, size: float) -> bool:
 
 def own_rows(mechanism: Mechanism) -> list[Row]:
     """The constraint equations that accompany a bare Lagrangian or given equations."""
-    bare = mechanism.lagrangian or mechanism.given
+    bare = mechanism.given
     if bare is None:
         return []
-    rates = {n + "_dot" for n in bare.coordinates} | set(getattr(bare, "velocities", ()))
+    rates = {n + "_dot" for n in bare.coordinates} | set(bare.velocities)
     return [
         Row(f"constraint_{k + 1}", e, "angle", "position" if symbols_of([e]).isdisjoint(rates) else "velocity", True)
         for k, e in enumerate(bare.constraints)
@@ -399,7 +399,7 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints, for_a_ti
 
 def place_of(mechanism: Mechanism, label: str) -> str:
     """The path of the element that a constraint row belongs to."""
-    if mechanism.lagrangian or mechanism.given:
-        return "lagrangian.constraints" if mechanism.lagrangian else "equations.constraints"
+    if mechanism.bare:
+        return f"{mechanism.bare_section}.constraints"
     name = label.partition(".")[0]
     return f"joints.{name}" if any(spec.name == name for spec in mechanism.joints) else f"constraints.{name}"

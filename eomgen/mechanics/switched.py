@@ -33,6 +33,7 @@ class SwitchedRow(NamedTuple):
 
     label: str
     state: str  #: 1 while it holds
+    on: Expr  #: whether it does
     jacobian: tuple[Expr, ...]  #: of C' by v
     rate: Expr  #: C'
     rest: Expr  #: w without the accelerations
@@ -81,8 +82,8 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
             rest = found.gamma[i] + rate * speed
         row = [_while_closed(switch, x) for x in (*J, speed, rest)]
         value = found.values[i] if i < len(found.values) else graph.zero
-        errors = (_closed_or_0(switch, value), _closed_or_0(switch, speed))
-        own = (label, switch.state, tuple(row[:-2]), row[-2], row[-1], multiplier, errors, found.kinds[i])
+        errors = (where(switch.holds, value, 0.0), where(switch.holds, speed, 0.0))
+        own = (label, switch.state, switch.holds, tuple(row[:-2]), row[-2], row[-1], multiplier, errors, found.kinds[i])
         rows.append(SwitchedRow(*own))
         for body, D in on_bodies[label].items():
             markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))
@@ -98,11 +99,7 @@ def _while_closed(switch: Switched, x: Expr) -> Expr:
     """x, or 0 while the constraint is open and x may be no number: a disc that lies flat, far from its plane."""
     if {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= FINITE:
         return x
-    return _closed_or_0(switch, x)
-
-
-def _closed_or_0(switch: Switched, x: Expr) -> Expr:
-    return where(x.graph.apply("lt", 0.5, x.graph.symbol(switch.state)), x, 0.0)
+    return where(switch.holds, x, 0.0)
 
 
 def _origin(kinematics: Kinematics, body: int) -> Marker:

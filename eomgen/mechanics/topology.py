@@ -284,10 +284,6 @@ class MotionSymbols:
 
 def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
     """The coordinates and velocities of the tree, in its order."""
-    if mechanism.lagrangian is not None:
-        names = mechanism.lagrangian.coordinates
-        kinds = ("angle",) * len(names)
-        return StateLayout(names, kinds, tuple(n + "_dot" for n in names), kinds, tuple(range(-1, len(names) - 1)))
     if mechanism.given is not None:
         given, n = mechanism.given, len(mechanism.given.velocities)
         rates = () if given.rates == tuple(map(mechanism.graph.symbol, given.velocities)) else given.rates

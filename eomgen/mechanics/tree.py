@@ -262,11 +262,6 @@ class AxisTurns:
         return found
 
 
-def turn_frame(frame: Frame, turn: Mat3) -> Frame:
-    """The frame turned in itself."""
-    return Frame(vec.product(frame.rotation, turn), frame.position)
-
-
 def about_z(rotation: Mat3) -> bool:
     """Whether a rotation leaves the z axis alone."""
     others = (rotation[0][2], rotation[1][2], rotation[2][0], rotation[2][1])
@@ -389,7 +384,7 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
         holder = place(frames[branch.parent], held)
         turn = turns.turned(branch, holder.rotation, frame)
         if turn is not None:
-            held, frame = turn_frame(held, turn), turn_frame(frame, turn)
+            held, frame = held.turned(turn), frame.turned(turn)
             holder = place(frames[branch.parent], held)
         body = mechanism.bodies[branch.body]
         back = vec.transpose(frame.rotation)

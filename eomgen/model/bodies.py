@@ -185,7 +185,7 @@ def _point(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
 
 
 def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
-    faults, graph = reader.faults, reader.graph
+    faults = reader.faults
     kind = values.get("type")
     if not isinstance(kind, str) or kind not in SOLID:
         if kind is None:
@@ -208,11 +208,7 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     given = {
         key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values
     }
-    frame = reader.frame(path, values)
-    if "axis" in values:
-        columns = reader.axis(f"{path}.axis", values["axis"])
-        if columns != TURNS["z"]:
-            frame = Frame(vec.product(frame.rotation, turn_matrix(graph, columns)), frame.position)
+    frame = _frame(reader, path, values)
     subtract = reader.flag(f"{path}.subtract", values["subtract"]) if "subtract" in values else False
     own = _mesh(reader, path, values, given.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
     if own is None or faults.under(path):
@@ -224,6 +220,13 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     x, y, z = (vec.scale(mass, row) for row in tensor)
     com = vec.add(frame.position, vec.times(frame.rotation, own.com))
     return MassProperties(mass, com, (x, y, z))
+
+
+def _frame(reader: Reader, path: str, values: Mapping[str, Any]) -> Frame:
+    """Where a solid is in its body, its z axis laid along ``axis``."""
+    frame = reader.frame(path, values)
+    columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
+    return frame if columns == TURNS["z"] else frame.turned(turn_matrix(reader.graph, columns))
 
 
 def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> MassProperties | None:
@@ -331,11 +334,7 @@ def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) 
 
 
 def _solid_shape(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
-    kind, frame = str(values.get("type")), reader.frame(path, values)
-    if "axis" in values:
-        columns = reader.axis(f"{path}.axis", values["axis"])
-        if columns != TURNS["z"]:
-            frame = Frame(vec.product(frame.rotation, turn_matrix(reader.graph, columns)), frame.position)
+    kind, frame = str(values.get("type")), _frame(reader, path, values)
     if kind == "mesh":
         scale = reader.expression(f"{path}.scale", values["scale"]) if "scale" in values else reader.graph.one
         return BodyShape(body, kind, (scale,) * 3, frame, str(values.get("file", "")))

@@ -11,13 +11,10 @@ from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE
 from ..elements import kinds
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
-from ..elements.frames import Frame, Marker
 from ..elements.joints import JOINTS, Joint
 from ..elements.kinds import LIMITS, Scalar
-from ..expr import vectors as vec
 from ..expr.core import Expr
 from ..expr.shown import quoted, shown
-from ..expr.vectors import Mat3
 from .checks import check_keys, check_names, unknown_key
 from .description import DescribedEntry, Description, items
 from .fields import joint_fields
@@ -203,7 +200,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
             continue
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
-            pair = (_turned(pair[0], turn), _turned(pair[1], turn))
+            pair = (pair[0].turned(turn), pair[1].turned(turn))
         spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named, axes=columns)
         result.append(_with_data(reader, spec, path, values))
     return tuple(result)
@@ -219,10 +216,6 @@ def _with_data(reader: Reader, spec: JointSpec, path: str, values: dict[str, Any
     if len(spec.coordinates) == 1 and "armature" in values:
         data["armature"] = read_armature(reader, f"{path}.armature", values["armature"])
     return replace(spec, **data) if data else spec
-
-
-def _turned(marker: Marker, turn: Mat3) -> Marker:
-    return Marker(marker.body, Frame(vec.product(marker.frame.rotation, turn), marker.frame.position), marker.label)
 
 
 def _type(reader: Reader, entry: DescribedEntry) -> str | None:

@@ -20,7 +20,6 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates, with_locks
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .build_states import (
-    begun_switches,
     build_events,
     build_states,
     build_switches,
@@ -28,17 +27,23 @@ from .build_states import (
     declare_states,
     declare_switches,
     events_of_switches,
-    states_of_switches,
 )
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .element_entry import Surroundings, build_elements, check_turns, declare_contacts, own_states
+from .equations import (
+    build_equations,
+    build_lagrangian,
+    check_energies,
+    declare_equations,
+    declare_lagrangian,
+    differentiate,
+    require_quadratic,
+)
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
-from .given_equations import build_equations, check_energies, declare_equations
-from .input_rates import add_rates
-from .lagrangian import build_lagrangian, declare_lagrangian
+from .input_rates import add_rates, clock
 from .mechanism import Body, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .quantities import SUMS, CarriedQuantity, WrenchQuantity
@@ -107,6 +112,9 @@ def build(description: Description) -> Mechanism:
     forces = build_elements(around, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     given = build_equations(reader, given_values)
+    if lagrangian is not None:
+        given = differentiate(graph, lagrangian, clock(graph, inputs))
+        require_quadratic(reader, given)
     constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     states, begun, clocks, samplings = build_states(reader, declared)
@@ -132,7 +140,8 @@ def build(description: Description) -> Mechanism:
     _check_mass(reader, bodies)
     negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
     check_turns(constraints, reader.requirements)
-    check_energies(given, outputs, faults)
+    if lagrangian is None:
+        check_energies(given, outputs, faults)
     _check_asked(reader, forces)
     if not faults:
         check_dimensions(reader, joints)
@@ -141,6 +150,7 @@ def build(description: Description) -> Mechanism:
     if faults:
         raise ModelError(faults.sorted())
     outputs = with_units(reader, joints, outputs)
+    exerted, carried = _wrenches(reader)
     described = len(bodies)
     bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
     return Mechanism(
@@ -153,15 +163,15 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=(*states, *held, *states_of_switches(reader, switched)),
+        states=(*states, *held, *(switch.held_state for switch in switched)),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.carried} | state_rates,
-        wrench_quantities=_exerted(reader),
-        reaction_quantities=_carried(reader),
+        wrench_quantities=exerted,
+        reaction_quantities=carried,
         initial=begun
-        | begun_switches(graph, switched)
+        | {s.state: graph.one if s.closed else graph.zero for s in switched}
         | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
@@ -246,24 +256,16 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
 
-def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
-    """The parts of reactions and the multipliers that expressions speak of."""
-    found = {}
+def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, CarriedQuantity]]:
+    """The parts of what force elements exert on bodies, and of reactions and multipliers, that expressions speak of."""
+    exerted, carried = dict[str, WrenchQuantity](), dict[str, CarriedQuantity]()
     for asked, path in reader.asked.items():
+        axes = reader.moving(asked.axes) if asked.axes else None
         if asked.carried:
-            axes = reader.moving(asked.axes) if asked.axes else None
-            found[str(asked)] = CarriedQuantity(asked.of, asked.part, axes, path)
-    return found
-
-
-def _exerted(reader: Reader) -> dict[str, WrenchQuantity]:
-    """The parts of what force elements exert on bodies that expressions speak of."""
-    found = {}
-    for asked, path in reader.asked.items():
-        if asked.on:
-            axes = reader.moving(asked.axes) if asked.axes else None
-            found[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
-    return found
+            carried[str(asked)] = CarriedQuantity(asked.of, asked.part, axes, path)
+        elif asked.on:
+            exerted[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
+    return exerted, carried
 
 
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:

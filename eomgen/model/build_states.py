@@ -9,8 +9,9 @@ from ..base.operations import CONDITION, operations_with
 from ..base.value_rules import POSITIVE
 from ..elements import kinds
 from ..elements.constraints import Constraint
+from ..elements.constraints.switching import event_of, is_switched, state_of
 from ..elements.kinds import LAW, OUTPUT
-from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.core import Expr, substitute, symbols_of
 from ..expr.shown import quoted, shown
 from .build_quantities import in_si, read_described
 from .checks import check_keys
@@ -18,7 +19,6 @@ from .description import DescribedEntry, items
 from .fields import EVENT, STATE
 from .mechanism import Clock, Event, FirstOrderState, Switched
 from .names import nearest
-from .read_shapes import positive
 from .scope import late_names
 from .sympy_face import in_order
 from .values import Reader, is_number
@@ -322,23 +322,14 @@ def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
     return reader.expression(f"{path}.rate", values["rate"], LAW), None
 
 
-CLOSED, CLOSES, OPENS = "_closed", "_closes", "_opens"  #: what follows the constraint's name: its state and events
-KEYS = ("closes", "opens", "closed")
-
-
-def is_switched(entry: DescribedEntry) -> bool:
-    """Whether a constraint closes or opens."""
-    return isinstance(entry.name, str) and not entry.values.keys().isdisjoint(KEYS)
-
-
 def declare_switches(reader: Reader, entries: Sequence[DescribedEntry]) -> list[DescribedEntry]:
     """Take in the names of states and events; the entries that have them."""
-    found = [entry for entry in entries if is_switched(entry)]
+    found = [entry for entry in entries if isinstance(entry.name, str) and is_switched(entry.values)]
     for entry in found:
-        reader.names.declare("state", f"{entry.name}{CLOSED}", entry.path)
-        for key, suffix in (("closes", CLOSES), ("opens", OPENS)):
+        reader.names.declare("state", state_of(entry.name), entry.path)
+        for key in ("closes", "opens"):
             if key in entry.values:
-                reader.names.declare("event", f"{entry.name}{suffix}", entry.path)
+                reader.names.declare("event", event_of(entry.name, key), entry.path)
     return found
 
 
@@ -354,12 +345,9 @@ def build_switches(
         closed = values.get("closed", "closes" not in values)
         releases = _released(reader, entry, names)
         rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
-        positive(reader, f"{path}.stabilisation", rate)
-        switch = Switched(
-            made.get(str(entry.name)), f"{entry.name}{CLOSED}", reader.flag(f"{path}.closed", closed), rate,
-            tuple(f"{name}{CLOSED}" for name in releases),
-        )  # fmt: skip
-        found.append(switch)
+        reader.requirements.positive(f"{path}.stabilisation", rate)
+        held = (state_of(str(entry.name)), reader.flag(f"{path}.closed", closed), rate)
+        found.append(Switched(made.get(str(entry.name)), *held, tuple(map(state_of, releases))))
     return tuple(found)
 
 
@@ -380,36 +368,19 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
     return [str(name) for name in listed]
 
 
-def states_of_switches(reader: Reader, switched: Sequence[Switched]) -> tuple[FirstOrderState, ...]:
-    """1 while a constraint holds."""
-    zero = reader.graph.zero
-    return tuple(FirstOrderState(s.state, zero, doc=f"1 while {s.state.removesuffix(CLOSED)} holds") for s in switched)
-
-
-def begun_switches(graph: Graph, switched: Sequence[Switched]) -> dict[str, Expr]:
-    """Where they start."""
-    return {s.state: graph.one if s.closed else graph.zero for s in switched}
-
-
 def events_of_switches(
     reader: Reader, entries: Sequence[DescribedEntry], switched: Sequence[Switched]
 ) -> tuple[Event, ...]:
     """What closes and opens them; velocities after an impact follow when the mechanism is known."""
     graph, events = reader.graph, []
     for entry, switch in zip(entries, switched, strict=True):
-        state = graph.symbol(switch.state)
-        holds = graph.apply("lt", 0.5, state)
-        if "closes" in entry.values:
-            gap = _falling(reader, f"{entry.path}.closes", entry.values["closes"])
-            reset: list[tuple[str, Expr]] = [(name, graph.zero) for name in switch.releases]
-            reset.append((switch.state, graph.one))
-            gap = graph.apply("select", holds, graph.one, gap)
-            events.append(Event(f"{entry.name}{CLOSES}", gap, 0, -1, tuple(reset), None, f"{entry.name} closes"))
-        if "opens" in entry.values:
-            left = _falling(reader, f"{entry.path}.opens", entry.values["opens"])
-            left = graph.apply("select", holds, left, graph.one)
-            reset = [(switch.state, graph.zero)]
-            events.append(Event(f"{entry.name}{OPENS}", left, 0, -1, tuple(reset), None, f"{entry.name} opens"))
+        closing = (*((name, graph.zero) for name in switch.releases), (switch.state, graph.one))
+        for key, reset in (("closes", closing), ("opens", ((switch.state, graph.zero),))):
+            if key in entry.values:
+                left = _falling(reader, f"{entry.path}.{key}", entry.values[key])
+                watched = (graph.one, left) if key == "closes" else (left, graph.one)
+                zero = graph.apply("select", switch.holds, *watched)
+                events.append(Event(event_of(entry.name, key), zero, 0, -1, reset, None, f"{entry.name} {key}"))
     return tuple(events)
 
 

@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 
 from ..base.notation import with_instance
 from ..elements import kinds
+from ..elements.constraints.switching import is_switched, state_of
 from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from .build_joints import coordinate_names, sketch
-from .build_states import CLOSED, COUNTER, SAMPLED, is_switched
+from .build_states import COUNTER, SAMPLED
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .element_entry import needs_point, states_of
@@ -27,7 +28,7 @@ from .names import fault_of_name, function_words, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
 from .scope import ENERGIES, RATES
 from .units import UnitError, read_unit
-from .visit import Slot, Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
+from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
 
 #: Notes a fault: path, message, remedy, code.
 Fault = Callable[[str, str, str, str], None]
@@ -65,7 +66,8 @@ class OwnNames:
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
             self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
         self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
-        self.symbols |= {f"{entry.name}{CLOSED}" for entry in sections["constraints"] if is_switched(entry)}
+        able = (*sections["constraints"], *sections["joints"])
+        self.symbols |= {state_of(str(entry.name)) for entry in able if is_switched(entry.values)}
         for entry in sections["states"]:
             if "period" in entry.values and isinstance(entry.name, str):
                 self.symbols |= {entry.name + COUNTER, entry.name + SAMPLED}
@@ -117,7 +119,7 @@ class Renaming(Visitor):
         self.closed, self.fault = closed, fault
         self.markers: dict[str, tuple[str, Mapping[str, Any]]] = {}  #: name -> body and place of markers to add
 
-    def word(self, name: str, slot: Slot) -> str:
+    def word(self, name: str) -> str:
         """A name in an expression."""
         if name in self.values:
             return in_brackets(self.values[name])
@@ -125,25 +127,23 @@ class Renaming(Visitor):
             return self.prefix + name
         if name not in WORDS:
             self._foreign(
-                name,
-                slot,
-                "declare a parameter or an input of that name in it, and give it where you add the component",
+                name, "declare a parameter or an input of that name in it, and give it where you add the component"
             )
         return name
 
-    def scalar(self, value: Any, slot: Slot) -> Any:
-        hidden = slot.field.local if slot.field else ()
+    def scalar(self, value: Any) -> Any:
+        hidden = self.field.local if self.field else ()
 
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:
                 return marker
-            found = self.marker(marker, slot)
+            found = self.marker(marker)
             return found if isinstance(found, str) else self._named(marker, found)
 
         def quantity(named: Named) -> str:
             return str(named.renamed(place, lambda name: self.prefix + name))
 
-        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), quantity)
+        return rewritten(value, lambda name: name if name in hidden else self.word(name), quantity)
 
     def coordinate(self, name: str) -> str:
         known = name in self.own.elements or self.own.has_symbol(name)
@@ -157,27 +157,25 @@ class Renaming(Visitor):
             return self.attached[name].body
         return self.prefix + name if name in self.own.bodies or self.closed else name
 
-    def marker(self, reference: Any, slot: Slot) -> Any:
+    def marker(self, reference: Any) -> Any:
         body = reference.get("body") if isinstance(reference, Mapping) else reference
         if not isinstance(body, str):
             return reference
         body, _, name = body.partition(".")
         if body in self.attached:
-            return self._on_attachment(body, name, reference, slot)
+            return self._on_attachment(body, name, reference)
         if body not in self.own.bodies:
-            self._foreign(
-                body, slot, f"it has the bodies and attachments {', '.join([*self.own.bodies, *self.attached])}"
-            )
-            return reference if isinstance(reference, str) else super().marker(reference, slot)
-        return super().marker(reference, slot)
+            self._foreign(body, f"it has the bodies and attachments {', '.join([*self.own.bodies, *self.attached])}")
+            return reference if isinstance(reference, str) else super().marker(reference)
+        return super().marker(reference)
 
-    def _on_attachment(self, body: str, name: str, reference: Any, slot: Slot) -> Any:
+    def _on_attachment(self, body: str, name: str, reference: Any) -> Any:
         found = self.attached[body]
         if isinstance(reference, str):
             if name:  # a marker that the component gives to ground
                 return f"{found.body}.{self.prefix}{name}"
             return found.reference
-        placed = self.placement(body, {key: value for key, value in reference.items() if key != "body"}, slot)
+        placed = self.placement(body, {key: value for key, value in reference.items() if key != "body"})
         return {"body": found.body, **self.placed(body, placed)}
 
     def placed(self, attachment: str, placed: Any) -> Mapping[str, Any]:
@@ -193,10 +191,10 @@ class Renaming(Visitor):
         self.markers[name] = (reference["body"], {k: v for k, v in reference.items() if k != "body"})
         return f"{reference['body']}.{name}"
 
-    def _foreign(self, name: str, slot: Slot, remedy: str) -> None:
-        if self.closed and slot.entry is not None:
+    def _foreign(self, name: str, remedy: str) -> None:
+        if self.closed and self.entry is not None:
             message = f"{name!r} is not declared in the component, and a component knows only its own names"
-            self.fault(f"{slot.entry.path}.{slot.key}", message, remedy, "EG-NAME-UNKNOWN")
+            self.fault(f"{self.entry.path}.{self.key}", message, remedy, "EG-NAME-UNKNOWN")
 
 
 # -- instances ---------------------------------------------------------------------------------------------------------
@@ -428,7 +426,8 @@ def _values(
                 told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
                 sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
-            texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))
+            renaming.entry, renaming.key = entry, "value"
+            texts[name] = str(renaming.scalar(value))
     return (numbers, texts, units) if sound else None
 
 
@@ -492,12 +491,11 @@ def _add_starts(target: Description, component: Component, instance: Instance, r
     for key, given in (("initial", instance.initial), ("guess", instance.guess)):
         own = component.description.values.get(key, {})
 
-        def inside(name: Any, slot: Slot) -> Any:
-            return started(name, lambda plain: renaming.prefix + plain, renaming, slot)
+        def inside(name: Any) -> Any:
+            return started(name, lambda plain: renaming.prefix + plain, renaming)
 
-        slots = {name: Slot("", "", key, (name,)) for name in (own if isinstance(own, Mapping) else ())}
-        made = {inside(name, slot): renaming.scalar(own[name], slot) for name, slot in slots.items()}
-        made |= {inside(name, Slot("", "", key, (name,))): value for name, value in given.items()}
+        made = {inside(name): renaming.scalar(x) for name, x in (own.items() if isinstance(own, Mapping) else ())}
+        made |= {inside(name): value for name, value in given.items()}
         if made:
             kept = target.values.get(key, {})
             whole = {**made, **kept} if isinstance(kept, Mapping) else made

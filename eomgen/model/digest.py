@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,6 +58,8 @@ def model_digest(mechanism: Mechanism) -> str:
     way, and orders in which they were made, change nothing.
     """
     known: dict[int, str] = {}
+    if mechanism.lagrangian is not None:  # the equations follow from it
+        mechanism = replace(mechanism, given=None)
     return _hash(repr(_spell(mechanism, mechanism.graph, known)))
 
 

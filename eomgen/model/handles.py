@@ -172,7 +172,58 @@ class ConstraintHandle(ElementHandle):
         return symbol(str(Named(MULTIPLIER, f"{self.name}.{row}" if row else self.name)))
 
 
-class MarkerHandle:
+class Motion:
+    """The motion of a marker in ground axes, or in others, as SymPy symbols for outputs, events and force laws."""
+
+    def _ends(self) -> tuple[str, ...]:
+        """Labels of the marker, of the one it is seen from, and of the one whose axes count."""
+        raise NotImplementedError
+
+    def _triple(self, prefix: str, suffix: str = "") -> Triple:
+        ends = self._ends()
+        x, y, z = (symbol(str(Named(f"{prefix}{axis}{suffix}", *ends))) for axis in "xyz")
+        return (x, y, z)
+
+    @property
+    def position(self) -> Triple:
+        """Position of the origin (m)."""
+        return self._triple("")
+
+    @property
+    def velocity(self) -> Triple:
+        """Velocity of the origin (m/s)."""
+        return self._triple("v")
+
+    @property
+    def acceleration(self) -> Triple:
+        """Acceleration of the origin (m/s^2), for outputs."""
+        return self._triple("a")
+
+    @property
+    def angular_velocity(self) -> Triple:
+        """Angular velocity of the body (rad/s)."""
+        return self._triple("w")
+
+    @property
+    def angular_acceleration(self) -> Triple:
+        """Angular acceleration of the body (rad/s^2), for outputs."""
+        return self._triple("w", "_dot")
+
+
+class SeenMotion(Motion):
+    """The motion of a marker as seen from another, in the axes of a third, as SymPy symbols (SI units).
+
+    ``origin`` and ``axes`` are labels of markers, empty for ground.
+    """
+
+    def __init__(self, marker: str, origin: str = "", axes: str = "") -> None:
+        self.marker, self.origin, self.axes = marker, origin, axes
+
+    def _ends(self) -> tuple[str, ...]:
+        return (self.marker, self.origin, self.axes)
+
+
+class MarkerHandle(Motion):
     """A frame fixed in a body; joints and forces attach to it, outputs read its motion.
 
     Attributes
@@ -191,31 +242,6 @@ class MarkerHandle:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.label}>"
-
-    @property
-    def position(self) -> Triple:
-        """Position of the origin in ground axes (m), as SymPy symbols for outputs, events and force laws."""
-        return self.seen().position
-
-    @property
-    def velocity(self) -> Triple:
-        """Velocity of the origin in ground axes (m/s), as SymPy symbols for outputs, events and force laws."""
-        return self.seen().velocity
-
-    @property
-    def acceleration(self) -> Triple:
-        """Acceleration of the origin in ground axes (m/s^2), as SymPy symbols for outputs."""
-        return self.seen().acceleration
-
-    @property
-    def angular_velocity(self) -> Triple:
-        """Angular velocity of the body in ground axes (rad/s), as SymPy symbols for outputs, events and force laws."""
-        return self.seen().angular_velocity
-
-    @property
-    def angular_acceleration(self) -> Triple:
-        """Angular acceleration of the body in ground axes (rad/s^2), as SymPy symbols for outputs."""
-        return self.seen().angular_acceleration
 
     @property
     def body_angular_velocity(self) -> Triple:
@@ -271,49 +297,8 @@ class MarkerHandle:
         self.note()
         return symbol(str(quantity))
 
-    def _triple(self, prefix: str, suffix: str) -> Triple:
-        x, y, z = (self._symbol(Named(f"{prefix}{axis}{suffix}", self.label)) for axis in "xyz")
-        return (x, y, z)
-
-
-class SeenMotion(NamedTuple):
-    """The motion of a marker as seen from another, in the axes of a third, as SymPy symbols (SI units).
-
-    ``origin`` and ``axes`` are labels of markers, empty for ground.
-    """
-
-    marker: str
-    origin: str = ""
-    axes: str = ""
-
-    @property
-    def position(self) -> Triple:
-        """Position of the origin (m)."""
-        return self._triple("")
-
-    @property
-    def velocity(self) -> Triple:
-        """Velocity of the origin (m/s)."""
-        return self._triple("v")
-
-    @property
-    def acceleration(self) -> Triple:
-        """Acceleration of the origin (m/s^2), for outputs."""
-        return self._triple("a")
-
-    @property
-    def angular_velocity(self) -> Triple:
-        """Angular velocity (rad/s)."""
-        return self._triple("w")
-
-    @property
-    def angular_acceleration(self) -> Triple:
-        """Angular acceleration (rad/s^2), for outputs."""
-        return self._triple("w", "_dot")
-
-    def _triple(self, prefix: str, suffix: str = "") -> Triple:
-        x, y, z = (symbol(str(Named(f"{prefix}{axis}{suffix}", *self))) for axis in "xyz")
-        return (x, y, z)
+    def _ends(self) -> tuple[str, ...]:
+        return (noted(self),)
 
 
 class BodyHandle(MarkerHandle):

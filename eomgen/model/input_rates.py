@@ -115,19 +115,16 @@ def _differentiated(
     """
     symbol = reader.graph.symbol
     found: list[tuple[list[Expr], int, str, str | None]] = []
-    rates: set[str] = set()
     if lagrangian is not None:
         v = [symbol(f"{name}_dot") for name in lagrangian.coordinates]
         found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)", "lagrangian"))
-        rates = {f"{name}_dot" for name in lagrangian.coordinates}
     if given is not None:
         rates = {f"{name}_dot" for name in given.coordinates} | set(given.velocities)
-    bare = lagrangian or given
-    positions = [e for e in bare.constraints if symbols_of([e]).isdisjoint(rates)] if bare is not None else []
-    velocities = [e for e in bare.constraints if not symbols_of([e]).isdisjoint(rates)] if bare is not None else []
-    section = "lagrangian.constraints" if given is None else "equations.constraints"
-    found += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
-    if given is not None:
+        positions = [e for e in given.constraints if symbols_of([e]).isdisjoint(rates)]
+        velocities = [e for e in given.constraints if not symbols_of([e]).isdisjoint(rates)]
+        section = f"{'equations' if lagrangian is None else 'lagrangian'}.constraints"
+        found += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
+    if given is not None and lagrangian is None:
         seconds = {f"{name}_ddot" for name in given.coordinates}
         shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
         if positions or shown:

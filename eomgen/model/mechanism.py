@@ -221,6 +221,18 @@ class Switched(NamedTuple):
     stabilisation: Expr
     releases: tuple[str, ...]
 
+    @property
+    def holds(self) -> Expr:
+        """Whether it is closed: what the state says."""
+        graph = self.stabilisation.graph
+        return graph.apply("lt", 0.5, graph.symbol(self.state))
+
+    @property
+    def held_state(self) -> FirstOrderState:
+        """The state, which events alone change."""
+        name = "" if self.constraint is None else self.constraint.name
+        return FirstOrderState(self.state, self.stabilisation.graph.zero, doc=f"1 while {name} holds")
+
 
 @dataclass(frozen=True)
 class Simulation:
@@ -258,8 +270,8 @@ class Mechanism:
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     independent: tuple[str, ...] = ()
     simulation: Simulation = Simulation()
-    lagrangian: Lagrangian | None = None
-    given: GivenEquations | None = None
+    given: GivenEquations | None = None  #: instead of bodies
+    lagrangian: Lagrangian | None = None  #: of which these are the derivatives, for reading
     constraints: tuple[Constraint, ...] = ()
     switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
@@ -279,7 +291,17 @@ class Mechanism:
     @property
     def bare(self) -> bool:
         """Whether there are no bodies: a Lagrangian, or equations, came instead."""
-        return self.lagrangian is not None or self.given is not None
+        return self.given is not None
+
+    @property
+    def written(self) -> GivenEquations | None:
+        """Equations of the user's own, of which energies and parts are known as far as they are given."""
+        return self.given if self.lagrangian is None else None
+
+    @property
+    def bare_section(self) -> str:
+        """The section of the model file that stands instead of bodies."""
+        return "equations" if self.lagrangian is None else "lagrangian"
 
     def problem(self, path: str, message: str, remedy: str = "", code: str = "") -> Problem:
         """A problem at a dotted path, with the file and line the path or its nearest parent came from."""

@@ -44,6 +44,20 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
+def _symbol(name: str, doc: str) -> Any:
+    """A property that is the SymPy symbol of a name."""
+    return property(lambda model: symbol(name), doc=doc)
+
+
+def _settings(key: str, doc: str) -> Any:
+    """A property that is a mapping of the description, to which values are assigned as one."""
+
+    def give(model: Builder, values: Mapping[Any, Any]) -> None:
+        model._description.values[key] = Settings(named(key, values))
+
+    return property(lambda model: model._description.values[key], give, doc=doc)
+
+
 class Builder(ElementMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
@@ -91,8 +105,8 @@ class Builder(ElementMethods):
         inputs: Mapping[Any, Any] | None = None,
         latex: Mapping[Any, str] | None = None,
     ) -> Self:
-        """Make a model from a Lagrangian; see :func:`eomgen.model.lagrangian.describe_lagrangian`."""
-        from .lagrangian import describe_lagrangian
+        """Make a model from a Lagrangian; see :func:`eomgen.model.equations.describe_lagrangian`."""
+        from .equations import describe_lagrangian
         from .sympy_text import SympyNames
 
         coordinates = one_or_several(coordinates)
@@ -104,8 +118,8 @@ class Builder(ElementMethods):
     def from_equations(
         cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
     ) -> Self:
-        """Make a model from equations M v' = f; see :func:`eomgen.model.given_equations.describe_equations`."""
-        from .given_equations import describe_equations
+        """Make a model from equations M v' = f; see :func:`eomgen.model.equations.describe_equations`."""
+        from .equations import describe_equations
         from .sympy_text import SympyNames
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
@@ -238,20 +252,11 @@ class Builder(ElementMethods):
         """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
         return symbol(name)
 
-    @property
-    def t(self) -> Any:
-        """The time, as a SymPy symbol."""
-        return symbol("t")
-
-    @property
-    def kinetic_energy(self) -> Any:
-        """The kinetic energy of the mechanism, as a SymPy symbol for outputs."""
-        return symbol("kinetic_energy")
-
-    @property
-    def potential_energy(self) -> Any:
-        """The potential energy of gravity and springs, as a SymPy symbol for outputs."""
-        return symbol("potential_energy")
+    t = _symbol("t", "The time, as a SymPy symbol.")
+    kinetic_energy = _symbol("kinetic_energy", "The kinetic energy of the mechanism, as a SymPy symbol for outputs.")
+    potential_energy = _symbol(
+        "potential_energy", "The potential energy of gravity and springs, as a SymPy symbol for outputs."
+    )
 
     # -- states and functions -----------------------------------------------------------------------------------------
 
@@ -635,15 +640,8 @@ class Builder(ElementMethods):
         return None if at is None else plain(References(self).marker(at))
 
     # -- sums over the mechanism --------------------------------------------------------------------------------------
-    @property
-    def total_energy(self) -> Any:
-        """Kinetic and potential energy together (J)."""
-        return symbol("total_energy")
-
-    @property
-    def total_mass(self) -> Any:
-        """Mass of all bodies (kg)."""
-        return symbol("total_mass")
+    total_energy = _symbol("total_energy", "Kinetic and potential energy together (J).")
+    total_mass = _symbol("total_mass", "Mass of all bodies (kg).")
 
     @property
     def center_of_mass(self) -> MarkerHandle:
@@ -697,23 +695,12 @@ class Builder(ElementMethods):
     def gravity(self, acceleration: Vector) -> None:
         self._description.values["gravity"] = acceleration
 
-    @property
-    def initial(self) -> Any:
-        """Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``."""
-        return self._description.values["initial"]
-
-    @initial.setter
-    def initial(self, values: Mapping[Any, Any]) -> None:
-        self._description.values["initial"] = Settings(named("initial", values))
-
-    @property
-    def guess(self) -> Any:
-        """Rough values of coordinates from which the loops are closed: ``m.guess(phi=1.2)``."""
-        return self._description.values["guess"]
-
-    @guess.setter
-    def guess(self, values: Mapping[Any, Any]) -> None:
-        self._description.values["guess"] = Settings(named("guess", values))
+    initial = _settings(
+        "initial",
+        'Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``.',
+    )
+    guess = _settings("guess", "Rough values of coordinates from which the loops are closed: ``m.guess(phi=1.2)``.")
+    simulation = _settings("simulation", "Defaults of a simulation: ``m.simulation(end=5, rtol=1e-9)``.")
 
     @property
     def independent(self) -> Any:
@@ -723,15 +710,6 @@ class Builder(ElementMethods):
     @independent.setter
     def independent(self, names: Sequence[Any]) -> None:
         self._description.values["independent"] = Names(names_of("independent", names, "a coordinate"))
-
-    @property
-    def simulation(self) -> Any:
-        """Defaults of a simulation: ``m.simulation(end=5, rtol=1e-9)``."""
-        return self._description.values["simulation"]
-
-    @simulation.setter
-    def simulation(self, values: Mapping[str, Any]) -> None:
-        self._description.values["simulation"] = Settings(named("simulation", values))
 
     # -- what comes next ------------------------------------------------------------------------------------------
     @property

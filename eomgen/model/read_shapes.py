@@ -37,19 +37,20 @@ from .values import Reader
 SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
 
 
-def positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
-    """Require a number greater than 0, or 0 too."""
-    reader.requirements.positive(path, x, or_zero)
+def _positive(reader: Reader, path: str, given: Mapping[str, Any], *keys: str) -> list[Expr]:
+    """Sizes that must be greater than 0."""
+    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
+    for key, x in zip(keys, sizes, strict=True):
+        reader.requirements.positive(f"{path}.{key}", x)
+    return sizes
 
 
 def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
     """Depth and points, clockwise, of an outline whose corners are known, counterclockwise."""
     points = list(zip(corners[::2], corners[1::2], strict=True))[::-1]
-    known = [(reader.known(x), reader.known(y)) for x, y in points]
-    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    numbers = _numbers(reader, points)
     if "depth" in given:
-        depth = reader.expression(f"{path}.depth", given["depth"])
-        positive(reader, f"{path}.depth", depth)
+        (depth,) = _positive(reader, path, given, "depth")
         if all(x.value is not None for x in corners):
             depth = reader.graph.apply("min", depth, half_gap(numbers))
     elif all(x.value is not None for x in corners):
@@ -68,16 +69,12 @@ def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple
             f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
         )
         return ()
-    keys = ("pitch", "seat", "tip_radius")
-    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
-    for key, x in zip(keys, sizes, strict=True):
-        positive(reader, f"{path}.{key}", x)
+    sizes = _positive(reader, path, given, "pitch", "seat", "tip_radius")
     sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
     if reader.faults.under(path) or reader.requirements.judge(path, SPROCKET, sizes, (teeth,)):
         return ()
     if "depth" in given:
-        depth = reader.expression(f"{path}.depth", given["depth"])
-        positive(reader, f"{path}.depth", depth)
+        (depth,) = _positive(reader, path, given, "depth")
     else:
         depth = half_tooth(teeth, *sizes)
     return (depth, reader.graph.constant(float(teeth)), *sizes)
@@ -128,11 +125,9 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
     if kind in ("half_plane", "half_space"):
         return ()
     if kind == "box":
-        size = _several(reader, f"{path}.size", given["size"], 2)
+        size = _several(reader, f"{path}.size", given["size"], 2, True)
         if size is None:
             return None
-        for k, x in enumerate(size):
-            positive(reader, f"{path}.size[{k}]", x)
         x, y = 0.5 * size[0], 0.5 * size[1]
         return (-x, -y, x, -y, x, y, -x, y)
     if kind == "polygon":
@@ -146,9 +141,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         return _profile(reader, path, given, 2 if kind == "profile" else 3)
     if kind in ("ellipsoid", "cuboid"):
         key = "semi_axes" if kind == "ellipsoid" else "size"
-        lengths = _several(reader, f"{path}.{key}", given[key], 3)
-        for k, x in enumerate(lengths or ()):
-            positive(reader, f"{path}.{key}[{k}]", x)
+        lengths = _several(reader, f"{path}.{key}", given[key], 3, True)
         return (
             None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
         )
@@ -162,7 +155,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
     sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
         if name in given:
-            positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
+            reader.requirements.positive(f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
 
 
@@ -194,8 +187,7 @@ def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Ex
     least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
     if "edge_radius" not in given:
         return (EDGES * least,)
-    radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
-    positive(reader, f"{path}.edge_radius", radius)
+    (radius,) = _positive(reader, path, given, "edge_radius")
     told = ("is {:g}", "must be less than half of its least length, {1:g}")
     reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], told)
     return (radius,)
@@ -203,9 +195,7 @@ def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Ex
 
 def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Length, width and number of points of a plate."""
-    sizes = [reader.expression(f"{path}.{name}", given[name]) for name in ("length", "width")]
-    for name, x in zip(("length", "width"), sizes, strict=True):
-        positive(reader, f"{path}.{name}", x)
+    sizes = _positive(reader, path, given, "length", "width")
     count = points_of_plate(given)
     if count is None:
         remedy = f"give a whole number from 1 to {POINTS}"
@@ -215,8 +205,7 @@ def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, .
 
 def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Length and number of cells of a bed."""
-    length = reader.expression(f"{path}.length", given["length"])
-    positive(reader, f"{path}.length", length)
+    (length,) = _positive(reader, path, given, "length")
     count = cells_of_bed(given)
     if count is None:
         reader.faults.add(
@@ -225,12 +214,25 @@ def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...
     return (length, reader.graph.constant(float(count or 1)))
 
 
-def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
-    listed = items(value)
-    if listed is None or len(listed) != count:
-        reader.wrong(path, value, kinds.Two if count == 2 else kinds.Vector)
-        return None
-    return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
+def _several(reader: Reader, path: str, value: Any, count: int, lengths: bool = False) -> list[Expr] | None:
+    """So many expressions, of lengths greater than 0."""
+    found = reader.several(path, value, count, kinds.Two if count == 2 else kinds.Vector)
+    for k, x in enumerate(found if found and lengths else ()):
+        reader.requirements.positive(f"{path}[{k}]", x)
+    return found
+
+
+def _points(reader: Reader, path: str, listed: Sequence[Any]) -> list[tuple[Expr, Expr]] | None:
+    """Points [x, y]; None if one is none."""
+    found = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(point[0], point[1]) for point in found if point is not None]
+    return points if len(points) == len(found) else None
+
+
+def _numbers(reader: Reader, points: Sequence[tuple[Expr, Expr]]) -> list[tuple[float, float]]:
+    """Points whose places the declared values tell."""
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    return [(x, y) for x, y in known if x is not None and y is not None]
 
 
 def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
@@ -239,16 +241,14 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
     if listed is None or len(listed) < least:
         reader.faults.add(place, "is no profile", f"give {least} or more points [x, y] from left to right", "EG-TYPE")
         return None
-    read = [_several(reader, f"{place}[{k}]", point, 2) for k, point in enumerate(listed)]
-    points = [(point[0], point[1]) for point in read if point is not None]
-    if len(points) < len(read):
+    points = _points(reader, place, listed)
+    if points is None:
         return None
     for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
         if reader.requirements.judge(f"{place}[{k + 1}]", RISING, [a, b]):
             return None
     if "depth" in given:
-        depth = reader.expression(f"{path}.depth", given["depth"])
-        positive(reader, f"{path}.depth", depth)
+        (depth,) = _positive(reader, path, given, "depth")
     else:
         depth = 0.1 * (points[-1][0] - points[0][0])
     return (depth, *(x for point in points for x in point))
@@ -260,12 +260,10 @@ def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tupl
     if listed is None or not 3 <= len(listed) <= CORNERS:
         reader.faults.add(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]", "EG-TYPE")
         return None
-    corners = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
-    points = [(corner[0], corner[1]) for corner in corners if corner is not None]
-    if len(points) < len(corners):
+    points = _points(reader, path, listed)
+    if points is None:
         return None
-    known = [(reader.known(x), reader.known(y)) for x, y in points]
-    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    numbers = _numbers(reader, points)
     sense = sense_of_outline(numbers, convex) if len(numbers) == len(points) else 1
     if isinstance(sense, Flaw):
         reader.faults.add(path + sense.key, sense.message, sense.remedy, "EG-RANGE")

@@ -232,12 +232,18 @@ class Reader:
     # -- vectors and matrices -------------------------------------------------------------------------------------
     def vector(self, path: str, value: Any, level: int = CONSTANT) -> Vec3:
         """Three scalars."""
-        parts = items(value)
-        if parts is None or len(parts) != 3:
-            self.wrong(path, value, kinds.Vector)
-            return (self.stand_in,) * 3
-        x, y, z = (self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts))
+        x, y, z = self.several(path, value, 3, kinds.Vector, level) or (self.stand_in,) * 3
         return (x, y, z)
+
+    def several(
+        self, path: str, value: Any, count: int, kind: kinds.Field | type[kinds.Field], level: int = CONSTANT
+    ) -> list[Expr] | None:
+        """So many scalars; None if it is no such list."""
+        parts = items(value)
+        if parts is None or len(parts) != count:
+            self.wrong(path, value, kind)
+            return None
+        return [self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts)]
 
     # -- frames and markers ---------------------------------------------------------------------------------------
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:

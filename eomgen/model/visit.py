@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..base.names import place_of_marker
 from ..base.names import undotted as undotted_name
@@ -70,29 +70,17 @@ def motions_of(value: Any) -> set[Named]:
     return {quantity for quantity in found if quantity.is_motion}
 
 
-class Slot(NamedTuple):
-    """Where a scalar stands: section, type of the entry, key, place within it, the entry, and the field of the key."""
+class Visitor:
+    """What a change does to each kind of value; nothing unless a method is overridden.
 
-    section: str
-    type: str
-    key: str
-    place: tuple[Any, ...] = ()
+    ``entry`` is the entry of which a value is changed, ``field`` its key of the name ``key``.
+    """
+
     entry: DescribedEntry | None = None
+    key = ""
     field: Field | None = None
 
-    def at(self, *index: Any) -> Slot:
-        """A place within this one."""
-        return self._replace(place=(*self.place, *index))
-
-    def named(self, key: str) -> Slot:
-        """A key within this place, for placements, solids and points."""
-        return self._replace(key=key, place=())
-
-
-class Visitor:
-    """What a change does to each kind of value; nothing unless a method is overridden."""
-
-    def scalar(self, value: Any, slot: Slot) -> Any:
+    def scalar(self, value: Any) -> Any:
         """A number or an expression."""
         return value
 
@@ -108,14 +96,12 @@ class Visitor:
         """How a name is printed."""
         return text
 
-    def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
+    def placement(self, body: str, placed: Mapping[str, Any]) -> dict[str, Any]:
         """``at`` and ``rpy`` in a body."""
-        made = {key: x if key == "axes" else self.vector(x, slot.named(key)) for key, x in placed.items()}
-        return made | (
-            {"on": self.placement(body, placed["on"], slot)} if isinstance(placed.get("on"), Mapping) else {}
-        )
+        made = {key: x if key == "axes" else self.vector(x) for key, x in placed.items()}
+        return made | ({"on": self.placement(body, placed["on"])} if isinstance(placed.get("on"), Mapping) else {})
 
-    def marker(self, reference: Any, slot: Slot) -> Any:
+    def marker(self, reference: Any) -> Any:
         """A reference to a marker: a text, or a mapping of body, at, rpy."""
         if isinstance(reference, str):
             body, dot, name = reference.partition(".")
@@ -123,13 +109,13 @@ class Visitor:
         if not isinstance(reference, Mapping) or not isinstance(reference.get("body"), str):
             return reference
         placed = {key: value for key, value in reference.items() if key != "body"}
-        return {"body": self.body(reference["body"]), **self.placement(reference["body"], placed, slot)}
+        return {"body": self.body(reference["body"]), **self.placement(reference["body"], placed)}
 
-    def vector(self, value: Any, slot: Slot) -> Any:
-        """A list of scalars, of any depth."""
-        if isinstance(value, list | tuple):
-            return [self.vector(part, slot.at(k)) for k, part in enumerate(value)]
-        return self.scalar(value, slot)
+    def vector(self, value: Any) -> Any:
+        """Lists and mappings of scalars, of any depth."""
+        if isinstance(value, Mapping):
+            return {key: self.vector(part) for key, part in value.items()}
+        return [self.vector(part) for part in value] if isinstance(value, list | tuple) else self.scalar(value)
 
 
 def visit(description: Description, visitor: Visitor) -> Description:
@@ -141,25 +127,23 @@ def visit(description: Description, visitor: Visitor) -> Description:
     }
     values = made.values
     if "gravity" in values:
-        values["gravity"] = visitor.vector(values["gravity"], Slot("", "", "gravity"))
+        values["gravity"] = visitor.vector(values["gravity"])
     for key in ("initial", "guess"):
         if isinstance(values.get(key), Mapping):
-            values[key] = {
-                started(name, visitor.coordinate, visitor, slot): visitor.scalar(value, slot)
-                for name, value, slot in ((n, x, Slot("", "", key, (n,))) for n, x in values[key].items())
-            }
+            changed = {started(n, visitor.coordinate, visitor): visitor.scalar(x) for n, x in values[key].items()}
+            values[key] = changed
     if isinstance(values.get("independent"), list | tuple):
         values["independent"] = [_named(name, visitor.coordinate) for name in values["independent"]]
     for key, fields in (("lagrangian", LAGRANGIAN), ("equations", EQUATIONS)):
         if isinstance(values.get(key), Mapping):
-            values[key] = _values(values[key], fields, Slot(key, "", ""), visitor)
+            values[key] = _values(values[key], fields, visitor)
     return made
 
 
-def started(name: Any, change: Callable[[str], str], visitor: Visitor, slot: Slot) -> Any:
+def started(name: Any, change: Callable[[str], str], visitor: Visitor) -> Any:
     """The name of an initial value or a guess: a place of a marker, or what else changes by ``change``."""
     if place := place_of_marker(name):
-        return f"{place[0]}({visitor.marker(place[1], slot)})"
+        return f"{place[0]}({visitor.marker(place[1])})"
     return _named(name, change)
 
 
@@ -169,17 +153,18 @@ def _named(name: Any, change: Callable[[str], str]) -> Any:
 
 def visit_entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:
     """An entry of a section as a visitor changes it."""
-    slot = Slot(section, str(entry.values.get("type", "")), "", (), entry)
-    values = _values(entry.values, fields_of(section, entry.values), slot, visitor)
+    visitor.entry = entry
+    values = _values(entry.values, fields_of(section, entry.values), visitor)
+    visitor.entry = None
     return replace(entry, values=values)
 
 
-def _values(values: Mapping[str, Any], fields: Fields, slot: Slot, visitor: Visitor) -> dict[str, Any]:
+def _values(values: Mapping[str, Any], fields: Fields, visitor: Visitor) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, value in values.items():
-        field = fields.get(key)
-        place = slot._replace(key=key, field=field)
-        result[key] = value if value is None or field is None else field.map(value, place, visitor)
+        visitor.key, visitor.field = key, fields.get(key)
+        result[key] = value if value is None or visitor.field is None else visitor.field.map(value, visitor)
+    visitor.field = None
     return result
 
 
@@ -201,13 +186,13 @@ class Undotted(Visitor):
 
     body = coordinate
 
-    def scalar(self, value: Any, slot: Slot) -> Any:
+    def scalar(self, value: Any) -> Any:
         if not isinstance(value, str) or "." not in value:
             return value
         return rewritten(value, self.coordinate, lambda quantity: str(quantity.renamed(self.coordinate)))
 
-    def marker(self, reference: Any, slot: Slot) -> Any:
-        return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference, slot)
+    def marker(self, reference: Any) -> Any:
+        return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference)
 
 
 def undotted(description: Description) -> Description:

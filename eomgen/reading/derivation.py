@@ -151,18 +151,17 @@ def derive_mechanism(
 
 def choose_method(mechanism: Mechanism, method: str) -> str:
     """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
-    bare = mechanism.lagrangian is not None
     if not isinstance(method, str):
         raise ill_typed(f"method must be the name of a method, not {shown(method)}")
-    if mechanism.given is not None:
+    if mechanism.written is not None:
         if method not in ("auto", GIVEN):
             raise cannot(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")
         return GIVEN
-    if method == "auto" and bare:
+    if method == "auto" and mechanism.bare:
         return "lagrange"
     if method not in ("auto", *METHODS):
         raise unknown("method", method, ("auto", *METHODS))
-    if bare and method not in OF_LAGRANGIANS:
+    if mechanism.bare and method not in OF_LAGRANGIANS:
         raise cannot(
             f"method {method!r} needs bodies; for a bare Lagrangian there are: auto, {', '.join(OF_LAGRANGIANS)}"
         )

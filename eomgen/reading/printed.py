@@ -348,7 +348,7 @@ class PrintedEquations:
     def attributes(self) -> tuple[str, ...]:
         """Attributes to read next."""
         mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
-        lacking = {*([BODIES] if mechanism.bare else ()), *([PARTS] if mechanism.given is not None else ())}
+        lacking = {*([BODIES] if mechanism.bare else ()), *([PARTS] if mechanism.written is not None else ())}
         rows = {row.name: row.offered for row in there.rows() if row.offered and row.offered not in lacking}
         loops = [name for name, offered in rows.items() if offered == LOOPS and self.equations.constraint_names]
         found = ["q", "v", "parameters", *(name for name, offered in rows.items() if offered != LOOPS)]

@@ -16,11 +16,11 @@ from ..expr.schedule import count
 from ..expr.vectors import Vec3
 from ..mechanics import Kinematics
 from ..mechanics.methods import METHODS
-from ..mechanics.methods.analytical import form_energies
 from ..mechanics.methods.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.wrenches import potential_energy, virtual_power
+from ..model.equations import differentiate
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -57,12 +57,12 @@ def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
 
 
 def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
-    bare = kinematics.mechanism.lagrangian
+    bare, given = kinematics.mechanism.lagrangian, kinematics.mechanism.given
     assert bare is not None
-    _, potential = form_energies(kinematics)
+    assert given is not None
     drag = gradient(bare.dissipation, list(kinematics.v))
     found = {
-        POTENTIAL: _downhill(kinematics, potential),
+        POTENTIAL: _downhill(kinematics, given.potential_energy),
         FORCES: list(bare.forces),
         DISSIPATION: [-d for d in drag],
     }
@@ -78,14 +78,16 @@ def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
 
 
 def without_forces(kinematics: Kinematics) -> Kinematics:
-    """The same motion with no gravity and no force element; of a bare Lagrangian, L without V."""
+    """The same motion with no gravity and no force element; of a bare Lagrangian, the equations of L without V."""
     mechanism, graph = kinematics.mechanism, kinematics.graph
-    bare = mechanism.lagrangian
-    if bare is not None:
+    bare, given = mechanism.lagrangian, mechanism.given
+    if bare is not None and given is not None:
         still = tuple(graph.zero for _ in bare.forces)
-        moving = bare.expression + form_energies(kinematics)[1]
-        bare = replace(bare, expression=moving, forces=still, dissipation=graph.zero)
-    alone = replace(mechanism, gravity=vec.zero(graph), forces=(), lagrangian=bare)
+        moving = bare.expression + given.potential_energy
+        given = differentiate(
+            graph, replace(bare, expression=moving, forces=still, dissipation=graph.zero), kinematics.clock
+        )
+    alone = replace(mechanism, gravity=vec.zero(graph), forces=(), given=given)
     return replace(kinematics, mechanism=alone, forces=())
 
 
@@ -293,7 +295,7 @@ class Quantities:
     # -- energies ---------------------------------------------------------------------------------------------------
     def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
         """Refuse energies of given equations of which none of the keys was given."""
-        given = self.kinematics.mechanism.given
+        given = self.kinematics.mechanism.written
         if given is not None and all(getattr(given, key).is_zero for key in keys):
             raise UnavailableError(
                 f"{what} is not known: the equations are given without {keys[0]}; give equations.{keys[0]}"
@@ -389,7 +391,7 @@ class Quantities:
         return self.transformation.project(row) if self._embeds else tuple(row)
 
     def _require_separate(self, what: str) -> None:
-        if self.kinematics.mechanism.given is not None:
+        if self.kinematics.mechanism.written is not None:
             raise UnavailableError(f"{what} are not known apart: given equations tell their sum alone, which is force")
 
     @cached_property

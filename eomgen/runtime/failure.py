@@ -67,7 +67,7 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
                 "may have several solutions or none (Painleve's paradox); give smaller coefficients"
                 f"{''.join(f'; or {why}' for why in own)}"
             )
-        held = [name for name in bad if f"{name}_closed" in layout.x]
+        held = [name for name in bad if name in layout.switches]
         if held:
             return f"the equations of {' and '.join(held)} are not (outside their domain, or a wheel lies flat)"
         loads = [name for name in bad if name not in layout.reaction_laws]
@@ -164,8 +164,8 @@ class Fail:
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
-        elif name == "resets" and (switched := self.layout.metadata.get("switched")):
-            held = ", ".join(one for one in switched if x[self.layout.x.index(f"{one}_closed")] > 0.5)
+        elif name == "resets" and (switches := self.layout.switches):
+            held = ", ".join(one for one, state in switches.items() if x[self.layout.x.index(state)] > 0.5)
             blame = f": values are no numbers, or contradict what is closed ({held or 'none'}), closes or holds always"
             remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):

@@ -157,6 +157,7 @@ class Layout:
         )
         self.states: tuple[str, ...] = tuple(data.get("states", ()))  #: of first order, the last of the velocities
         self.n_states = len(self.states)
+        self.switches: dict[str, str] = data.get("switched", {})  #: constraint that closes and opens -> its state
         self.moving = self.n_v - self.n_states  #: velocities of the mechanism
         self.space = Space.of(self.n_v, self.quaternion_slots, self.n_states)
         self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)

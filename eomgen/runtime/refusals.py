@@ -113,9 +113,9 @@ def require_switched(layout: Layout, states: Array) -> None:
     UsageError
     """
     given = dict(zip(layout.states, states, strict=True))
-    for name in layout.metadata.get("switched", ()):
-        if (value := given[f"{name}_closed"]) not in (0.0, 1.0):
-            raise no_choice(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
+    for name, state in layout.switches.items():
+        if (value := given[state]) not in (0.0, 1.0):
+            raise no_choice(f"{state} is 1 while {name} is closed and 0 while it is open, not {value:g}")
 
 
 def refuse_closed(layout: Layout, states: Array, what: str) -> None:
@@ -129,9 +129,9 @@ def refuse_closed(layout: Layout, states: Array, what: str) -> None:
     """
     require_switched(layout, states)
     given = dict(zip(layout.states, states, strict=True))
-    names = [name for name in layout.metadata.get("switched", ()) if given[f"{name}_closed"] > 0.5]
+    names = [name for name, state in layout.switches.items() if given[state] > 0.5]
     if names:
-        first = f"{names[0]}_closed"
+        first = layout.switches[names[0]]
         raise UnavailableError(
             f"{what} is not available while constraints that close and open are closed, and {', '.join(names)} of "
             f"{layout.name!r} {'are' if names[1:] else 'is'}: what holds for a time restricts no degree of freedom; "

@@ -297,6 +297,22 @@ def test_a_function_with_a_python_fallback_in_a_component(tmp_path: Path, target
     np.testing.assert_allclose(module.rhs(0, module.x0(a_pin=0.5, b_pin=3.0))[2:], [-0.5, -18.0], rtol=1e-15)
 
 
+def test_a_joint_that_closes_in_a_component_has_its_state(tmp_path: Path) -> None:
+    text = """
+name: pair
+components:
+  arm:
+    attachments: [top]
+    bodies: {rod: {mass: 1, inertia: {zz: 1}}}
+    joints: {hinge: {type: revolute, between: [top, rod], closes: 0.25 - t}}
+    outputs: {shut: hinge_closed}
+add: {a: {component: arm, at: ground}, b: {component: arm, at: ground, initial: {hinge_dot: 2}}}
+"""
+    run = load(tmp_path, text).compile(target="numpy").simulate(0.5)
+    assert [run[name][k] for name in ("a_shut", "b_shut") for k in (0, -1)] == [0, 1, 0, 1]
+    assert run["b.hinge"][-1] == pytest.approx(0.5)
+
+
 ADDING = [
     ("component: link, at: root", "component: lnik, at: root", "EG-NAME-UNKNOWN limb.add.upper.component: 'link'?"),
     ("{l: L}", "{q: L}", "EG-NAME-UNKNOWN :14: components.limb.add.upper.parameters.q: 'q' link"),

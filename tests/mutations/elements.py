@@ -110,7 +110,7 @@ FAULTS = (
     ),
     Fault(
         "rolling-floor", "Rolling.conditions",
-        "vec.add(view.velocity(self.plane), vec.cross(view.angular_velocity(self.plane), beside))",
+        "velocity_at(view, self.plane, vec.sub(point, view.position(self.plane)))",
         "view.velocity(self.plane)",
         "a floor that turns does not carry what rolls on it along",
         "tests/mechanics/test_rolling.py::test_a_ball_on_a_turntable_goes_round_two_sevenths_as_fast",

@@ -10,31 +10,19 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
 from ...base.records import dataclass
-from ...expr.core import Expr, Graph
-from ...expr.vectors import Mat3, Vec3
+from ...expr.core import Expr
 from ..element_type import Entry
-from ..frames import Frame, Marker
+from ..frames import Frame, Marker, MotionView
 from ..looks import Seen
 
 POSITION, VELOCITY = "position", "velocity"
 
 
-class ConstraintView(Protocol):
-    """Motion of markers, as expressions; in ground axes unless said."""
-
-    graph: Graph
+class ConstraintView(MotionView, Protocol):
+    """Motion of markers against each other too."""
 
     def relative(self, start: Marker, end: Marker) -> Frame:
         """Placement of ``end`` in the axes of ``start``."""
-        ...
-
-    def position(self, marker: Marker) -> Vec3: ...
-    def velocity(self, marker: Marker) -> Vec3: ...
-    def rotation(self, marker: Marker) -> Mat3: ...
-    def angular_velocity(self, marker: Marker) -> Vec3: ...
-
-    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
-        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap."""
         ...
 
 

@@ -14,7 +14,7 @@ from ...expr.differentiate import jvp
 from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, table
-from ..frames import Marker
+from ..frames import Marker, velocity_at
 from ..kinds import Axis, Choice, Flag, MarkerReference, Scalar, Vector
 from ..looks import Contour, Seen, Wheel
 from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
@@ -69,9 +69,8 @@ class Rolling(Constraint):
     def conditions(self, view: ConstraintView) -> list[Condition]:
         arm = self.contact(view)
         point = vec.add(view.position(self.wheel), arm)
-        v = vec.add(view.velocity(self.wheel), vec.cross(view.angular_velocity(self.wheel), arm))
-        beside = vec.sub(point, view.position(self.plane))
-        floor = vec.add(view.velocity(self.plane), vec.cross(view.angular_velocity(self.plane), beside))
+        v = velocity_at(view, self.wheel, arm)
+        floor = velocity_at(view, self.plane, vec.sub(point, view.position(self.plane)))
         x, y, _ = vec.transpose_times(view.rotation(self.plane), vec.sub(v, floor))
         return [
             Condition("height", self.height(view), "length"),
@@ -164,8 +163,7 @@ class KnifeEdge(Constraint):
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         sideways = vec.times(view.rotation(self.marker), self.axis)
-        apart = vec.sub(view.position(self.marker), view.position(self.on))
-        under = vec.add(view.velocity(self.on), vec.cross(view.angular_velocity(self.on), apart))
+        under = velocity_at(view, self.on, vec.sub(view.position(self.marker), view.position(self.on)))
         slip = vec.dot(sideways, vec.sub(view.velocity(self.marker), under))
         return [Condition("slip", slip, "length", VELOCITY)]
 
@@ -196,11 +194,7 @@ class RollingConvex(Rolling):
 
     def _touching(self, n: Vec3) -> tuple[Expr, Vec3]:
         """The support and the point of a normal, body axes."""
-        graph = self.support.graph
-        zero, one = graph.zero, graph.one
-        slopes = [
-            jvp([self.support], {x: one if i == k else zero for i, x in enumerate(self.local)})[0] for k in range(3)
-        ]
+        slopes = [_along(self.support, self.local, k) for k in range(3)]
         h, x, y, z = substitute([self.support, *slopes], dict(zip(self.local, n, strict=True)))
         along = vec.dot((x, y, z), n)
         return h, vec.add(vec.scale(h - along, n), (x, y, z))

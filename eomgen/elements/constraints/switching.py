@@ -1,10 +1,19 @@
-"""Constraint elements that close and open: the keys by which a constraint holds for a time only."""
+"""Constraint elements that close and open: keys by which any constraint holds for a time, and what only does so."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ...base.records import dataclass
+from ...expr import vectors as vec
+from ...expr.core import Expr
 from ..dimensions import SPIN
-from ..element_type import ElementType, Types
-from ..kinds import LAW, Fields, Flag, Scalar, SomeNames
+from ..element_type import ElementType, Entry, Types, table
+from ..frames import Marker, velocity_at
+from ..kinds import LAW, Choice, Fields, Flag, JointReference, Pair, Scalar, SomeNames
+from ..looks import CROSS, Drawn, Seen
+from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
 
 #: Of any constraint that may close and open in a run.
 SWITCHING: Fields = {
@@ -36,3 +45,109 @@ def switchable(types: Types) -> Types:
 
 def _with_keys(found: ElementType) -> ElementType:
     return found._replace(keys=found.keys | SWITCHING)
+
+
+def is_switched(values: Mapping[str, Any]) -> bool:
+    """Whether an entry says that a constraint or joint closes or opens."""
+    return not values.keys().isdisjoint(("closes", "opens", "closed"))
+
+
+def state_of(name: str) -> str:
+    """The first-order state that is 1 while the constraint or joint of a name holds."""
+    return f"{name}_closed"
+
+
+def event_of(name: str, key: str) -> str:
+    """The event at which it ``closes`` or ``opens``."""
+    return f"{name}_{key}"
+
+
+# -- what holds for a time only ----------------------------------------------------------------------------------------
+AXES = ("xyz", "xy", "x", "y", "z", "xz", "yz")
+
+
+@dataclass(frozen=True)
+class Hold(Constraint):
+    """A marker that does not move on the body of another marker, along some of that marker's axes.
+
+    It is held wherever it is: its velocity on the other body is 0, and with ``turning`` its angular velocity too.
+    """
+
+    sentence: ClassVar[str] = "The marker does not move on the other body while it is held."
+    formula: ClassVar[str] = r"\mathbf{v}_b - \mathbf{v}_a = \mathbf{0}"
+    type_name: ClassVar[str] = "hold"
+    on: Marker
+    marker: Marker
+    axes: str
+    turning: str
+
+    def drawn(self) -> list[Seen]:
+        return [Drawn((self.marker,), about=CROSS)]
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        under = velocity_at(view, self.on, vec.sub(view.position(self.marker), view.position(self.on)))
+        axes = view.rotation(self.on)
+        slip = vec.transpose_times(axes, vec.sub(view.velocity(self.marker), under))
+        turn = vec.sub(view.angular_velocity(self.marker), view.angular_velocity(self.on))
+        spin = vec.transpose_times(axes, turn)
+        rows = [Condition(f"v{axis}", slip["xyz".index(axis)], "length", VELOCITY) for axis in self.axes]
+        return rows + [Condition(f"w{axis}", spin["xyz".index(axis)], "angle", VELOCITY) for axis in self.turning]
+
+
+@dataclass(frozen=True)
+class Lock(Constraint):
+    """A joint whose coordinates, or one of them, do not change: it is held wherever it is."""
+
+    sentence: ClassVar[str] = "The coordinates of the joint do not change while it is locked."
+    formula: ClassVar[str] = r"\dot{q}_k = 0"
+    type_name: ClassVar[str] = "lock"
+    velocities: tuple[tuple[str, Expr, str], ...]  #: label, the velocity, 'length' or 'angle'
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        return [Condition(label, velocity, kind, VELOCITY) for label, velocity, kind in self.velocities]
+
+
+def _require_switch(e: Entry, otherwise: str) -> None:
+    if not is_switched(e.values):
+        remedy = f"give closes, opens or closed; for good {otherwise}"
+        e.fault("", "is neither closed nor opened", remedy, "EG-MISSING")
+
+
+def _hold(e: Entry) -> Constraint | None:
+    pair, axes, turning = e.pair(), e["axes"], e["turning"]
+    _require_switch(e, "a joint holds bodies")
+    if pair is None or not on_two_bodies(e, "between", *pair):
+        return None
+    return Hold(e.name, *pair, axes, "" if turning == "none" else turning)
+
+
+def _lock(e: Entry) -> Constraint | None:
+    velocities = e.velocities("joint")
+    _require_switch(e, "use a joint of type weld")
+    return None if velocities is None else Lock(e.name, velocities)
+
+
+TYPES = table(
+    ElementType(
+        "hold",
+        "a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch.",
+        {
+            "between": Pair("marker whose body holds, and the marker that is held", required=True),
+            "axes": Choice(
+                "axes of the first marker along which the second does not move", default="xyz", choices=AXES
+            ),
+            "turning": Choice(
+                "axes of the first marker about which the second does not turn",
+                default="none",
+                choices=("none", *AXES),
+            ),
+        },
+        _hold,
+    ),
+    ElementType(
+        "lock",
+        "a joint whose coordinates stay where they are while it is closed: a clutch, a brake, the latch of a door.",
+        {"joint": JointReference("joint that is locked, or one of its coordinates", required=True)},
+        _lock,
+    ),
+)

@@ -12,7 +12,7 @@ from ...expr.core import Expr, sqrt
 from ...expr.vectors import Vec3
 from ..dimensions import FORCE, LENGTH, NONE, SPEED
 from ..element_type import ElementType, Entry, table
-from ..frames import Marker
+from ..frames import Marker, velocity_at
 from ..kinds import LAW, Choice, Pair, Scalar
 from .force import Force, Load, MarkerLoad, View, beyond_zero, where
 
@@ -55,15 +55,13 @@ class Creep(Force):
         axes = view.rotation(self.track)
         arm = vec.scale(-self.radius, vec.transpose(axes)[2])
         centre = view.position(self.wheel)
-        turn = view.angular_velocity(self.track)
-
-        def on_track(point: Vec3) -> Vec3:
-            return vec.add(view.velocity(self.track), vec.cross(turn, vec.sub(point, view.position(self.track))))
-
-        touching = vec.add(view.velocity(self.wheel), vec.cross(view.angular_velocity(self.wheel), arm))
-        slip = vec.transpose_times(axes, vec.sub(touching, on_track(vec.add(centre, arm))))
-        rolling = vec.transpose_times(axes, vec.sub(view.velocity(self.wheel), on_track(centre)))[0]
-        spin = vec.transpose_times(axes, vec.sub(view.angular_velocity(self.wheel), turn))[2]
+        origin = view.position(self.track)
+        under = velocity_at(view, self.track, vec.sub(vec.add(centre, arm), origin))
+        slip = vec.transpose_times(axes, vec.sub(velocity_at(view, self.wheel, arm), under))
+        passing = vec.sub(view.velocity(self.wheel), velocity_at(view, self.track, vec.sub(centre, origin)))
+        rolling = vec.transpose_times(axes, passing)[0]
+        turning = vec.sub(view.angular_velocity(self.wheel), view.angular_velocity(self.track))
+        spin = vec.transpose_times(axes, turning)[2]
         speed = view.graph.apply("abs", rolling) if self.speed is None else self.speed
         return slip, spin, speed, arm
 

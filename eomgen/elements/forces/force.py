@@ -8,9 +8,9 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
-from ...expr.core import Expr, Graph
-from ...expr.vectors import Mat3, Vec3
-from ..frames import Marker
+from ...expr.core import Expr
+from ...expr.vectors import Vec3
+from ..frames import Marker, MotionView
 from ..looks import Seen
 
 # -- one-sided laws ----------------------------------------------------------------------------------------------------
@@ -35,18 +35,8 @@ def beyond_zero(x: Expr, law: Callable[[Expr], Expr]) -> Expr:
 # A force element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.
 
 
-class View(Protocol):
-    """Motion of markers in ground axes and of joint coordinates, as expressions."""
-
-    graph: Graph
-
-    def position(self, marker: Marker) -> Vec3: ...
-    def velocity(self, marker: Marker) -> Vec3: ...
-    def rotation(self, marker: Marker) -> Mat3: ...
-    def angular_velocity(self, marker: Marker) -> Vec3: ...
-    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
-        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap."""
-        ...
+class View(MotionView, Protocol):
+    """Motion of markers, and of joint coordinates."""
 
     def coordinate(self, name: str) -> tuple[Expr, Expr]:
         """Value and rate of a coordinate of any joint, tree or cut."""
@@ -77,6 +67,18 @@ class CoordinateLoad(NamedTuple):
 
 
 Load = MarkerLoad | CoordinateLoad
+
+
+def power_of(view: View, loads: Sequence[Load]) -> Expr:
+    """Power of loads (W)."""
+    total = view.graph.zero
+    for load in loads:
+        if isinstance(load, MarkerLoad):
+            total = total + vec.dot(load.force, view.velocity(load.marker))
+            total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
+        else:
+            total = total + load.value * view.coordinate(load.coordinate)[1]
+    return total
 
 
 class Measured(NamedTuple):
@@ -151,14 +153,7 @@ class Force(ABC):
 
     def power(self, view: View) -> Expr:
         """Power of its loads (W): positive where it drives the mechanism."""
-        total = view.graph.zero
-        for load in self.loads(view):
-            if isinstance(load, MarkerLoad):
-                total = total + vec.dot(load.force, view.velocity(load.marker))
-                total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
-            else:
-                total = total + load.value * view.coordinate(load.coordinate)[1]
-        return total
+        return power_of(view, self.loads(view))
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         """Rates of its states, in the order in which its type names them."""

@@ -14,7 +14,7 @@ from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder
 from ..kinds import JointReference, Pair, Via
 from ..looks import Drawn, Points
-from .force import CoordinateLoad, Force, Load, MarkerLoad, View, where
+from .force import CoordinateLoad, Force, Load, MarkerLoad, View, power_of, where
 
 # -- paths -------------------------------------------------------------------------------------------------------------
 
@@ -209,7 +209,7 @@ class Route(Path):
         length = view.graph.zero
         for _, _, _, piece in self._pieces(view):
             length = length + piece.length
-        return length, _power(view, self._smooth(view, view.graph.one))  # of a unit force: the rate
+        return length, power_of(view, self._smooth(view, view.graph.one))  # of a unit force: the rate
 
     def is_exact(self, view: View) -> bool:
         return not any(isinstance(stop, WrapCylinder) and stop.friction is not None for stop in self.via)
@@ -224,7 +224,7 @@ class Route(Path):
             result += _scaled(force, halves[2 * k])
             if cylinder is not None and cylinder.friction is not None and cylinder.smoothing is not None:
                 before, after = (
-                    _power(view, [load for half in part for load in half])
+                    power_of(view, [load for half in part for load in half])
                     for part in (halves[: 2 * k + 1], halves[2 * k + 1 :])
                 )
                 slip = view.graph.apply("tanh", 0.5 * (before - after) / cylinder.smoothing)
@@ -268,14 +268,6 @@ def _halves(
         first.append(MarkerLoad(cylinder.marker, piece.leaving, piece.turns[0]))
         last.append(MarkerLoad(cylinder.marker, vec.neg(piece.arriving), vec.neg(piece.turns[1])))
     return first, last
-
-
-def _power(view: View, loads: Sequence[MarkerLoad]) -> Expr:
-    total = view.graph.zero
-    for load in loads:
-        total = total + vec.dot(load.force, view.velocity(load.marker))
-        total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
-    return total
 
 
 def _scaled(force: Expr, loads: Sequence[MarkerLoad]) -> list[MarkerLoad]:

@@ -260,29 +260,3 @@ def parameter_rates(e: Sequence[Expr], w: Sequence[Expr]) -> list[Expr]:
         e3 * h1 + e0 * h2 - e1 * h3,
         e1 * h2 - e2 * h1 + e0 * h3,
     ]
-
-
-def parameters_of(graph: Graph, rotation: Mat3) -> list[Expr]:
-    """Unit Euler parameters of a rotation matrix with e0 >= 0, from its largest one (Shepperd, 1978, J. Guidance 1)."""
-    r = rotation
-    skew = (r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1])
-    trace = r[0][0] + r[1][1] + r[2][2]
-    squares = [1.0 + trace, *(1.0 + 2.0 * r[k][k] - trace for k in range(3))]  # 4 e_k^2
-    ways = []
-    for k, square in enumerate(squares):
-        root = graph.apply("sqrt", graph.apply("max", square, 0.5))  # the largest is at least 1
-        half = 0.5 / root
-        if k == 0:
-            way = [0.5 * root, *(half * x for x in skew)]
-        else:
-            way = [half * skew[k - 1], *(half * (r[k - 1][j] + r[j][k - 1]) for j in range(3))]
-            way[k] = 0.5 * root
-            sign = graph.apply("select", graph.apply("lt", way[0], 0.0), -1.0, 1.0)
-            way = [sign * x for x in way]
-        ways.append(way)
-    result, best = ways[0], squares[0]
-    for way, square in zip(ways[1:], squares[1:], strict=True):
-        larger = graph.apply("lt", best, square)
-        result = [graph.apply("select", larger, x, y) for x, y in zip(way, result, strict=True)]
-        best = graph.apply("max", best, square)
-    return result

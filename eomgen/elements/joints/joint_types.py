@@ -14,6 +14,7 @@ from ..dimensions import LENGTH
 from ..element_type import key
 from ..kinds import Choice, Scalar
 from ..looks import JointLook, SymbolPart
+from ..rotations.quaternions import euler_parameters_from_matrix
 from .joint import (
     SEQUENCE,
     Closure,
@@ -27,7 +28,6 @@ from .joint import (
     euler_rates,
     parallel_axes,
     parameter_rotation,
-    parameters_of,
     same_orientation,
     unit,
 )
@@ -394,7 +394,7 @@ class RotatingJoint(Joint):
     def turned(self, graph: Graph, rotation: Mat3) -> list[Expr]:
         """The coordinates of a rotation."""
         if self.in_parameters:
-            return parameters_of(graph, rotation)
+            return [*euler_parameters_from_matrix(rotation)]
         return euler_angles(graph, self.sequence, rotation)
 
 

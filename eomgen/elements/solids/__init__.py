@@ -9,15 +9,10 @@ SOLIDS: dict[str, type[Solid]] = {
 
 __all__ = [
     "SOLIDS",
-    "Box",
-    "Cone",
     "Cylinder",
-    "Ellipsoid",
     "MassProperties",
     "Rod",
     "Solid",
-    "Sphere",
-    "Tube",
     "combine",
     "point",
 ]

@@ -5,9 +5,7 @@ from __future__ import annotations
 from ...elements.forces import CoordinateLoad, MarkerLoad
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
-from ...expr.core import Expr, substitute
-from ...expr.differentiate import gradient, jvp
-from ...expr.identity import vanishes
+from ...expr.core import Expr
 from ...expr.schedule import count
 from ...expr.vectors import Vec3
 from .. import Kinematics
@@ -15,24 +13,11 @@ from ..wrenches import virtual_power
 
 
 def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
-    """T and V; of a bare Lagrangian its terms of second degree in the velocities, and V = -L(v = 0).
-
-    T + V is then the energy v . dL/dv - L, in which terms linear in the velocities cancel.
+    """T and V.
 
     ``differentiated``: without the potentials of elements whose forces enter by virtual power instead.
     """
-    bare = kinematics.mechanism.lagrangian
     graph = kinematics.graph
-    if bare is not None:
-        v = list(kinematics.v)
-        momenta = gradient(bare.expression, v)
-        at_rest, *first_degree = substitute([bare.expression, *momenta], dict.fromkeys(v, graph.zero))
-        quadratic = bare.expression - at_rest
-        if not all(vanishes(first_degree)):
-            quadratic = graph.zero
-            for rate, inertial in zip(v, jvp(momenta, dict(zip(v, v, strict=True))), strict=True):  # M v
-                quadratic = quadratic + 0.5 * (rate * inertial)
-        return quadratic, -at_rest
     kinetic, potential = graph.zero, graph.zero
     # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
     heights: list[tuple[Expr, Vec3]] = []
@@ -67,13 +52,4 @@ def generalized_forces(kinematics: Kinematics) -> list[Expr]:
     for terms in kinematics.forces:
         loads += terms.marker_loads if terms.force.by_power else terms.marker_remainder
         loads += terms.coordinate_remainder
-    return [a + b for a, b in zip(virtual_power(kinematics, loads), _bare_forces(kinematics), strict=True)]
-
-
-def _bare_forces(kinematics: Kinematics) -> list[Expr]:
-    """Given generalized forces less the gradient of Rayleigh's dissipation function."""
-    bare, graph = kinematics.mechanism.lagrangian, kinematics.graph
-    if bare is None:
-        return [graph.zero] * len(kinematics.v)
-    drag = gradient(bare.dissipation, list(kinematics.v))
-    return [f - d for f, d in zip(bare.forces, drag, strict=True)]
+    return virtual_power(kinematics, loads)

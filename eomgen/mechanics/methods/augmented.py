@@ -14,14 +14,14 @@ from ...expr.core import Expr
 from .. import Kinematics
 from ..constraint_functions import Units
 from ..loops import Constraints
-from . import embedding, lagrange
-from .tree_equations import LinearSystem, TreeEquations, with_armature
+from . import embedding
+from .tree_equations import LinearSystem, TreeEquations, take_given, with_armature
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
-    """M and h of the tree, of a bare Lagrangian by Lagrange's equations, and the system with multipliers."""
-    bare = kinematics.mechanism.lagrangian is not None
-    tree = with_armature(lagrange.derive if bare else embedding.derive)(kinematics)
+    """M and h of the tree, or those given, and the system with multipliers."""
+    bare = kinematics.mechanism.bare
+    tree = take_given(kinematics, "augmented") if bare else with_armature(embedding.derive)(kinematics)
     tree.method = "augmented"
     if kinematics.constraints.labels:
         tree.system = _system(kinematics, tree)

@@ -222,7 +222,7 @@ class Composite(NamedTuple):
 def can_differentiate(kinematics: Kinematics) -> bool:
     """Whether the formulas of this file hold for a mechanism's tree."""
     mechanism = kinematics.mechanism
-    if mechanism.lagrangian is not None or mechanism.given is not None or cut_drives(kinematics):
+    if mechanism.bare or cut_drives(kinematics):
         return False
     places = coordinate_places(kinematics)
     for link in kinematics.links:

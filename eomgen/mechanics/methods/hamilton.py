@@ -15,16 +15,22 @@ from collections.abc import Sequence
 from ...expr import vectors as vec
 from ...expr.core import Expr
 from ...expr.differentiate import gradient, jacobian, jvp, vjp
+from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..wrenches import cut_drives, drive_inertias
 from .analytical import form_energies, generalized_forces
-from .tree_equations import TreeEquations
+from .tree_equations import TreeEquations, take_given
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Canonical equations of the spanning tree, or of a bare Lagrangian."""
-    graph, v = kinematics.graph, list(kinematics.v)
+    graph, v, bare = kinematics.graph, list(kinematics.v), kinematics.mechanism.lagrangian
     n = len(v)
+    if bare is not None:
+        tree = take_given(kinematics, "hamilton")
+        momenta, rates = momenta_and_rates(bare, kinematics.q, v)
+        tree.canonical = (*momenta, *rates)
+        return tree
     kinetic, potential = form_energies(kinematics)
     for j, inertia in drive_inertias(kinematics).items():
         kinetic = kinetic + 0.5 * inertia * (v[j] * v[j])
@@ -32,8 +38,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         loop = kinematics.loop_coordinates
         rate = loop.rates[loop.names.index(name)]
         kinetic = kinetic + 0.5 * inertia * (rate * rate)
-    bare = kinematics.mechanism.lagrangian
-    L = kinetic - form_energies(kinematics, differentiated=True)[1] if bare is None else bare.expression
+    L = kinetic - form_energies(kinematics, differentiated=True)[1]
     momenta = gradient(L, v)
     entries = jacobian(momenta, v)
     mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n))

@@ -2,7 +2,7 @@
 
 d/dt (dT/dv) - dT/dq + dV/dq = Q (Shabana, Computational Dynamics, sec. 4.4 ff.).  T and V come from the velocity
 recursion and are linear in the number of bodies; one reverse gradient and one forward derivative keep the equations
-linear too.  A bare Lagrangian goes the same way.  Where q' = N v, for Euler parameters, the equations are those of
+linear too.  Where q' = N v, for Euler parameters, the equations are those of
 Boltzmann and Hamel with the structure constants of rotations, w being angular velocities in turned axes:
 d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Analytical Dynamics, 1970, sec. 4.13).
 """
@@ -13,16 +13,17 @@ from ...expr import vectors as vec
 from ...expr.differentiate import gradient, jacobian, jvp, vjp
 from .. import Kinematics
 from .analytical import form_energies, generalized_forces
-from .tree_equations import TreeEquations
+from .tree_equations import TreeEquations, take_given
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
-    """Lagrange's equations of the spanning tree, or of a bare Lagrangian."""
+    """Lagrange's equations of the spanning tree; those of a bare Lagrangian are given."""
+    if kinematics.mechanism.bare:
+        return take_given(kinematics, "lagrange")
     graph = kinematics.graph
     q, v = list(kinematics.q), list(kinematics.v)
     kinetic, potential = form_energies(kinematics)
-    bare = kinematics.mechanism.lagrangian
-    L = kinetic - form_energies(kinematics, differentiated=True)[1] if bare is None else bare.expression
+    L = kinetic - form_energies(kinematics, differentiated=True)[1]
     momentum = gradient(L, v)
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)

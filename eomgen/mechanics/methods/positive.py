@@ -54,8 +54,7 @@ class IdleMotion:
         involved = [j for j in np.argsort(-np.abs(v), kind="stable") if abs(v[j]) > FAINT]
         largest = names[involved[0]]
         spec = next((s for s in mechanism.joints if largest in (*s.coordinates, *s.velocities)), None)
-        section = "lagrangian" if mechanism.given is None else "equations"
-        path = f"joints.{spec.name}" if spec else f"{section}.{largest}"
+        path = f"joints.{spec.name}" if spec else f"{mechanism.bare_section}.{largest}"
         shown = sorted(involved)
         ratio = " : ".join(f"{v[j]:.3g}" for j in shown)
         together = f"{', '.join(names[j] for j in shown)} at the rates {ratio}"
@@ -202,8 +201,7 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():
             spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
-            section = "lagrangian" if m.given is None else "equations"
-            path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
+            path = f"joints.{spec.name}" if spec else f"{m.bare_section}.{names[j]}"
             what = "negative inertia" if size < -LEAST else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
             problems.append(m.problem(path, message, REMEDY, "EG-NO-INERTIA"))

@@ -10,6 +10,7 @@ from types import FunctionType
 from ...base.records import dataclass
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import jacobian
+from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..link_frames import Turned
 from ..motion import combined
@@ -209,7 +210,7 @@ def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr
 GIVEN = "given"  #: what stands where the name of a method would
 
 
-def take_given(kinematics: Kinematics) -> TreeEquations:
+def take_given(kinematics: Kinematics, method: str = GIVEN) -> TreeEquations:
     """The equations of a mechanism that has them; only the lower triangle of M is read."""
     given = kinematics.mechanism.given
     assert given is not None
@@ -217,11 +218,16 @@ def take_given(kinematics: Kinematics) -> TreeEquations:
     lower = given.mass_matrix
     mass = tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
     bias = tuple(-f for f in given.forcing)
+    if (bare := kinematics.mechanism.lagrangian) is None:
+        moved = [combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)]
+    else:  # shorter
+        momenta, rates = momenta_and_rates(bare, kinematics.q, kinematics.v)
+        moved = [d - r for d, r in zip(kinematics.total_derivative(momenta), rates, strict=True)]
     return TreeEquations(
-        method=GIVEN,
+        method=method,
         mass_matrix=mass,
         bias=bias,
-        inverse_dynamics=tuple(combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)),
+        inverse_dynamics=tuple(moved),
         kinetic_energy=given.kinetic_energy,
         potential_energy=given.potential_energy,
     )

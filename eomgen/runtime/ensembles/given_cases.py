@@ -227,7 +227,7 @@ def assemble_states(
     if module.metadata.get("clocks"):
         for k in set(range(cases.count)) - reasons.keys():
             x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
-    if module.metadata.get("switched"):
+    if module.layout.switches:
         _refuse_disagreement(module, cases, t, x, reasons)
     failed = np.array([k in reasons for k in range(cases.count)], dtype=bool)
     return x, failed, [reasons[k] for k in sorted(reasons)]

@@ -136,7 +136,7 @@ def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | 
     forcing.attach(module)
     given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}
     settings = check_tolerances(module.n_x, float("inf"), given)
-    shared = not (module.layout.input_rates or module.metadata.get("clocks") or module.metadata.get("switched"))
+    shared = not (module.layout.input_rates or module.metadata.get("clocks") or module.layout.switches)
     return Settled(forcing, Events(module.layout, None), str(title), float(declared["end"]), settings, shared)
 
 

@@ -370,7 +370,7 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
             f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
             f"to {end:.6g} s"
         )
-    switched: list[str] = module.metadata.get("switched", [])
+    switched = module.layout.switches
     if switched and end < start:
         raise cannot(
             f"a run of constraints that close and open ({', '.join(switched)}) goes forward in time, not from "
@@ -407,7 +407,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
             (found[2 * k + 1], MEASURED * size * fast, "changes by", "/s"),
         ):
             if not abs(value) <= limit and state not in (initial or ()):
-                name = state.removesuffix("_closed")
+                name = label.partition(".")[0]
                 raise untrue(
                     f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
                     f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or "

@@ -255,7 +255,7 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
     AssemblyError
         The loops do not close, or the inputs on which they depend change with the state that they give.
     """
-    if module.metadata.get("clocks") or module.metadata.get("switched"):
+    if module.metadata.get("clocks") or module.layout.switches:
         from .events import at_next_samples
 
         span = None if forcing is None else forcing.span

@@ -1,0 +1,527 @@
+"""Models without bodies: equations M v' = f, or a Lagrangian, whose equations follow -> GivenEquations on the graph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from ..base.limits.numbers import TENSOR
+from ..base.notation import split_rate
+from ..elements import kinds
+from ..elements.kinds import MOTION, Fields
+from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.differentiate import gradient, jacobian, jvp
+from ..expr.evaluate import evaluate
+from ..expr.identity import vanishes
+from ..expr.shown import quoted, shown
+from .checks import check_keys
+from .description import Description, Faults, items
+from .expressions import names_in
+from .fields import EQUATIONS, LAGRANGIAN
+from .mechanism import GivenEquations, Lagrangian, Output
+from .names import fault_of_name, nearest
+from .printed_names import MULTIPLIERS, give_latex, numbered, take_coordinates_latex
+from .scope import ENERGIES, RATES
+from .sympy_face import derivative_names, free_names, function_names, in_order, is_sympy, name_of, named, names_of
+from .values import Reader
+
+# -- what Python gives -------------------------------------------------------------------------------------------------
+
+
+def describe_lagrangian(
+    name: str,
+    L: Any,
+    coordinates: Sequence[Any],
+    forces: Sequence[Any] | Mapping[Any, Any] | None = None,
+    dissipation: Any = None,
+    constraints: Sequence[Any] = (),
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | None = None,
+    latex: Mapping[Any, str] | None = None,
+) -> Description:
+    """Describe a system by its Lagrangian L = T - V.
+
+    Parameters
+    ----------
+    name : str
+        Identifier; the generated module bears it.
+    L : sympy.Expr or str
+        T - V in coordinates, velocities and t.
+    coordinates : sequence
+        Generalized coordinates: functions of time ``q(t)`` (``dynamicsymbols``), whose velocities are their
+        derivatives, or plain symbols (or names) ``q``, whose velocities are the symbols ``q_dot``.
+    forces : sequence or mapping, optional
+        Generalized forces, one for each coordinate in order, or by coordinate.
+    dissipation : sympy.Expr, optional
+        Rayleigh's dissipation function D(q, q_dot); it adds the forces -dD/dq_dot.
+    constraints : sequence of sympy.Expr, optional
+        Constraints, each = 0: of coordinates and t (holonomic), or linear in the velocities (nonholonomic).
+    parameters : mapping, optional
+        Values by symbol or name.  Every other free symbol becomes a parameter without a value.
+    inputs : mapping, optional
+        Quantities given over time, by symbol or name: the value that holds while none is given.
+    latex : mapping, optional
+        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``; also
+        velocities, ``"q_dot"``, and the multipliers of the constraints, ``"lambda_1"``.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    ModelError
+        A coordinate is neither a symbol nor a function of time ``q(t)``.
+    """
+    names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
+    given: dict[str, Any] = {"coordinates": names, "expression": L}
+    if forces is not None:
+        given["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
+    if dissipation is not None:
+        given["dissipation"] = dissipation
+    if items(constraints) or not isinstance(constraints, list | tuple):
+        given["constraints"] = constraints
+
+    description = Description(values={"name": name, "lagrangian": given})
+    values, driven = named("parameters", parameters), named("inputs", inputs)
+    known = {q + rate for q in names for rate in RATES} | set(driven)
+    stems = {split_rate(source)[0] for source in driven}
+    found = _names_of_section(given)
+    further = derivative_names([part for part in _parts(given) if is_sympy(part)])
+    others = [name for name in sorted({*found, *further}) if name not in {*known, *values}]
+    rates = [name for name in others if split_rate(name)[0] in stems]
+    known |= set(rates)
+    own = {name: value for name, value in values.items() if name not in known}
+    description.declare(own, driven | dict.fromkeys(rates), [name for name in found if name not in known])
+    give_latex(description, "lagrangian", latex)
+    return description
+
+
+def describe_equations(
+    name: str,
+    coordinates: Sequence[Any],
+    mass_matrix: Any,
+    forcing: Any,
+    *,
+    velocities: Sequence[Any] | None = None,
+    rates: Mapping[Any, Any] | None = None,
+    intermediates: Mapping[Any, Any] | None = None,
+    constraints: Sequence[Any] = (),
+    multipliers: Sequence[Any] = (),
+    kinetic_energy: Any = None,
+    potential_energy: Any = None,
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | None = None,
+    latex: Mapping[Any, str] | None = None,
+) -> Description:
+    """Describe a system by its equations of motion M v' = f, as the section ``equations`` of a model file does.
+
+    Values are numbers, texts or SymPy expressions in symbols or functions of time.
+
+    Parameters
+    ----------
+    name : str
+        Identifier; the generated module bears it.
+    coordinates : sequence
+        Generalized coordinates q, in order.
+    mass_matrix : (n, n) array or SymPy matrix
+        M(q, t), symmetric.
+    forcing : sequence of n
+        f(q, v, t, inputs).
+    velocities : sequence of n, optional
+        Generalized velocities v; ``<coordinate>_dot`` unless given.
+    rates : mapping, optional
+        q' by coordinate, linear in v; the velocities in order unless given.
+    intermediates : mapping, optional
+        Named parts of the expressions; each may use those before it.
+    constraints : sequence, optional
+        Expressions that are 0: functions of coordinates and t, or linear in the velocities.
+    multipliers : sequence of str, optional
+        Names of the multipliers of the constraints, for outputs: M v' + C_q^T l = f.
+    kinetic_energy, potential_energy : optional
+        In J, for the balance of energy.
+    parameters : mapping, optional
+        Values by symbol or name.  Every other free symbol becomes a parameter without a value.
+    inputs : mapping, optional
+        Quantities given over time, by symbol or name: the value that holds while none is given.
+    latex : mapping, optional
+        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
+
+    Returns
+    -------
+    Description
+    """
+    names = names_of("equations.coordinates", coordinates, "a coordinate")
+    speeds = names_of("equations.velocities", velocities, "a velocity")
+    given: dict[str, Any] = {"coordinates": names}
+    if speeds:
+        given["velocities"] = speeds
+    for key, table in (("rates", rates), ("intermediates", intermediates)):
+        if values := named(key, table):
+            given[key] = values
+    rows = [items(row) for row in items(mass_matrix) or ()]
+    if rows and all(row is None for row in rows):  # one coordinate: SymPy's 1 x 1 matrix counts as a plain list
+        rows = [items(mass_matrix)]
+    given |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
+    if items(constraints):
+        given["constraints"] = items(constraints)
+    if forces := names_of("equations.multipliers", multipliers, "a multiplier"):
+        given["multipliers"] = forces
+    for key, energy in (("kinetic_energy", kinetic_energy), ("potential_energy", potential_energy)):
+        if energy is not None:
+            given[key] = energy
+    description = Description(values={"name": name, "equations": given})
+    values, driven = named("parameters", parameters), named("inputs", inputs)
+    known = {part + rate for part in (*names, *speeds) for rate in RATES}
+    known |= {*driven, *given.get("intermediates", ()), *given.get("multipliers", ())}
+    own = {name: value for name, value in values.items() if name not in known}
+    description.declare(own, driven, [name for name in _names_of_section(given) if name not in known])
+    give_latex(description, "equations", latex)
+    return description
+
+
+def _parts(value: Any) -> Iterator[Any]:
+    """Texts and SymPy expressions that a value holds."""
+    if isinstance(value, str) or is_sympy(value):
+        yield value
+    else:
+        for part in value.values() if isinstance(value, Mapping) else items(value) or ():
+            yield from _parts(part)
+
+
+def _names_of_section(given: Mapping[str, Any]) -> list[str]:
+    """Names in the expressions of a section; functions of time are coordinates or faults, never parameters."""
+    declared = ("coordinates", "velocities", "multipliers")
+    found: set[str] = set()
+    for part in _parts({key: value for key, value in given.items() if key not in declared}):
+        found |= {*names_in(part)} if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
+    return sorted(found - {"t"})
+
+
+# -- the sections of a model file --------------------------------------------------------------------------------------
+def _section(reader: Reader, path: str, given: Any, has_others: bool, fields: Fields) -> dict[str, Any] | None:
+    """A checked section, its coordinates by name; empty if it is no mapping, None if there is none."""
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, kinds.Table)
+        return {}
+    if has_others:
+        remedy = "describe only one: bodies, a Lagrangian, equations"
+        reader.faults.add(path, "the model has bodies, joints or another such section too", remedy, "EG-CONFLICT")
+    check_keys(path, given, fields, reader.faults)
+    values = dict(given)
+    values["coordinates"] = _names(reader, path, values, "coordinates", ())
+    if not values["coordinates"] and "coordinates" in given:
+        reader.faults.add(f"{path}.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
+    return values
+
+
+def _names(reader: Reader, path: str, values: Mapping[str, Any], key: str, default: Sequence[str]) -> list[str]:
+    given = values.get(key)
+    if given is None:
+        return list(default)
+    listed = items(given)
+    if listed is None:
+        reader.wrong(f"{path}.{key}", given, kinds.Names)
+        return list(default)
+    return [str(name_of(item)) for item in listed]
+
+
+def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
+    """Note an expression of velocities that is not linear in them."""
+    if symbols_of([expression]).isdisjoint(v):
+        return
+    slopes = jacobian([expression], [reader.graph.symbol(name) for name in v])
+    if not symbols_of(list(slopes.values())).isdisjoint(v):
+        remedy = "write it as a sum of terms a(q, t)*v and b(q, t), with each velocity v to the first power"
+        reader.faults.add(path, "is not linear in the velocities", remedy, "EG-EXPRESSION")
+
+
+# -- a Lagrangian ------------------------------------------------------------------------------------------------------
+def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str, Any] | None:
+    """Check the section and take its coordinates into the namespace; None if there is no section."""
+    values = _section(reader, "lagrangian", given, has_bodies, LAGRANGIAN)
+    if not values:
+        return values
+    for k, name in enumerate(values["coordinates"]):
+        reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
+    others = [f"{name}_dot" for name in values["coordinates"]]
+    count = len(items(values.get("constraints", ())) or ())
+    multipliers = [name for word in MULTIPLIERS for name in numbered(word, count)]
+    others += [name for name in multipliers if name not in reader.names.kinds]
+    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()), others)
+    return values
+
+
+def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangian | None:
+    """The Lagrangian of a checked section."""
+    if values is None:
+        return None
+    path = "lagrangian"
+    names = [str(q) for q in values.get("coordinates", ())]
+    zero = reader.graph.zero
+    expression = (
+        reader.expression(f"{path}.expression", values["expression"], MOTION) if "expression" in values else zero
+    )
+    dissipation = reader.expression(f"{path}.dissipation", values.get("dissipation", 0), MOTION)
+    constraints = items(values.get("constraints", ()))
+    if constraints is None:
+        reader.wrong(f"{path}.constraints", values["constraints"], kinds.Scalars)
+        constraints = []
+    forces = _forces(reader, f"{path}.forces", values.get("forces", ()), names)
+    rows = [reader.expression(f"{path}.constraints[{k}]", row, MOTION) for k, row in enumerate(constraints)]
+    for k, row in enumerate(rows):
+        _check_linear(reader, f"{path}.constraints[{k}]", row, [f"{name}_dot" for name in names])
+    return Lagrangian(tuple(names), expression, forces, dissipation, tuple(rows))
+
+
+def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Expr, ...]:
+    """One generalized force for each coordinate; those not given are 0."""
+    result = dict.fromkeys(names, reader.graph.zero)
+    if isinstance(given, Mapping):
+        for name, value in in_order(given, names):
+            if name not in result:
+                remedy = nearest(shown(name), names, "coordinates")
+                reader.faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            else:
+                result[name] = reader.expression(f"{path}.{name}", value, MOTION)
+        return tuple(result.values())
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, kinds.CoordinateForces)
+    elif listed and len(listed) != len(names):
+        reader.faults.add(
+            path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order", "EG-SHAPE"
+        )
+    elif listed:
+        return tuple(reader.expression(f"{path}[{k}]", value, MOTION) for k, value in enumerate(listed))
+    return tuple(result.values())
+
+
+def momenta_and_rates(bare: Lagrangian, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+    """p = dL/dv and p' = dL/dq + Q - dD/dv."""
+    slopes, drag = gradient(bare.expression, list(q)), gradient(bare.dissipation, list(v))
+    rates = [s + (f - d) for s, f, d in zip(slopes, bare.forces, drag, strict=True)]
+    return gradient(bare.expression, list(v)), rates
+
+
+def differentiate(graph: Graph, bare: Lagrangian, clock: Mapping[Expr, Expr]) -> GivenEquations:
+    """Lagrange's equations d/dt (dL/dv) - dL/dq = Q - dD/dv as M v' = f (Shabana, Computational Dynamics, sec. 4.4).
+
+    T holds the terms of L of second degree in the velocities, and V = -L(v = 0): T + V is then the energy
+    v . dL/dv - L, in which terms linear in the velocities cancel.
+
+    Parameters
+    ----------
+    clock : mapping of Expr to Expr
+        The rates of all that is prescribed.
+    """
+    L, velocities = bare.expression, tuple(f"{name}_dot" for name in bare.coordinates)
+    q, v = ([graph.symbol(name) for name in names] for names in (bare.coordinates, velocities))
+    momenta, rates = momenta_and_rates(bare, q, v)
+    drift = jvp(momenta, {**dict(zip(q, v, strict=True)), **clock})
+    entries, n = jacobian(momenta, v), range(len(v))
+    mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in n) for i in n)
+    kinetic = potential = graph.zero
+    if symbols_of([x for row in mass for x in row]).isdisjoint(velocities):  # else it is refused
+        at_rest, *first_degree = substitute([L, *momenta], dict.fromkeys(v, graph.zero))
+        kinetic, potential = L - at_rest, -at_rest
+        if not all(vanishes(first_degree)):
+            kinetic = graph.zero
+            for rate, inertial in zip(v, jvp(momenta, dict(zip(v, v, strict=True))), strict=True):  # M v
+                kinetic = kinetic + 0.5 * (rate * inertial)
+    forcing = tuple(-(d - r) for d, r in zip(drift, rates, strict=True))
+    return GivenEquations(
+        bare.coordinates, velocities, tuple(v), mass, forcing, bare.constraints, (), kinetic, potential
+    )
+
+
+def require_quadratic(reader: Reader, given: GivenEquations) -> None:
+    """Refuse a Lagrangian whose mass matrix d2L/(dq_dot dq_dot) depends on velocities: kernels take M(q, t)."""
+    used = symbols_of([x for row in given.mass_matrix for x in row])
+    found = [rate for rate in given.velocities if rate in used]
+    if found:
+        reader.faults.add(
+            "lagrangian.expression",
+            "is not quadratic in the velocities: the mass matrix (its second derivatives by them) depends on "
+            + ", ".join(found),
+            "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), with all products expanded; for "
+            "another kind of Lagrangian give the equations of motion: `equations:` of a model file, with mass_matrix "
+            "1 and the accelerations as forcing",
+            "EG-EXPRESSION",
+        )
+
+
+# -- equations ---------------------------------------------------------------------------------------------------------
+PATH = "equations"
+
+
+def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str, Any] | None:
+    """Check the section and take its names into the namespace; None if there is no section."""
+    faults, values = reader.faults, _section(reader, PATH, given, has_others, EQUATIONS)
+    if not values:
+        return values
+    q = values["coordinates"]
+    v = values["velocities"] = _names(reader, PATH, values, "velocities", [f"{name}_dot" for name in q])
+    values["multipliers"] = _names(reader, PATH, values, "multipliers", ())
+    if not v and q:
+        faults.add(f"{PATH}.velocities", "there are no velocities", "name at least one", "EG-MISSING")
+    for k, name in enumerate(q):  # the rate of one that no velocity is follows from the velocities
+        kind = "coordinate" if f"{name}_dot" in v else "parameter of rotation"
+        reader.names.declare(kind, name, f"{PATH}.coordinates[{k}]")
+    own = {f"{name}_dot" for name in q}
+    for k, name in enumerate(v):
+        if name not in own:
+            reader.names.declare("velocity", name, f"{PATH}.velocities[{k}]")
+    for k, name in enumerate(values["multipliers"]):
+        reader.names.declare("multiplier", name, f"{PATH}.multipliers[{k}]")
+    others = [name for name in (*v, *values["multipliers"]) if name not in q]
+    take_coordinates_latex(reader, f"{PATH}.latex", q, values.get("latex", ()), others)
+    return values
+
+
+def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquations | None:
+    """The equations of a checked section."""
+    if values is None:
+        return None
+    graph, faults = reader.graph, reader.faults
+    q, v, named = values.get("coordinates", []), values.get("velocities", []), values.get("multipliers", [])
+    local: dict[str, Expr] = {}
+    parts = values.get("intermediates", {})
+    if not isinstance(parts, Mapping):
+        reader.wrong(f"{PATH}.intermediates", parts, kinds.Rates)
+        parts = {}
+    for name, part in parts.items():
+        fault = fault_of_name(name, symbol=True)
+        if fault:
+            faults.add(f"{PATH}.intermediates.{name}", *fault, "EG-NAME-FORM")
+        elif name in reader.names.kinds:
+            message = f"the name is already used by the {reader.names.kinds[name]}"
+            faults.add(f"{PATH}.intermediates.{name}", message, "rename one", "EG-NAME-TAKEN")
+        local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
+    rates = _rates(reader, values.get("rates"), q, v, local)
+    derived = {f"{name}_dot": rate for name, rate in zip(q, rates, strict=True) if f"{name}_dot" not in v}
+    mapping = {graph.symbol(name): rate for name, rate in derived.items()}
+
+    def read(path: str, value: Any) -> Expr:
+        expression = reader.expression(path, value, MOTION, local)
+        return substitute([expression], mapping)[0] if not symbols_of([expression]).isdisjoint(derived) else expression
+
+    def listed(key: str, size: int | None) -> tuple[Expr, ...]:
+        path, given = f"{PATH}.{key}", values.get(key, ())
+        parts = items(given)
+        if parts is None:
+            reader.wrong(path, given, kinds.Scalars)
+            return ()
+        if size is not None and len(parts) != size and key in values:
+            faults.add(
+                path, f"{len(parts)} expressions for {size} velocities", "give one for each, in order", "EG-SHAPE"
+            )
+        return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(parts))
+
+    rows: list[tuple[Expr, ...]] = []
+    given = values.get("mass_matrix", ())
+    lines = items(given)
+    if lines is None or any(items(line) is None for line in lines):
+        reader.wrong(f"{PATH}.mass_matrix", given, kinds.Matrix)
+        lines = []
+    for i, line in enumerate(lines):
+        parts = items(line) or []
+        rows.append(tuple(read(f"{PATH}.mass_matrix[{i}][{j}]", part) for j, part in enumerate(parts)))
+    if "mass_matrix" in values and {len(rows), *map(len, rows)} != {len(v)}:
+        if not faults.under(f"{PATH}.mass_matrix"):
+            shape = f"{len(rows)} x {max(map(len, rows), default=0)}"
+            remedy = f"give {len(v)} rows of {len(v)}"
+            faults.add(f"{PATH}.mass_matrix", f"is {shape} for {len(v)} velocities", remedy, "EG-SHAPE")
+    elif not faults.under(f"{PATH}.mass_matrix"):
+        _check_mass_matrix(reader, rows, v)
+    constraints = listed("constraints", None)
+    for k, constraint in enumerate(constraints):
+        _check_linear(reader, f"{PATH}.constraints[{k}]", constraint, v)
+        if constraint.is_zero:
+            faults.add(
+                f"{PATH}.constraints[{k}]",
+                "is 0 for every motion, so it constrains nothing",
+                "leave it out",
+                "EG-REDUNDANT",
+            )
+    if named and len(named) != len(constraints):
+        message = f"{len(named)} names for {len(constraints)} constraints"
+        faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order", "EG-SHAPE")
+    kinetic, potential = (read(f"{PATH}.{key}", values.get(key, 0)) for key in ("kinetic_energy", "potential_energy"))
+    forcing = listed("forcing", len(v))
+    return GivenEquations(
+        tuple(q), tuple(v), rates, tuple(rows), forcing, constraints, tuple(named), kinetic, potential
+    )
+
+
+def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faults: Faults) -> None:
+    """Note outputs of an energy that given equations do not know."""
+    if given is None or not given.kinetic_energy.is_zero:
+        return
+    for output in outputs:
+        for name in sorted(symbols_of([output.expression]) & {f"{energy}()" for energy in ENERGIES}):
+            message = f"{name.removesuffix('()')} is not known, because the equations are given without kinetic_energy"
+            faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy", "EG-MISSING")
+
+
+def _rates(
+    reader: Reader, given: Any, q: Sequence[str], v: Sequence[str], local: Mapping[str, Expr]
+) -> tuple[Expr, ...]:
+    """q' in terms of the velocities."""
+    path, faults = f"{PATH}.rates", reader.faults
+    if given is None:
+        if len(q) != len(v):
+            faults.add(
+                path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate", "EG-SHAPE"
+            )
+        symbols = [reader.graph.symbol(name) for name in v[: len(q)]]
+        return (*symbols, *(reader.stand_in,) * (len(q) - len(symbols)))
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, kinds.Rates)
+        return (reader.stand_in,) * len(q)
+    named = {name_of(key): value for key, value in given.items()}
+    for name in named:
+        if name not in q:
+            remedy = nearest(shown(name), q, "coordinates")
+            faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+    result = []
+    own = {f"{name}_dot" for name in q} - set(v)
+    for name in q:
+        value: Any = named.get(name, f"{name}_dot" if f"{name}_dot" in v else None)
+        if value is None:
+            faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}", "EG-MISSING")
+        rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION, local)
+        if not symbols_of([rate]).isdisjoint(own):
+            faults.add(
+                f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}", "EG-EXPRESSION"
+            )
+        _check_linear(reader, f"{path}.{name}", rate, v)
+        result.append(rate)
+    return tuple(result)
+
+
+def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequence[str]) -> None:
+    """Note a mass matrix that depends on velocities or is not symmetric."""
+    flat = [entry for row in rows for entry in row]
+    used = symbols_of(flat)
+    moving = sorted(used & set(v))
+    if moving:
+        reader.faults.add(
+            f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters", "EG-EXPRESSION"
+        )
+        return
+    n = len(rows)
+    values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
+    numbers = [float(x) for x in evaluate(flat, values)]
+    size = max((abs(x) for x in numbers if math.isfinite(x)), default=0.0)
+    for i in range(n):
+        for j in range(i):
+            gap = abs(numbers[i * n + j] - numbers[j * n + i])
+            if gap > TENSOR * size:  # false where an entry is not finite there
+                message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
+                remedy = "give the symmetric M of M v' = f, where f contains all forces"
+                reader.faults.add(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
+                return
