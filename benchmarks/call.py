@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import eomgen as eg
-from eomgen.runtime.late import eager
+from eomgen.runtime.kernels import eager
 from eomgen.toolchain.compiler import find_compiler
 
 from .measure import interleaved, seconds_per_call

@@ -13,8 +13,7 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from .errors import UnavailableError, ill_typed
-from .runtime.argument_checks import find_lacking
-from .runtime.argument_names import both_names, plain_names
+from .runtime.argument_checks import both_names, find_lacking, plain_names
 from .runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
@@ -169,6 +168,9 @@ class Module(BoundModel):
         ``wrt="u"``, (n_x, n_u), by the parameters with ``wrt="p"``, (n_x, n_p).  Exact, in all directions, at states on
         the constraints (of ``x0``, ``project`` or a trajectory); elsewhere it is the one at the projected state, off by
         the order of the distance, as derivatives by parameters and inputs are.
+    input_jacobian, parameter_jacobian : callable
+        The same as ``wrt="u"`` and ``wrt="p"``.  The projection is part of the rhs: where parameters move the
+        constraints, the state is taken along to the nearest one on them.
     bias : callable
         ``bias(t, x)`` -> h (n_v,) in ``M v' + h`` = generalized forces that are not in the model.
     outputs : callable
@@ -187,6 +189,10 @@ class Module(BoundModel):
         ``project(x, t=0.0)`` -> the nearest x on the constraints.
     poses : callable
         ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
+    center_of_mass, com_jacobian, momentum, centroidal_inertia : callable
+        Sums over all bodies, in ground axes: ``center_of_mass(q)`` -> (3,) (m); ``com_jacobian(q)`` -> (3, n_v), which
+        times v is its velocity; ``momentum(x)`` -> (6,), linear (kg m/s), then angular about the centre of mass
+        (kg m^2/s); ``centroidal_inertia(q)`` -> (3, 3) about it (kg m^2).
     equations : Equations or None
         What the module was compiled from; None of a generated package.
     minimal : Minimal

@@ -102,7 +102,7 @@ def compile_core(
 ) -> Core:
     """Stages 4 and 5, Derivation -> Core; see :meth:`eomgen.api.equations.Equations.compile`."""
     from .base.kernel_table import KERNELS
-    from .runtime.late import LateCore
+    from .runtime.kernels import LateCore
 
     row = find_target(target)
     if not row.load:

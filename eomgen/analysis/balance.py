@@ -81,7 +81,7 @@ def find_tangent(
     scales, n_q, n_h = layout.scales, layout.n_q, layout.n_h
     preferred = layout.independent if independent is None else choose_velocities(layout, independent)
     strict = independent is not None
-    C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")
+    C_q = module.kernels.constraint_jacobian(x[:n_q], t=t)
     J = scales.jacobian(C_q)
     B, velocities = _basis(J, layout.rank, preferred, strict, scales)
     if n_h == layout.n_c:
@@ -151,7 +151,7 @@ def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array
     if not layout.n_c:
         return np.eye(layout.n_x)
     q = x[:n_q]
-    dz = tangent_projector(module.kernels.constraint_jacobian(q, t=t, rows="all")[: layout.n_h], scales)
+    dz = tangent_projector(module.kernels.constraint_jacobian(q, t=t)[: layout.n_h], scales)
     unit = np.eye(n_q)
     if space is None:
         dq = dz
@@ -217,7 +217,7 @@ def balance_forces(
     layout = module.layout
     scales, n_q, n_h, order = layout.scales, layout.n_q, layout.n_h, layout.independent
     rest = np.concatenate([q, np.zeros(layout.n_v - len(s)), s])
-    J = scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
+    J = scales.jacobian(module.kernels.constraint_jacobian(q, t=t))
     split = partition(J, layout.rank, order if preferred is None else preferred)
     rate = scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
     x = np.concatenate([q, scales.q * split.particular(-rate)])
@@ -292,8 +292,8 @@ def slopes(
     by_unknown = np.hstack([P, U])[n_q:]
     motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
     if len(parameters) and n_h:
-        moved = module.kernels.assembly_jacobian(t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
-        C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
+        moved = module.kernels.assembly_jacobian(x, t=t)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
+        C_q = module.kernels.constraint_jacobian(x[:n_q], t=t)[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
         step = -algebra.lstsq(stacked, wanted, rcond=STATE)

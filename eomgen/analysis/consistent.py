@@ -207,7 +207,7 @@ def _velocities(
     layout, scales = module.layout, module.layout.scales
     free = np.array([name not in held for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
-    J = module.kernels.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
+    J = module.kernels.constraint_jacobian(q, t=t)[:, free] / scales.c[:, None]
     J = algebra.solve(L, J.T).T
     sizes = np.linalg.norm(J, axis=1)
     sizes = np.where(sizes > RANK * sizes.max(initial=0.0), sizes, np.inf)

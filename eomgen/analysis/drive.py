@@ -316,7 +316,7 @@ def _effects(states: ProjectedStates, names: Sequence[str]) -> tuple[Array, Arra
             S[layout.velocity_labels.index(name), i] = 1.0
         elif name in layout.loops:
             if loops is None:
-                loops = states.evaluate(module.kernels.state("loop_coordinate_jacobian"), states.q)
+                loops = states.evaluate(module.kernels.loop_coordinate_jacobian, states.q)
             S[:, i] = loops[layout.loops.index(name)]
         else:
             j = layout.u.index(name)

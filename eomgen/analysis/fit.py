@@ -16,10 +16,9 @@ from ..base.results import Result, ResultTable, same_keys
 from ..errors import ParameterError, SimulationError, at_odds, ill_shaped, ill_typed, incomplete, no_choice, off_range
 from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
 from ..runtime.inputs import Forcing, Table
-from ..runtime.layout import bounds_of
+from ..runtime.layout import bounds_of, silent, start_slopes, warn_of_fixed
 from ..runtime.refusals import require_support
 from ..runtime.runs.simulate import simulate
-from ..runtime.start_values import silent, start_slopes, warn_of_fixed
 from ..runtime.tapes import Expression
 from .experiments import Experiment, read_experiments, read_sigma
 
@@ -130,12 +129,12 @@ def _start(module: BoundModel, names: Sequence[str], given: Mapping[str, float])
 def _slopes(module: BoundModel, names: Sequence[str], t: Array, x: Array, u: Array) -> tuple[Array, Array]:
     """J (k, n_x, n_x) and df/d(names) (k, n_x, names) at nodes."""
     kernels = module.kernels
-    J = np.moveaxis(np.asarray(kernels.timed("jacobian")(t, x, u=u)), -1, 0)
+    J = np.moveaxis(np.asarray(kernels.jacobian(t, x, u=u)), -1, 0)
     by = np.zeros((len(t), module.n_x, len(names)))
     for kernel, known in (("parameter_jacobian", module.p_names), ("input_jacobian", module.u_names)):
         there = [(column, known.index(name)) for column, name in enumerate(names) if name in known]
         if there:
-            values = np.moveaxis(np.asarray(kernels.timed(kernel)(t, x, u=u)), -1, 0)
+            values = np.moveaxis(np.asarray(kernels.kernel(kernel)(t, x, u=u)), -1, 0)
             for column, index in there:
                 by[:, :, column] = values[:, :, index]
     return J, by
@@ -171,7 +170,7 @@ def _outputs(module: BoundModel, names: Sequence[str], forcing: Forcing, t: Arra
     of = [layout.n_u + module.p_names.index(name) if name in module.p_names else
           module.u_names.index(name) if name in module.u_names else -1 for name in names]  # fmt: skip
     for j, time in enumerate(t):
-        Y = module.bind(u=u[:, j]).kernels.output_derivatives(float(time), x[:, j], rates[n_q:, j])
+        Y = module.bind(u=u[:, j]).kernels.output_derivatives(x[:n_q, j], x[n_q:, j], rates[n_q:, j], t=float(time))
         here = S[j]
         result[j] = Y[:, :n_x] @ here + Y[:, n_x : n_x + n_v] @ (J[j] @ here + by[j])[n_q:]
         for column, place in enumerate(of):

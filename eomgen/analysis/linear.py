@@ -58,7 +58,7 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     for name in names:
         if name not in layout.x:
             raise unknown("coordinate or velocity", name, layout.x)
-    rows = module.kernels.assembly_jacobian(t, x)
+    rows = module.kernels.assembly_jacobian(x, t=t)
     slopes, at_rest, C_q = rows[:n_h, :n_q], rows[n_h : n_h + n_c, :n_q], rows[n_h : n_h + n_c, n_q : layout.n_x]
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
@@ -235,6 +235,6 @@ def _outputs(
     n_q, n_v, n_x = layout.n_q, layout.n_v, layout.n_x
     if not layout.n_y:
         return np.zeros((0, directions.shape[1])), np.zeros((0, layout.n_u))
-    Y = module.kernels.output_derivatives(t, x, rates[n_q:])
+    Y = module.kernels.output_derivatives(x[:n_q], x[n_q:], rates[n_q:], t=t)
     by_a = Y[:, n_x : n_x + n_v]
     return Y[:, :n_x] @ directions + by_a @ moved[n_q:], Y[:, n_x + n_v : n_x + n_v + layout.n_u] + by_a @ U[n_q:]

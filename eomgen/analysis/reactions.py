@@ -62,7 +62,7 @@ def place(states: ProjectedStates) -> Geometry:
     """Evaluate the geometry."""
     module, table = states.module, joint_table(states.module)
     k, n_c, n_b = len(states.t), module.n_rows, module.n_bodies
-    flat = states.evaluate(module.kernels.state("wrench_geometry"), states.q)
+    flat = states.evaluate(module.kernels.wrench_geometry, states.q)
     sizes = (
         6 * n_c * n_b,
         3 * len(table["ends"]),
@@ -326,7 +326,7 @@ def _reactions(
 ) -> tuple[Array, Array]:
     module = states.module
     table, geometry = joint_table(module), place(states)
-    flat = states.evaluate(module.kernels.motion("needed_wrenches"), states.q, states.v, a)
+    flat = states.evaluate(module.kernels.needed_wrenches, states.q, states.v, a)
     every = flat.reshape(-1, 6, len(states.t))
     needed = every[: module.n_bodies] + np.einsum("ck,cbik->bik", multipliers, geometry.rows)
     loads = dict(zip(table["cut"], every[module.n_bodies :], strict=True))

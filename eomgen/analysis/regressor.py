@@ -66,7 +66,7 @@ def _on_constraints(module: BoundModel, random: np.random.Generator, rate: float
 def _rate(module: BoundModel) -> float:
     """sqrt(g / L), at which gravity and inertia are alike; 1 where there is no gravity."""
     still = np.zeros(module.n_v)
-    terms = module.kernels.motion("inertial_terms")(module.layout.q_reference, still, still)
+    terms = module.kernels.inertial_terms(module.layout.q_reference, still, still)
     fall = float(np.linalg.norm(terms[:, 9:12], axis=1).max())
     return float(np.sqrt(fall / module.layout.length)) if fall > 0.0 else 1.0
 
@@ -119,7 +119,7 @@ def standard_parameters(module: BoundModel, /, p: Any = None) -> dict[str, float
     """
     names = standard_names(module)
     state, still = module.layout.q_reference, np.zeros(module.layout.n_v)  # of states too
-    terms = module.kernels.motion("inertial_terms")(state, still, still, p=_values(module, p))
+    terms = module.kernels.inertial_terms(state, still, still, p=_values(module, p))
     return dict(zip(names, map(float, terms[:, MOTION:].ravel()), strict=True))
 
 
@@ -223,7 +223,7 @@ def _motion(
 
 def _columns(module: BoundModel, q: Array, v: Array, a: Array, p: Any, t: float) -> Array:
     """Y of k states, (n_v, 10 n_bodies, k)."""
-    kernel = module.kernels.motion("inertial_terms")
+    kernel = module.kernels.inertial_terms
     n_v, count = v.shape
     omega, _, alpha, lifted = np.moveaxis(_parts(kernel(q, v, a, p=p, t=t)), 1, 0)
     twists = kernel(  # linear in v: those of unit velocities are the columns of the bodies' Jacobians

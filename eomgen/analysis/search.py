@@ -227,7 +227,7 @@ class Search:
         held = self.held_rows(module, x[: layout.n_q])
         rows = np.zeros((len(held), layout.n_p))
         if layout.n_loop_coordinates and self.parameters:
-            every = module.kernels.assembly_jacobian(self.t, x)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
+            every = module.kernels.assembly_jacobian(x, t=self.t)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
             for k, row in enumerate(held):
                 if row.name in layout.loops:
                     rows[k] = every[layout.loops.index(row.name)] / row.scale

@@ -55,6 +55,11 @@ class Kernel(NamedTuple):
         """Whether a model has it only if no size of its result is 0."""
         return self.absent or bool(self.late)
 
+    @property
+    def kind(self) -> str:
+        """Of its arguments: 'timed' (t and states), 'motion' (q, v and a) or 'state'."""
+        return "timed" if self.name in TIMED else "motion" if self.inputs == ("q", "v", "a") else "state"
+
     def length(self, sizes: Sizes) -> int:
         """How many numbers ``x`` has."""
         each = {"q": sizes.n_q, "q_guess": sizes.n_q, "q_rate": sizes.n_q, "v": sizes.n_v, "a": sizes.n_v, "cj": 1}
@@ -168,6 +173,11 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )  # fmt: skip
 
+#: Those that take the time first.
+TIMED = frozenset((
+    *("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian", "dae_residual", "dae_jacobian"),
+    *("events", "resets", "held_errors", "event_slopes", "event_derivatives", "strike_derivatives"),
+))  # fmt: skip
 #: The same by name.
 NAMED = {kernel.name: kernel for kernel in KERNELS}
 

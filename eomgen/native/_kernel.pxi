@@ -2,6 +2,9 @@
 
 ctypedef object (*vectorcall)(object, PyObject *const *, size_t, PyObject *)
 
+cdef enum:
+    MOST = 7  # arguments of a kernel
+
 
 cdef class Kernel:
     """A kernel of the model, bound to a context; call it with arrays.
@@ -16,16 +19,26 @@ cdef class Kernel:
         Shape of the result for one state.
     fail : callable
         Called as ``fail(name, status, t, x)`` when the kernel fails, then p and u if any was given; it must raise.
+    order : tuple of str
+        Names of its arguments: the time t, states, p, u and out, and last a choice if it has one.
+    required : int
+        How many of these must be given.
     nan : bool
         At a recoverable failure (status > 0) remember it instead, and put NaN where an entry is no finite number, or
         everywhere if it is another failure.
     error : type
         Exception raised for arguments that do not fit.
+    pick : array of int, optional
+        Places of the result among the numbers of the kernel; all of them by default.
+    choose : callable, optional
+        Of the value of the choice -> the kernel with the arguments before it that is called instead; None: this one.
+    load : callable, optional
+        Of a kernel that is made when it is first called: gives the context of the model that has it, or the error.
+    find : callable, optional
+        ``find(*states, p=, u=, t=, out=)`` is called in place of a function of the model.
 
     Attributes
     ----------
-    others : callable or None
-        Of a jacobian: ``others(name)`` gives the kernel that differentiates by something else.
     failure : tuple or None
         With ``nan``: (status, t, x) of the last failure. Assign None to forget it.
     """
@@ -36,34 +49,77 @@ cdef class Kernel:
     cdef const double *c
     cdef const double *u
     cdef int index, n_in, n_out, ndim
+    cdef int n_states, n_order, required, at_t, at_p, at_u, at_out, at_choice  # arguments by their places; -1: none
+    cdef int[3] at_states
     cdef bint long, tolerant
     cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
-    cdef object fail, error
+    cdef object fail, error, choose, load, find
     cdef readonly object name, shape, nan
+    cdef readonly tuple order
     cdef readonly Context context
     cdef Model model
     cdef str label  # what users call its state
+    cdef cnp.ndarray pick
     cdef object last_failure
-    cdef public object others
 
-    def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
-        set_quick_call(self)
-        self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
-        self.model, self.table = context.model, context.model.table
-        cdef const eomgen_kernel *kernel = self.model.kernel(name, error)
-        self.index, self.call, self.n_in, self.n_out = kernel - self.table.kernels, kernel.call, kernel.n_in, kernel.n_out
-        self.label = "q" if self.n_in == self.model.n_q else "x"
-        self.c = <const double *>cnp.PyArray_DATA(context.c)
-        self.u = <const double *>cnp.PyArray_DATA(context.u)
-        self.tolerant = nan
-        self.shape = tuple(shape)
-        self.ndim = len(self.shape)
-        if self.ndim > MAX_DIMENSIONS or np.prod(self.shape, dtype=int) != self.n_out:
-            raise error(f"shape {self.shape} does not hold the {self.n_out} numbers of kernel {name!r}")
+    def __cinit__(self, str name not None, Context context not None, shape, fail, tuple order not None, int required,
+                  nan=False, error=ValueError, pick=None, choose=None, load=None, find=None):
+        cdef int i
+        self.quick = call_kernel
+        self.name, self.fail, self.nan, self.error = name, fail, bool(nan), error
+        self.order, self.required, self.tolerant, self.shape = order, required, nan, tuple(shape)
+        self.choose, self.load, self.find, self.pick = choose, load, find, pick
+        self.ndim, self.n_order = len(self.shape), len(order)
+        if self.ndim > MAX_DIMENSIONS or self.n_order > MOST:
+            raise error(f"kernel {name!r} has too many dimensions or arguments")
+        self.at_choice = -1
+        for i in range(self.n_order):
+            if order[i] == "t":
+                self.at_t = i
+            elif order[i] == "p":
+                self.at_p = i
+            elif order[i] == "u":
+                self.at_u = i
+            elif order[i] == "out":
+                self.at_out = i
+            elif choose is not None and i == self.n_order - 1:
+                self.at_choice = i
+            else:
+                self.at_states[self.n_states] = i
+                self.n_states += 1
         for i in range(self.ndim):
             self.dims[i] = self.shape[i]
-        counts = self.model.facts.get("operations", {}).get(name, {}).values()
+        self.label = order[self.at_states[0]]
+        self.context, self.model = context, context.model
+        if load is None and find is None:
+            self.take(context)
+
+    cdef int take(self, Context context) except -1:
+        """The function of a model."""
+        cdef cnp.npy_intp length = 1
+        cdef int i
+        self.context, self.model, self.table = context, context.model, context.model.table
+        cdef const eomgen_kernel *kernel = self.model.kernel(self.name, self.error)
+        self.index, self.n_in, self.n_out = kernel - self.table.kernels, kernel.n_in, kernel.n_out
+        if self.n_states == 1:
+            self.label = "q" if self.n_in == self.model.n_q else "x"
+        self.c = <const double *>cnp.PyArray_DATA(context.c)
+        self.u = <const double *>cnp.PyArray_DATA(context.u)
+        for i in range(self.ndim):
+            length *= self.dims[i]
+        if length != (self.n_out if self.pick is None else self.pick.size):
+            raise self.error(f"shape {self.shape} does not hold the {self.n_out} numbers of kernel {self.name!r}")
+        counts = self.model.facts.get("operations", {}).get(self.name, {}).values()
         self.long = sum([count for count in counts if isinstance(count, (int, float))]) > LONG
+        self.call = kernel.call
+        return 0
+
+    cdef int make(self) except -1:
+        """What is left until the first call."""
+        found = self.load()
+        if isinstance(found, BaseException):
+            raise found
+        return self.take(found)
 
     @property
     def failure(self):
@@ -76,7 +132,44 @@ cdef class Kernel:
             self.last_failure = value
 
     def __repr__(self):
-        return f"<{type(self).__name__} kernel {self.name} of {self.table.name.decode()}: ({self.n_in},) -> {self.shape}>"
+        return f"<kernel {self.name} of {self.model.table.name.decode()}: ({', '.join(self.order)}) -> {self.shape}>"
+
+    def __call__(self, *args, **given):
+        """Evaluate at states, (n,) or (n, k) for k states as columns, and times t, a float or (k,).
+
+        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's, a mapping those that it names; they are called
+        parameters and inputs as well. out is a float64 array of the result's shape, ``shape`` or ``(*shape, k)``.
+        """
+        return self.plainly(args, given)
+
+    cdef object plainly(self, tuple args, dict given):
+        """A call with arguments under any of their names; says what is wrong with them."""
+        cdef PyObject *sorted[MOST]
+        cdef dict named = dict(zip(self.order, args))
+        cdef int i
+        what = f"{self.name}({', '.join([self.label if name == 'x' else name for name in self.order[:self.required]])})"
+        if len(args) > self.n_order:
+            raise TypeError(f"{what} takes at most {self.n_order} positional arguments ({len(args)} given)")
+        for name, value in given.items():
+            if name in named:
+                raise TypeError(f"{what} got multiple values for keyword argument '{name}'")
+            if name in self.order:
+                named[name] = value
+            elif name not in ("parameters", "inputs"):
+                raise TypeError(f"{what} got an unexpected keyword argument '{name}'")
+        for name, other in (("p", "parameters"), ("u", "inputs")):
+            if given.get(other) is not None:
+                if named.get(name) is not None:
+                    text = f"{name} and {other} are the same argument; give one of them"
+                    raise fault(self.error, "EG-CONFLICT", text)
+                named[name] = given[other]
+        for i in range(self.n_order):
+            name = self.order[i]
+            sorted[i] = <PyObject *>named[name] if name in named else NULL
+            if i < self.required and sorted[i] == NULL:
+                raise TypeError(f"{what} takes at least {self.required} positional argument{'s' * (self.required > 1)} "
+                                f"({len(args)} given)")
+        return call_sorted(self, sorted)
 
     cdef inline bint is_target(self, object out, const double *x) noexcept:
         """Whether the kernel can write into out: float64, right shape, contiguous, apart from x."""
@@ -98,7 +191,7 @@ cdef class Kernel:
         cdef double now
         cdef cnp.npy_intp n_work = self.table.n_work
         cdef int status, i
-        if not (is_vector(x, self.n_in) and (u is None or is_vector(u, self.table.n_u))
+        if not (self.pick is None and is_vector(x, self.n_in) and (u is None or is_vector(u, self.table.n_u))
                 and (p is None or is_vector(p, self.table.n_p))):
             return self.general(t, [(self.label, self.n_in, x)], p, u, out)
         now = moment(t, "t", self.error, self.name)
@@ -177,7 +270,8 @@ cdef class Kernel:
         if p is not None:
             constants = self.model.constants(vector(p, self.table.n_p, "p", self.error), self.error)
             batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
-        cdef cnp.ndarray result = self.target(out, held, columns)
+        cdef cnp.ndarray picked = self.target(out, held, columns)
+        cdef cnp.ndarray result = picked if self.pick is None else rows(self.n_out, 1 if columns < 0 else columns)
         cdef cnp.npy_intp length_of_all = self.table.n_work + self.n_in + self.n_out + self.table.n_u
         cdef cnp.npy_intp plain = length_of_all
         cdef const eomgen_lanes *lanes
@@ -207,9 +301,11 @@ cdef class Kernel:
             now = load(&batch, failed)
             given = () if p is None and u is None else (p, copy(batch.u, self.table.n_u))
             self.report(status, now, copy(batch.x, self.n_in), given)
-        if out is not None and out is not result:
-            out[...] = result
-        return result if out is None else out
+        if self.pick is not None:
+            (<object>picked)[...] = (<object>result)[self.pick].reshape((<object>picked).shape)
+        if out is not None and out is not picked:
+            out[...] = picked
+        return picked if out is None else out
 
     cdef cnp.npy_intp call_columns(self, const Batch *batch, cnp.ndarray result, int *status) except -2:
         """Evaluate all columns at once by the model's Python function; those that are not finite again, one by one."""
@@ -313,90 +409,27 @@ cdef extern from *:
     PyObject *item_of "EOMGEN_ITEM"(PyObject *, Py_ssize_t)
     Py_ssize_t count_of "EOMGEN_COUNT_OF"(size_t)  # what PyVectorcall_NARGS does
 
-cdef extern from "Python.h":
-    ctypedef struct PyTypeObject
-    void *PyType_GetSlot(PyTypeObject *, int)
-    const int Py_tp_call
-    PyTypeObject *Py_TYPE(object)
 
-ctypedef object (*ternary)(object, object, object)
-
-
-cdef object one_of(object error, str name, object given, str other, object same):
-    """An argument that has two names."""
-    if same is None:
-        return given
-    if given is not None:
-        raise fault(error, "EG-CONFLICT", f"{name} and {other} are the same argument; give one of them")
-    return same
-
-
-cdef class Timed(Kernel):
-    """A kernel of time and state: ``f(t, x, p=None, u=None, out=None)``."""
-
-    def __call__(self, t, x, p=None, u=None, out=None, wrt=None, parameters=None, inputs=None):
-        """Evaluate at time t, a float or (k,), and state x, (n,) or (n, k) for k states as columns.
-
-        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's, a mapping those that it names; they are called
-        parameters and inputs as well. out is a float64 array of the result's shape, ``shape`` or ``(*shape, k)``.
-        ``wrt`` is for a jacobian: 'x', 'u' or 'p', by which it is.
-        """
-        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
-        if wrt is not None:
-            if self.others is None:
-                raise TypeError(f"{self.name} has no argument wrt")
-            if wrt not in ("x", "u", "p"):
-                raise self.error(f"wrt must be 'x' (the state), 'u' (the inputs) or 'p' (the parameters), not {wrt!r}")
-            if wrt != "x":
-                return self.others(f"{'input' if wrt == 'u' else 'parameter'}_jacobian")(t, x, p, u, out)
-        return self.evaluate(t, x, p, u, out)
-
-
-cdef class State(Kernel):
-    """A kernel of the state alone: ``f(x, p=None, u=None, out=None, t=0.0)``."""
-
-    def __call__(self, x, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
-        """Evaluate at state x; arguments as for Timed."""
-        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
-        return self.evaluate(t, x, p, u, out)
-
-
-cdef class Motion(Kernel):
-    """A kernel of coordinates, velocities, accelerations: ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
-
-    def __call__(self, q=None, v=None, a=None, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
-        """Evaluate at q (n_q,), v and a (n_v,), or with a last axis k; other arguments as for Timed."""
-        if q is None or v is None or a is None:
-            raise TypeError(f"{self.name}(q, v, a) takes at least 3 positional arguments")
-        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
-        cdef int n_v = self.model.n_v
-        return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
-
-
-cdef enum:
-    MOST = 5  # arguments of a quick call
-
-cdef tuple OF_TIMED = tuple(map(intern, ("t", "x", "p", "u", "out")))
-cdef tuple OF_STATE = tuple(map(intern, ("x", "p", "u", "out", "t")))
-
-
-cdef inline bint sort_arguments(tuple order, PyObject *const *given, Py_ssize_t n, PyObject *names,
+cdef inline bint sort_arguments(Kernel kernel, PyObject *const *given, Py_ssize_t n, PyObject *names,
                                 PyObject **sorted) noexcept:
     """Put arguments in order, NULL where there is none; whether that was easy."""
     cdef Py_ssize_t i, k
     cdef PyObject *name
-    if n > MOST:
+    if n > kernel.n_order:
         return False
-    for i in range(MOST):
+    for i in range(kernel.n_order):
         sorted[i] = given[i] if i < n else NULL
     if names != NULL:
         for i in range(length_of(names)):
             name, k = item_of(names, i), 0
-            while k < MOST and item_of(<PyObject *>order, k) != name:  # names in a program are interned
+            while k < kernel.n_order and item_of(<PyObject *>kernel.order, k) != name:  # names are interned
                 k += 1
-            if k == MOST or sorted[k] != NULL:
+            if k == kernel.n_order or sorted[k] != NULL:
                 return False
             sorted[k] = given[n + i]
+    for i in range(n, kernel.required):
+        if sorted[i] == NULL:
+            return False
     return True
 
 
@@ -404,46 +437,40 @@ cdef inline object given_or_none(PyObject *value):
     return None if value == NULL else <object>value
 
 
-cdef object call_timed(object kernel, PyObject *const *given, size_t flagged, PyObject *names):
-    cdef PyObject *a[MOST]
-    if sort_arguments(OF_TIMED, given, count_of(flagged), names, a) and a[0] != NULL and a[1] != NULL:
-        return (<Timed>kernel).evaluate(
-            <object>a[0], <object>a[1], given_or_none(a[2]), given_or_none(a[3]), given_or_none(a[4]))
-    return call_plainly(kernel, given, count_of(flagged), names)
+cdef object call_sorted(Kernel kernel, PyObject **a):
+    """A call with arguments in order, NULL where there is none."""
+    cdef int i, n_v
+    t = 0.0 if a[kernel.at_t] == NULL else <object>a[kernel.at_t]
+    p, u, out = given_or_none(a[kernel.at_p]), given_or_none(a[kernel.at_u]), given_or_none(a[kernel.at_out])
+    if kernel.at_choice >= 0 and a[kernel.at_choice] != NULL:
+        chosen = kernel.choose(<object>a[kernel.at_choice])
+        if chosen is not None:  # the arguments before the choice are its own
+            return call_sorted(<Kernel?>chosen, a)
+    if kernel.call == NULL:
+        if kernel.find is not None:
+            states = [<object>a[kernel.at_states[i]] for i in range(kernel.n_states)]
+            return kernel.find(*states, t=t, p=p, u=u, out=out)
+        kernel.make()
+    if kernel.n_states == 1:
+        return kernel.evaluate(t, <object>a[kernel.at_states[0]], p, u, out)
+    n_v = kernel.model.n_v
+    lengths = (kernel.n_in - 2 * n_v, n_v, n_v)
+    values = [(kernel.order[kernel.at_states[i]], lengths[i], <object>a[kernel.at_states[i]]) for i in range(3)]
+    return kernel.general(t, values, p, u, out)
 
 
-cdef object call_state(object kernel, PyObject *const *given, size_t flagged, PyObject *names):
-    cdef PyObject *a[MOST]
-    if sort_arguments(OF_STATE, given, count_of(flagged), names, a) and a[0] != NULL:
-        return (<State>kernel).evaluate(
-            0.0 if a[4] == NULL else <object>a[4], <object>a[0], given_or_none(a[1]), given_or_none(a[2]),
-            given_or_none(a[3]))
-    return call_plainly(kernel, given, count_of(flagged), names)
-
-
-cdef object call_plainly(object kernel, PyObject *const *given, Py_ssize_t n, PyObject *names):
-    """By ``__call__``, which says what is wrong with the arguments."""
-    cdef Py_ssize_t i
+cdef object call_kernel(object any, PyObject *const *given, size_t flagged, PyObject *names):
+    cdef Kernel kernel = <Kernel>any
+    cdef PyObject *sorted[MOST]
+    cdef Py_ssize_t i, n = count_of(flagged)
+    if names == NULL and n == kernel.required and kernel.n_states == 1 and kernel.call != NULL:
+        return kernel.evaluate(0.0 if kernel.at_t >= n else <object>given[kernel.at_t],
+                               <object>given[kernel.at_states[0]], None, None, None)
+    if sort_arguments(kernel, given, n, names, sorted):
+        return call_sorted(kernel, sorted)
     cdef tuple words = () if names == NULL else <tuple>names
-    try:
-        return (<ternary>PyType_GetSlot(Py_TYPE(kernel), Py_tp_call))(
-            kernel, tuple([<object>given[i] for i in range(n)]),
-            {words[i]: <object>given[n + i] for i in range(len(words))})
-    except TypeError as error:
-        _, own, fault = str(error).partition("__call__()")
-        if not own:
-            raise
-        words = ("t", "x") if isinstance(kernel, Timed) else ((<Kernel>kernel).label,)
-        raise TypeError(f"{kernel.name}({', '.join(words)}){fault}") from None
-
-
-cdef int set_quick_call(Kernel kernel) except -1:
-    """What CPython calls in place of ``__call__``."""
-    kernel.quick = NULL
-    if isinstance(kernel, Timed):
-        kernel.quick = call_timed
-    elif isinstance(kernel, State):
-        kernel.quick = call_state
+    return kernel.plainly(tuple([<object>given[i] for i in range(n)]),
+                          {words[i]: <object>given[n + i] for i in range(len(words))})
 
 
 cdef Py_ssize_t offset_of_quick(object any):
@@ -451,5 +478,4 @@ cdef Py_ssize_t offset_of_quick(object any):
     return <char *>&(<Kernel>any).quick - <char *><PyObject *>any
 
 
-timed = quick_type(Timed, b"_native.Timed", offset_of_quick(Timed))
-state = quick_type(State, b"_native.State", offset_of_quick(State))
+kernel = quick_type(Kernel, b"_native.Kernel", offset_of_quick(Kernel))

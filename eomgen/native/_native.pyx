@@ -143,7 +143,7 @@ include "_ensembles.pxi"
 include "_contacts.pxi"
 
 MAKERS = {
-    "timed": timed, "state": state, "motion": Motion, "stepper": Stepper, "run": Run, "called": CalledRun, "integrator": Integrator,
+    "kernel": kernel, "stepper": Stepper, "run": Run, "called": CalledRun, "integrator": Integrator,
     "march": march, "solve_contacts": solve_contacts,
 }  # of a Model, whose context they take
 if EOMGEN_OWN_TABLE != NULL:

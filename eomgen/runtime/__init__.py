@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .bound_model import BoundModel
     from .inputs import Signal
-    from .loaded import load_trajectory
     from .minimal import Minimal
     from .protocols import Core
-    from .trajectory import Trajectory
+    from .trajectory import Trajectory, load_trajectory
 
 _HOMES = {
     "BoundModel": "bound_model",
@@ -22,7 +21,7 @@ _HOMES = {
     "Minimal": "minimal",
     "Signal": "inputs",
     "Trajectory": "trajectory",
-    "load_trajectory": "loaded",
+    "load_trajectory": "trajectory",
 }
 
 __all__ = ["BoundModel", "Core", "Minimal", "Signal", "Trajectory", "load_trajectory"]

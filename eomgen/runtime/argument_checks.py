@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import nullcontext
+from functools import wraps
 from importlib import import_module
+from inspect import signature
 from math import isfinite
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..base.algebra import Array
+from ..base.kernel_table import argument
 from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..base.names import undotted
 from ..base.texts import shown
@@ -38,12 +41,7 @@ DEEPEST = 64  #: lists in lists, as in NumPy
 
 
 def require_room(what: str, numbers: float, remedy: str) -> None:
-    """Refuse what would keep more numbers than ``MOST_NUMBERS``, before any of them is made.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse what would keep more numbers than ``MOST_NUMBERS``, before any of them is made."""
     if numbers > MOST_NUMBERS:
         raise too_large(
             f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call can keep at most "
@@ -52,12 +50,7 @@ def require_room(what: str, numbers: float, remedy: str) -> None:
 
 
 def require_steps(name: str, step: float, start: float, end: float) -> None:
-    """Refuse steps of limited size that are too many for a run, or too small for its times.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse steps of limited size that are too many for a run, or too small for its times."""
     latest = max(abs(start), abs(end))
     if abs(end - start) > MOST_STEPS * step or (start != end and latest + step == latest):
         raise UsageError(
@@ -344,12 +337,7 @@ def read_names(what: str, given: Any) -> tuple[str, ...]:
 
 
 def require_mapping(what: str, given: Any) -> None:
-    """Refuse what does not give values by name.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse what does not give values by name."""
     if not isinstance(given, Mapping):
         raise ill_typed(f"{what} must be a mapping of names to values, not {shown(given)}")
 
@@ -367,8 +355,6 @@ def require(module: str, extra: str, purpose: str) -> ModuleType:
 
 def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
     """Refuse a function that cannot be called as f(t, x); one that shows no signature is left to its first call."""
-    from inspect import signature
-
     try:
         taken = signature(function)
     except (TypeError, ValueError):
@@ -379,3 +365,73 @@ def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
         given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
         remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
         raise ill_typed(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None
+
+
+# -- names of arguments ------------------------------------------------------------------------------------------------
+
+# p and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``.
+
+
+Function = TypeVar("Function", bound=Callable[..., object])
+PAIRS = (("p", "parameters"), ("u", "inputs"), ("parameters", "p"), ("inputs", "u"))
+
+
+def both_names(function: Function) -> Function:
+    """The same function, which takes each argument of PAIRS under either name.
+
+    Raises
+    ------
+    UsageError
+        A call gives both.
+    """
+    taken = signature(function).parameters
+    others = {other: name for name, other in PAIRS if name in taken and other not in taken}
+    place = {name: k for k, name in enumerate(taken)}
+
+    @wraps(function)
+    def call(*args, **given):  # type: ignore[no-untyped-def]
+        for other in others.keys() & given.keys() if given else ():
+            if others[other] in given or place[others[other]] < len(args):
+                raise at_odds(f"{others[other]} and {other} are the same argument; give one of them")
+            given[others[other]] = given.pop(other)
+        try:
+            return function(*args, **given)
+        except TypeError as error:
+            _, own, fault = str(error).partition(f"{function.__qualname__}()")
+            if not own:
+                raise
+            name = getattr(args[0], "name", "f") if function.__name__ == "__call__" else function.__name__
+            needed = [n for n, one in taken.items() if one.default is one.empty and n not in ("self", "module")]
+            fault = fault.replace("'x'", f"'{argument(name, 'x')}'")
+            raise TypeError(f"{name}({', '.join(argument(name, n) for n in needed)}){fault}") from None
+
+    return call  # type: ignore[return-value]
+
+
+def plain_names(function: Function) -> Function:
+    """The same function of a model, which takes names of instances with dots, in lists and mappings too.
+
+    Texts that name nothing of the model, such as those of files, stay as they are.
+    """
+
+    @wraps(function)
+    def call(model, *args, **given):  # type: ignore[no-untyped-def]
+        layout = model.layout
+        if layout.instances:
+            args = tuple(_plain(layout, value) for value in args)
+            given = _plain(layout, given)
+        return function(model, *args, **given)
+
+    return call  # type: ignore[return-value]
+
+
+def _plain(layout: Any, value: Any) -> Any:
+    if isinstance(value, str):
+        found = layout.plain(value)
+        return found if found in layout.names or found.partition(".")[0] in layout.bodies else value
+    if isinstance(value, dict):
+        found = {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
+        return found if len(found) == len(value) else value  # a name given twice is told where it is read
+    if type(value) in (list, tuple) and any(isinstance(x, str | dict | tuple) for x in value):
+        return type(value)(_plain(layout, x) for x in value)
+    return value

@@ -8,9 +8,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, lru_cache
-from math import prod
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,16 +18,15 @@ from ..base.algebra import Array
 from ..base.limits.analyses import MOST_ANGLE
 from ..base.limits.constraints import CHOSEN
 from ..base.texts import angle_in_degrees
-from ..errors import UsageError, calls_within, ill_placed, ill_shaped, no_number
-from .argument_checks import read_number, read_numbers, require_mapping
-from .argument_names import both_names
+from ..errors import calls_within, ill_placed, ill_shaped, no_number
+from .argument_checks import both_names, read_number, read_numbers, require_mapping
 from .initial import Given, Initial
-from .kernels import DerivedState, Kernels, Projection, Refused, Rows, mechanical
+from .kernels import Kernels, public_call
 from .layout import Layout
 from .refusals import require_support
 
 if TYPE_CHECKING:
-    from .protocols import Core, Motion, State, Timed
+    from .protocols import Core, Motion, Projection, Rows, State, Timed
 
 
 class InverseDynamicsDerivatives(NamedTuple):
@@ -50,6 +48,8 @@ class BoundModel:
 
     rhs: Timed
     jacobian: Timed
+    input_jacobian: Timed
+    parameter_jacobian: Timed
     bias: Timed
     outputs: Timed
     mass_matrix: State
@@ -61,6 +61,10 @@ class BoundModel:
     constraints: Rows
     constraint_jacobian: Rows
     velocity_constraints: Rows
+    center_of_mass: State
+    com_jacobian: State
+    momentum: State
+    centroidal_inertia: State
 
     def __init__(self, core: Core, p: Any = None, u: Any = None) -> None:
         self.core = core
@@ -87,18 +91,6 @@ class BoundModel:
         self.n_q, self.n_v, self.n_s, self.n_x = layout.n_q, moving, len(layout.states), layout.n_x
         self.n_u, self.n_p, self.n_y, self.n_bodies = layout.n_u, layout.n_p, layout.n_y, layout.n_bodies
         self.n_dof, self.n_c, self.n_rows = layout.n_dof - self.n_s, len(layout.rows), layout.n_c
-        jacobian: Any = kernels.timed("jacobian")
-        self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, kernels.derivative
-        self.outputs = kernels.timed("outputs")
-        self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
-        self.project = Projection(kernels.state("project"))
-        self.constraints = kernels.constraints
-        names = ("mass_matrix", "embedded_mass_matrix", "bias", "inverse_dynamics", "constraint_jacobian")
-        vars(self).update(mechanical(kernels) if self.n_s else {name: getattr(kernels, name) for name in names})
-        if layout.reaction_laws:
-            refused = Refused(lambda: require_support(layout, "inverse_dynamics"))
-            self.inverse_dynamics = cast("Motion", refused)
-        self.velocity_constraints = kernels.velocity_constraints
 
     @property
     def p(self) -> Array:
@@ -106,8 +98,8 @@ class BoundModel:
         return np.array(self.kernels.context.p)
 
     @cached_property
-    def _settled(self) -> dict[tuple[Any, ...], Any]:
-        """What runs with the same arguments have in common; see :mod:`.runs.compiled`."""
+    def _plans(self) -> dict[tuple[Any, ...], Any]:
+        """Plans of runs by method and tolerances; see :mod:`.runs.simulate`."""
         return {}
 
     @cached_property
@@ -174,21 +166,7 @@ class BoundModel:
 
     # derivatives
 
-    @cached_property
-    def input_jacobian(self) -> Timed:
-        """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
-        return self.kernels.derivative("input_jacobian")
-
-    @cached_property
-    def parameter_jacobian(self) -> Timed:
-        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters.
-
-        The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
-        nearest one on them.  Exact at states on the constraints; others are projected first.
-        """
-        return self.kernels.derivative("parameter_jacobian")
-
-    _inverse_slopes = cached_property["Motion"](lambda self: self.kernels.motion("inverse_dynamics_derivatives"))
+    _inverse_slopes = cached_property["Motion"](lambda self: self.kernels.inverse_dynamics_derivatives)
 
     @both_names
     def inverse_dynamics_derivatives(
@@ -227,45 +205,6 @@ class BoundModel:
         require_support(self.layout, "inverse_dynamics_derivatives")
         n_q, n_v, every = self.n_q, self.n_v, self._inverse_slopes(q, v, a, p, u, out, t)
         return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
-
-    # sums over all bodies, in ground axes; an error where the model has no bodies, or none with a mass
-
-    def _part(self, name: str, start: int, *shape: int, rates: bool = False) -> State:
-        """A part of the kernel ``centroidal``, whose sums over the bodies share the work."""
-        layout, whole = self.kernels.layout, self.kernels.state("centroidal")
-        n = layout.n_x if rates else layout.n_q
-
-        def find(x: ArrayLike, **given: Any) -> Array:
-            if layout.n_com == 0:
-                raise UsageError(f"model {layout.name!r} has no {name}: no body of it has a mass", code="EG-NO-INERTIA")
-            state = read_numbers("x", x)
-            if state.shape[:1] != (n,) or state.ndim > 2:
-                raise ill_shaped(f"{'x' if rates else 'q'} must have shape ({n},) or ({n}, k), not {state.shape}")
-            full = np.concatenate([state, np.zeros((layout.n_x - n, *state.shape[1:]))])
-            found = whole(full, **given)[start : start + prod(shape)]
-            return np.array(found.reshape(shape + state.shape[1:]))
-
-        return cast("State", DerivedState(name, find))
-
-    @cached_property
-    def center_of_mass(self) -> State:
-        """``center_of_mass(q)`` -> (3,) of all bodies (m)."""
-        return self._part("center_of_mass", 0, 3)
-
-    @cached_property
-    def com_jacobian(self) -> State:
-        """``com_jacobian(q)`` -> (3, n_v): the velocity of the centre of mass is this times v."""
-        return self._part("com_jacobian", 3, 3, self.kernels.layout.n_v)
-
-    @cached_property
-    def momentum(self) -> State:
-        """``momentum(x)`` -> (6,): linear (kg m/s), then angular about the centre of mass (kg m^2/s)."""
-        return self._part("momentum", 3 + 3 * self.kernels.layout.n_v, 6, rates=True)
-
-    @cached_property
-    def centroidal_inertia(self) -> State:
-        """``centroidal_inertia(q)`` -> (3, 3) about the centre of mass of all bodies (kg m^2)."""
-        return self._part("centroidal_inertia", 9 + 3 * self.kernels.layout.n_v, 3, 3)
 
     # positions that loops allow
 
@@ -484,3 +423,14 @@ class BoundModel:
         path, reference = self._path
         start = None if guess is None else read_numbers("guess", guess)
         return motions(path, reference, (q_i, v_i, a_i), start, read_numbers("t", t))
+
+
+def _called(name: str) -> Any:
+    """A call of a module as an attribute, made when it is first asked for."""
+    made = cached_property[Any](lambda self: public_call(self.kernels, name))
+    made.__set_name__(BoundModel, name)
+    return made
+
+
+for _name in BoundModel.__annotations__.keys() - {"equations"}:
+    setattr(BoundModel, _name, _called(_name))

@@ -45,7 +45,7 @@ class Canonical:
         self.p_names = tuple(f"p_{name}" for name in layout.velocity_labels)
         self.z_names = layout.q + self.p_names
         self.n_z = len(self.z_names)
-        self._terms = module.kernels.state("canonical")
+        self._terms = module.kernels.canonical
 
     def __repr__(self) -> str:
         return f"<canonical form of {self._module.name}: z = [{', '.join(self.z_names)}]>"
@@ -82,7 +82,7 @@ class Canonical:
         rate, N = np.zeros(layout.n_c), np.eye(layout.n_v)
         if layout.n_c:
             q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[:n]
-            J = layout.scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
+            J = layout.scales.jacobian(module.kernels.constraint_jacobian(q, t=t))
             rest = np.concatenate([q, np.zeros(layout.n_v)])
             rate = layout.scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
             N = algebra.svd(J)[2][layout.rank :].T

@@ -51,7 +51,7 @@ class ChangePoint(NamedTuple):
 def scaled_jacobians(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
     """Scaled constraint Jacobians (k, m, n) at times (k,), states (n_x, k) and inputs (n_u, k)."""
     layout = module.layout
-    C_q = np.moveaxis(module.kernels.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
+    C_q = np.moveaxis(module.kernels.constraint_jacobian(x[: layout.n_q], t=t, u=u), -1, 0)
     return np.asarray(layout.scales.jacobian(C_q))
 
 
@@ -109,7 +109,7 @@ class StatesBetween:
 
     def __init__(self, module: BoundModel, t: Array, x: Array, u: Array) -> None:
         self.t, self.x, self.n_q = t, x, module.layout.n_q
-        slopes = module.kernels.timed("rhs", nan=True)(t, x, u=u if len(u) else None)
+        slopes = module.kernels.kernel("rhs", nan=True)(t, x, u=u if len(u) else None)
         known = bool(np.isfinite(slopes).all())
         self.rates = slopes[: self.n_q] if known else np.where(np.isfinite(slopes), slopes, 0.0)[: self.n_q]
         self.bends = slopes[self.n_q :] if known and self.n_q == module.layout.n_v else None

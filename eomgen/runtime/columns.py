@@ -175,7 +175,7 @@ class Columns:
             return np.empty((0, len(self.t)))
         a = np.array([self[name] for name in layout.a])
         q, v = self.x[: layout.n_q], self.x[layout.n_q :]
-        y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
+        y = self.module.kernels.loop_coordinates(q, v, a, u=self._varying(), t=self.t)
         angles = layout.loop_angles
         y[0, angles] = self._unwrapped(y[0, angles], angles)
         parameters = [k for k, kind in enumerate(layout.loop_kinds) if kind == "parameter"]
@@ -193,7 +193,7 @@ class Columns:
             return np.unwrap(found, axis=-1)
         t, x, u, order = passed
         n = self.module.layout.n_q
-        kernel = self.module.kernels.motion("loop_coordinates")
+        kernel = self.module.kernels.loop_coordinates
         between = kernel(x[:n], x[n:], np.zeros_like(x[n:]), u=u if u.size else None, t=t)[0, angles]
         turned = np.empty((len(angles), len(order)))
         turned[:, order] = np.unwrap(np.concatenate([between, found], axis=-1)[:, order], axis=-1)
@@ -280,7 +280,7 @@ def project(
         return NO_RESIDUALS, raw
     led = forcing is not None and forcing.constrained
     u = forcing.sample(t, raw) if led and forcing is not None else None
-    x = module.project.kernel(raw, None, u, None, t)
+    x = module.project(raw, t, None, u)
     if not module.n_rows:
         return NO_RESIDUALS, x
     here = u
@@ -297,9 +297,8 @@ def _residuals(
 ) -> Residuals:
     """How far raw states and projected ones are from the constraints, at the inputs of each."""
     n = module.n_q
-    x = module.project.kernel(raw, None, None, None, t) if x is None else x
-    position = module.constraints.every
-    velocity = module.velocity_constraints.every
+    x = module.project(raw, t) if x is None else x
+    position, velocity = module.kernels.constraints, module.kernels.velocity_constraints
     correction = np.abs(x - raw)
     for i, _ in module.layout.quaternion_slots:  # their length means nothing
         e = raw[i : i + 4]

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.inline_pictures import picture_html, side_by_side
-from ..base.kernel_table import KERNELS
+from ..base.kernel_table import KERNELS, Kernel
 from ..base.notation import Notation
 from ..base.picture_data import read_picture
 from ..base.texts import aligned_rows, html_table, html_text, shown, visible
@@ -370,7 +370,7 @@ def _calls(module: BoundModel) -> str:
             continue
         shape = module.layout.shape(kernel.name)
         size = " x ".join(map(str, shape))
-        rows.append((f"{kernel.name}({_arguments(kernel.name, kernel.inputs)})", size, kernel.result))
+        rows.append((f"{kernel.name}({_arguments(kernel)})", size, kernel.result))
     cells = "".join(
         f"<tr><td {LEFT}><code>{html_text(call)}</code></td><td>{html_text(size)}</td>"
         f"<td {LEFT}>{html_text(result)}</td></tr>"
@@ -390,16 +390,11 @@ def _is_call(kind: type, name: str) -> bool:
     return not isinstance(found, property) and (hasattr(found, "__get__") or callable(found))
 
 
-def _arguments(name: str, inputs: tuple[str, ...]) -> str:
+def _arguments(kernel: Kernel) -> str:
     """The arguments as they are written in a call."""
-    if name == "kinematics":
-        return "q_i, v_i, a_i"
-    if inputs == ("q", "v"):
-        return "t, x" if name in _TIMED else "x"
-    return ", ".join(inputs)
-
-
-_TIMED = ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")
+    if kernel.inputs == ("q", "v"):
+        return "t, x" if kernel.kind == "timed" else "x"
+    return ", ".join(name for name in kernel.inputs if name != "q_guess")
 
 
 def trajectory_html(trajectory: Any) -> str:

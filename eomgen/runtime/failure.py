@@ -24,7 +24,7 @@ def find_culprit(kernels: Any, status: int, t: float, x: Array, p: Array | None,
     if status == 1:
         return _not_finite(kernels, t, x, p, u)
     if status == 2:
-        M = kernels.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
+        M = kernels.kernel("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
         if not np.isfinite(M).all():
             return ""
         values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
@@ -39,7 +39,7 @@ def find_culprit(kernels: Any, status: int, t: float, x: Array, p: Array | None,
         size = "negative" if values[0] < -SINGULAR else "no"
         return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
     if status == 3:
-        e = kernels.state("constraints", nan=True)(q, t=t, p=p, u=u)
+        e = kernels.kernel("constraints", nan=True)(q, t=t, p=p, u=u)
         if not np.isfinite(e).all() or not e.size:
             return ""
         worst = int(np.abs(layout.scales.residual(e)).argmax())
@@ -57,7 +57,7 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
     if bad:
         return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
     if layout.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
-        finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
+        finite = kernels.kernel("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         bad = [name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0]
         known = layout.metadata.get("not_finite_where", {})
         own = {known[name]: None for name in bad if name in known}
@@ -76,11 +76,11 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
             why = ", or ".join([*own, *ends, "its law is outside its domain"])
             return f"the loads of {' and '.join(loads)} are not ({why})"
     if "mass_matrix" in kernels.core.names and x.size >= layout.n_q:
-        M = kernels.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
+        M = kernels.kernel("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
         if not np.isfinite(M).all():
             return "the mass matrix is not (a mass, an inertia or a length outside the domain of its law)"
     if layout.states and "rhs" in kernels.core.names and x.size == layout.n_x:
-        fine = np.isfinite(kernels.timed("rhs", nan=True)(t, x, p=p, u=u))
+        fine = np.isfinite(kernels.kernel("rhs", nan=True)(t, x, p=p, u=u))
         bad = [name for name, known in zip(layout.x, fine, strict=True) if not known]
         if bad and {*bad} <= {*layout.states}:
             many = len(bad) > 1
@@ -208,7 +208,7 @@ def flat_disc(kernels: Any, x: Array, t: float, p: Array | None) -> tuple[str, s
     discs = layout.metadata.get("rolling_discs", ())
     if not discs or "poses" not in kernels.core.names or len(x) < layout.n_q:
         return None
-    poses = kernels.state("poses", nan=True)
+    poses = kernels.kernel("poses", nan=True)
     turns = np.concatenate([poses(x[: layout.n_q], t=t, p=p)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
     for name, wheel, axle, plane, normal in discs:
         across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .inputs import Signal
-from .late import eager
+from .kernels import eager
 from .tapes import Expression
 
 if TYPE_CHECKING:

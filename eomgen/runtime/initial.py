@@ -45,7 +45,7 @@ from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cann
 from .argument_checks import UnknownNameError, unknown, without_dots
 from .failure import place
 from .kernels import Kernels, constraint_system
-from .start_values import warn_of_fixed
+from .layout import warn_of_fixed
 
 # -- rank at other parameters ------------------------------------------------------------------------------------------
 
@@ -59,10 +59,6 @@ def require_rank(kernels: Kernels, J: Array) -> None:
         With the parameters.
     J : (n_c, n_v) array
         Scaled constraint Jacobian at an assembled position.
-
-    Raises
-    ------
-    UsageError
     """
     layout = kernels.layout
     pairs = list(zip(layout.p, kernels.context.p, layout.metadata["p_values"], strict=True))
@@ -193,7 +189,7 @@ class StartBranch:
         ends = []
         for side in (h, -h):
             x = np.concatenate([self.scales.move(self.q, side * v), v * self.scales.q])
-            ends.append(self.kernels.velocity_constraints.every(x, t=self.t + side) / self.scales.c)
+            ends.append(self.kernels.velocity_constraints(x, t=self.t + side) / self.scales.c)
         return np.asarray(self.lost.T @ (ends[0] - ends[1]) / (2.0 * h * speed**2))
 
     def complete(self, v: Array) -> Array:
@@ -346,7 +342,7 @@ def find_wanted(kernels: Kernels, name: str, t: float) -> Wanted | None:
 def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
     layout, places = kernels.layout, kernels.layout.place_scales
     n_q, n_v, k = layout.n_q, layout.n_v, layout.y.index(name)
-    outputs, slopes = kernels.motion("motion_outputs"), kernels.motion("output_derivatives")
+    outputs, slopes = kernels.motion_outputs, kernels.output_derivatives
     zero = np.zeros(n_v)
     # at one position a slope may vanish that counts elsewhere, as sin(q) does at 0
     tried = [layout.q_reference + turn * np.linspace(0.7, 1.3, n_q) for turn in (0.0, 0.3, -0.2)]
@@ -374,7 +370,7 @@ def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
 def _of_marker(kernels: Kernels, name: str, what: str, marker: str) -> Wanted:
     """A coordinate of the place of a marker or of a body's origin, or of its velocity."""
     layout, axis, of_velocities = kernels.layout, "xyz".index(what[-1]), what.startswith("v")
-    poses, twists = kernels.state("poses"), kernels.motion("inertial_terms")
+    poses, twists = kernels.poses, kernels.inertial_terms
     data = read_picture(layout.metadata, kernels.context.p)
     marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
     if marker not in data.markers and marker not in layout.bodies:
@@ -420,7 +416,7 @@ class Initial:
         self.layout = layout = kernels.layout
         self.t = t
         self.system = constraint_system(kernels).at(t)
-        self._C_q = kernels.state("constraint_jacobian", nan=True)
+        self._C_q = kernels.kernel("constraint_jacobian", nan=True)
         self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
         self.wanted: dict[str, Wanted] = {}
@@ -467,7 +463,7 @@ class Initial:
 
     def rate(self, q: Array) -> Array:
         """C_t (n_c,)."""
-        return self.kernels.velocity_constraints.every(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
+        return self.kernels.velocity_constraints(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
 
     def follow(self, start: Array, held: Mapping[str, float]) -> Array:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
@@ -640,7 +636,7 @@ class Initial:
         gap[turns] = np.abs((gap[turns] + np.pi) % (2 * np.pi) - np.pi)
         if largest(gap) <= MEASURED or largest(gap[~turns]) > MEASURED or not self.layout.n_bodies:
             return largest(gap) > MEASURED
-        poses = self.kernels.state("poses", nan=True)  # Euler angles describe each rotation twice
+        poses = self.kernels.kernel("poses", nan=True)  # Euler angles describe each rotation twice
         return not largest((poses(a, t=self.t) - poses(b, t=self.t))[:, :3, :3].ravel()) <= MEASURED
 
     def side(self, q: Array) -> float:
@@ -688,12 +684,7 @@ class Initial:
         return self.scales.jacobian(self._C_q(q, t=self.t))
 
     def _require_motion(self, q: Array, given: Mapping[str, float | Array]) -> None:
-        """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
-
-        Raises
-        ------
-        AssemblyError
-        """
+        """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates."""
         layout = self.layout
         if not layout.n_c:
             return
@@ -740,7 +731,7 @@ class Initial:
             y_t, y_q = self.wanted[name].evaluate(q, self.t)
             return y_q, y_t, self.wanted[name].scale
         layout, zero, k = self.layout, np.zeros(self.layout.n_v), self.layout.loop_rates.index(name)
-        rest = self.kernels.motion("loop_coordinates")(q, zero, zero, t=self.t)[1]
+        rest = self.kernels.loop_coordinates(q, zero, zero, t=self.t)[1]
         return self.system.cut.evaluate(q, self.t)[1][k], rest[k], layout.loop_scales[k]
 
     # which values can be held together

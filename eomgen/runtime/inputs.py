@@ -637,12 +637,7 @@ TimeFunction = Callable[[float], float]
 
 
 def require_smooth(forcing: Forcing, start: float, end: float) -> None:
-    """Refuse tables that jump where their rates are needed, and texts that do not change as their rates say.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse tables that jump where their rates are needed, and texts that do not change as their rates say."""
     layout = forcing.layout
     for rate, (name, times, _) in forcing.derived.items():
         table: Any = forcing.values[name]
@@ -747,10 +742,6 @@ def require_agreement(forcing: Forcing, start: float, end: float) -> None:
     """Refuse rates that are not those of the inputs beside which they are given, and rates bound of held inputs.
 
     What depends on the state is not compared: how it changes is known along the motion only.
-
-    Raises
-    ------
-    UsageError
     """
     values, layout, base = forcing.values, forcing.layout, forcing.base
     for first, of in layout.input_rates.items():

@@ -3,42 +3,103 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, lru_cache
+from functools import cache, lru_cache, partial
+from math import prod
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
+from ..base.kernel_table import NAMED
 from ..base.numeric.assembly import ConstraintSystem, CutJoints
-from ..errors import cannot, ill_shaped, no_choice, not_finite
+from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
 from .argument_checks import fitting, read_numbers
-from .argument_names import both_names
 from .failure import Fail
-from .layout import Layout
+from .layout import Layout, at_parameters
 from .refusals import require_support
-from .start_values import at_parameters
 
 if TYPE_CHECKING:
-    from .protocols import Core, Motion, State, Timed
+    from .protocols import Call, Core
 
-# -- calls -------------------------------------------------------------------------------------------------------------
+# -- cores -------------------------------------------------------------------------------------------------------------
 
-# A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
-# makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
+# A core is the part that differs between targets: a Model of eomgen._native or of a package's own.  All its kernels are
+# of one class (native/_kernel.pxi), whose arguments are named and ordered as ORDERS says.
+
+
+class LateCore:
+    """A core that offers further kernels, compiled or loaded at the first call of any of them.
+
+    Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
+    exported package has them all from the beginning.
+
+    Parameters
+    ----------
+    core : Core
+    late : sequence of str
+        Names of the further kernels.
+    load : callable
+        Makes a core of those that are late together: of :attr:`~..base.kernel_table.Kernel.late` of the table.
+
+    Attributes
+    ----------
+    further : dict of str to Core
+        Cores made so far, by what their kernels have in common.
+    """
+
+    def __init__(self, core: Core, late: Sequence[str], load: Callable[[str], Core]) -> None:
+        self.core = core
+        self.names = (*core.names, *(name for name in late if name not in core.names))
+        self.load = load
+        self.further: dict[str, Core] = {}
+        self.run = core.run  # here, because every run asks for it
+
+    def having(self, name: str) -> Core:
+        """The core with a rarer kernel, made now if there is none yet."""
+        group = str(NAMED[name].late)
+        if group not in self.further:
+            self.further[group] = self.load(group)
+        return self.further[group]
+
+    def kernel(self, name: str, context: Any, *options: Any, **more: Any) -> Any:
+        """A kernel; a rarer one is made when it is first called."""
+        if name in self.names and name not in self.core.names and not more.keys() & {"load", "find"}:
+            more["load"] = lambda: self.having(name).context(context.p, context.u, ill_shaped)
+        return self.core.kernel(name, context, *options, **more)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.core, name)
+
+
+def eager(core: Any) -> Any:
+    """The core that was there from the beginning, which has the right-hand side and the steppers."""
+    return core.core if isinstance(core, LateCore) else core
+
+
+# -- kernels -----------------------------------------------------------------------------------------------------------
 
 
 ENERGY = (
     "the energy of the model {!r} is not known: its equations of motion are given without kinetic_energy; "
     "give equations.kinetic_energy, and equations.potential_energy if forces have a potential"
 )
+#: Kind of a kernel -> its arguments in order, and how many of them must be given.
+ORDERS: dict[str, tuple[tuple[str, ...], int]] = {
+    "timed": (("t", "x", "p", "u", "out"), 2),
+    "state": (("x", "p", "u", "out", "t"), 1),
+    "motion": (("q", "v", "a", "p", "u", "out", "t"), 3),
+    "project": (("x", "t", "p", "u", "out"), 1),
+    "jacobian": (("t", "x", "p", "u", "out", "wrt"), 2),
+    "rows": (("q", "p", "u", "out", "t", "rows"), 1),
+}
 
 
 class Kernels:
     """The calls of one model, sharing one set of parameters and inputs.
 
-    Here the velocities are [v; s], first-order states among them; :mod:`.kernels` leaves these out for users.
-    Kernels that are properties are made anew when asked for: what is kept lives as long as Fail, which refers back.
+    ``kernels.poses`` is the kernel of this name.  Here all are as in C: velocities are [v; s], with first-order states
+    among them, and rows those of all constraints; :func:`public_call` gives what users see.  They are made anew when
+    asked for: what is kept lives as long as Fail, which refers back.
 
     Parameters
     ----------
@@ -53,34 +114,18 @@ class Kernels:
         self.layout = layout
         self.context = core.context(p, u, ill_shaped)
         if p is not None and "scales" in core.names:
-            scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, ill_shaped)
+            shape, order = layout.shape("scales"), ORDERS["state"]
+            scales = core.kernel("scales", self.context, shape, self._unscaled, *order, False, ill_shaped)
             self.layout = layout = layout.sized(scales(np.empty(0)))
         if p is not None and not layout.metadata.keys().isdisjoint(("start_terms", "start_fixed")):
             self.layout = layout = at_parameters(layout, self.context.p)
         self.fail = Fail(self)
-        self._derivatives: dict[str, Timed] = {}
+        self._derivatives: dict[str, Call] = {}
 
-    def _rows(self, name: str, independent: Indices) -> Rows:
-        return Rows(self.state(name), independent)
-
-    constraints = cached_property["Rows"](
-        lambda self: self._rows("constraints", self.layout.rows[self.layout.rows < self.layout.n_h])
-    )
-    constraint_jacobian = cached_property["Rows"](lambda self: self._rows("constraint_jacobian", self.layout.rows))
-    velocity_constraints = cached_property["Rows"](lambda self: self._rows("velocity_constraints", self.layout.rows))
-    mass_matrix: State = cast("State", property(lambda self: self.state("mass_matrix")))
-    embedded_mass_matrix: State = cast("State", property(lambda self: self.state("embedded_mass_matrix")))
-    bias: Timed = cast("Timed", property(lambda self: self.timed("bias")))
-    inverse_dynamics: Motion = cast("Motion", property(lambda self: self.motion("inverse_dynamics")))
-
-    def derivative(self, name: str) -> Timed:
-        """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
-        if name not in self._derivatives:
-            refused = self.layout.given_rates or not self.layout.projects
-            self._derivatives[name] = (
-                cast("Timed", Refused(lambda: require_support(self.layout, name))) if refused else self.timed(name)
-            )
-        return self._derivatives[name]
+    def __getattr__(self, name: str) -> Call:
+        if name not in NAMED:
+            raise AttributeError(f"there is no kernel {name!r}", name=name)
+        return self.kernel(name)
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""
@@ -88,51 +133,79 @@ class Kernels:
         bad = [f"{name} = {value:.6g}" for name, value in given if not np.isfinite(value)]
         raise not_finite(f"the sizes computed from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
 
-    def timed(self, name: str, nan: bool = False) -> Timed:
-        """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
-        return cast("Timed", self._make("timed", name, nan))
+    def kernel(
+        self, name: str, nan: bool = False, kind: str = "", pick: Indices | None = None, choose: Any = None
+    ) -> Call:
+        """A kernel.
 
-    def state(self, name: str, nan: bool = False) -> State:
-        """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
-        return cast("State", self._make("state", name, nan))
+        Parameters
+        ----------
+        name : str
+        nan : bool
+            NaN for recoverable failures.
+        kind : str
+            Of its arguments, one of ORDERS; that of the table of kernels by default.
+        pick : array of int, optional
+            Places of the result among the numbers of the kernel, in its shape; all of them by default.
+        choose : callable, optional
+            Of its last argument -> the kernel that is called instead, or None for this one.
+        """
+        layout, shape, kind = self.layout, self.layout.shape(name), kind or NAMED[name].kind
+        result = shape if pick is None else pick.shape
+        if name in self.core.names:
+            places = None if pick is None or np.array_equal(pick, _places(shape)) else pick.ravel()
+            make = self.core.kernel
+            found = make(name, self.context, result, self.fail, *ORDERS[kind], nan, ill_shaped, places, choose)
+            return cast("Call", found)
+        if 0 in shape:
+            n = layout.inputs(name)
+            return self.derived(name, kind, lambda *x, **_: np.zeros((*result, *batch_of(x, n))), choose)
+        if not layout.n_c and name == "project":
+            return self.derived(name, kind, self._normalised)
+        if not layout.rank and name == "embedded_mass_matrix":
+            every = _places((layout.n_v, layout.n_v))[np.ix_(layout.independent, layout.independent)]
+            return self.kernel("mass_matrix", nan, kind, every if pick is None else every.ravel()[pick])
+        return self.refused(name, kind, partial(self.missing, name))
 
-    def motion(self, name: str) -> Motion:
-        """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
-        return cast("Motion", self._make("motion", name, False))
+    def missing(self, name: str) -> UsageError:
+        """Why the model has no kernel of a name."""
+        if name == "energy" and not self.layout.energy_known:
+            return cannot(ENERGY.format(self.layout.name))
+        message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
+        return cannot(f"{message}; compile again with kernels=None for all, or name it in kernels")
 
-    def assembly_jacobian(self, t: float, x: Array) -> Array:
-        """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
-        return self.state("assembly_jacobian")(x, t=t)
+    def refused(self, name: str, kind: str, load: Callable[[], Any]) -> Call:
+        """In place of a kernel that the model cannot have: ``load()`` raises why, or returns it, at a call."""
+        return self._made(name, kind, load=load)
 
-    def output_derivatives(self, t: float, x: Array, a: Array) -> Array:
-        """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
-        return self.motion("output_derivatives")(x[: self.layout.n_q], x[self.layout.n_q :], a, t=t)
+    def derived(self, name: str, kind: str, find: Callable[..., Array], choose: Any = None) -> Call:
+        """A call of a kind that is made of kernels: ``find(*states, p=, u=, t=)`` -> its result."""
+
+        def call(*states: Any, out: Array | None = None, **given: Any) -> Array:
+            return into(out, find(*states, **given))
+
+        return self._made(name, kind, find=call, choose=choose)
+
+    def _made(self, name: str, kind: str, **how: Any) -> Call:
+        made = self.core.kernel(name, self.context, (), self.fail, *ORDERS[kind], False, ill_shaped, **how)
+        return cast("Call", made)
+
+    def derivative(self, name: str) -> Call:
+        """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
+        if name not in self._derivatives:
+            refused = self.layout.given_rates or not self.layout.projects
+            load = partial(require_support, self.layout, name)
+            self._derivatives[name] = self.refused(name, "timed", load) if refused else self.kernel(name)
+        return self._derivatives[name]
 
     def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
         """Rows of a timed kernel at one state; the others need not be numbers there."""
-        found = np.asarray(self.timed(name, nan=True)(t, x, u=u)[chosen])
+        found = np.asarray(self.kernel(name, nan=True)(t, x, u=u)[chosen])
         if not np.isfinite(found).all():
-            self.timed(name)(t, x, u=u)  # tells what is wrong
+            self.kernel(name)(t, x, u=u)  # tells what is wrong
         return found
 
-    def _make(self, kind: str, name: str, nan: bool) -> Any:
-        layout = self.layout
-        shape = layout.shape(name)
-        if name in self.core.names:
-            return getattr(self.core, kind)(name, self.context, shape, self.fail, nan, ill_shaped)
-        if 0 in shape:
-            return DERIVED[kind](name, lambda *x, **_: np.zeros((*shape, *batch_of(x, layout.inputs(name)))))
-        if not layout.n_c and name == "project":
-            return DERIVED[kind](name, self._normalised)
-        if not layout.rank and name == "embedded_mass_matrix":
-            every, order = self.state("mass_matrix", nan), np.ix_(layout.independent, layout.independent)
-            return DERIVED[kind](name, lambda x, **given: np.array(every(x, **given)[order]))
-        if name == "energy" and not layout.energy_known:
-            return Refused(lambda: cannot(ENERGY.format(layout.name)))
-        message = f"model {layout.name!r} was generated without the kernel {name!r}"
-        return Refused(lambda: cannot(f"{message}; compile again with kernels=None for all, or name it in kernels"))
-
-    def _normalised(self, x: ArrayLike, **given: Any) -> Array:
+    def _normalised(self, x: Any, **given: Any) -> Array:
         """The projection of a tree: nothing to do but for the length of Euler parameters."""
         result = np.array(read_numbers("x", x))
         batch_of((result,), self.layout.n_x)
@@ -141,53 +214,9 @@ class Kernels:
         return result
 
 
-class Derived:
-    """A call that is made of kernels, and has the arguments of one.
-
-    Parameters
-    ----------
-    name : str
-        Of that kernel, for messages.
-    find : callable
-        ``find(*arrays, p=, u=, t=)`` -> its result.
-    """
-
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, name: str, find: Callable[..., Array]) -> None:
-        self.name, self.find = name, find
-
-
-class DerivedTimed(Derived):
-    """Of time and state."""
-
-    @both_names
-    def __call__(self, t: Any, x: Any, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
-        """Evaluate."""
-        return into(out, self.find(x, p=p, u=u, t=t))
-
-
-class DerivedState(Derived):
-    """Of the state, or the coordinates, alone."""
-
-    @both_names
-    def __call__(self, x: Any, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
-        """Evaluate."""
-        return into(out, self.find(x, p=p, u=u, t=t))
-
-
-class DerivedMotion(Derived):
-    """Of coordinates, velocities and accelerations."""
-
-    @both_names
-    def __call__(
-        self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0
-    ) -> Array:
-        """Evaluate."""
-        return into(out, self.find(q, v, a, p=p, u=u, t=t))
-
-
-DERIVED: dict[str, Any] = {"timed": DerivedTimed, "state": DerivedState, "motion": DerivedMotion}
+def _places(shape: tuple[int, ...]) -> Indices:
+    """Where the numbers of a result lie."""
+    return np.arange(prod(shape)).reshape(shape)
 
 
 def batch_of(arrays: Sequence[Any], n: int) -> tuple[int, ...]:
@@ -204,99 +233,6 @@ def batch_of(arrays: Sequence[Any], n: int) -> tuple[int, ...]:
     return shape[1:]
 
 
-class Refused:
-    """In place of a call that a model cannot have: says why when it is called.
-
-    Parameters
-    ----------
-    refuse : callable
-        Raises the error, or returns it.
-    """
-
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, refuse: Callable[[], Any]) -> None:
-        self.refuse = refuse
-
-    def __call__(self, *args: Any, **options: Any) -> Any:
-        """Refuse.
-
-        Raises
-        ------
-        UsageError
-        """
-        raise self.refuse()
-
-
-class Rows:
-    """A constraint kernel that gives the independent rows, or all of them; of those of C_q the first columns."""
-
-    def __init__(self, every: State, independent: Sequence[int] | Indices, width: int | None = None) -> None:
-        self.every, self.independent, self.width = every, independent, width
-
-    @both_names
-    def __call__(
-        self,
-        q: ArrayLike,
-        p: Any = None,
-        u: Any = None,
-        out: Array | None = None,
-        t: Any = 0.0,
-        rows: str = "independent",
-    ) -> Array:
-        """Evaluate.
-
-        Parameters
-        ----------
-        q : (n_q,) or (n_q, k) array; x, (n_x,) or (n_x, k), for velocity_constraints
-        p, u : arrays, optional
-        out : array, optional
-        t : float
-        rows : {"independent", "all"}
-        """
-        if not isinstance(rows, str) or rows not in ("independent", "all"):
-            raise no_choice(f"rows must be 'independent' or 'all', not {rows!r}")
-        if rows == "all" and self.width is None:
-            return self.every(q, p=p, u=u, out=out, t=t)
-        result = self.every(q, p=p, u=u, t=t)
-        result = result if rows == "all" else result[self.independent]
-        return into(out, result if self.width is None else np.ascontiguousarray(result[:, : self.width]))
-
-
-class Projection:
-    """The projection, whose second argument is the time: the constraints of drivers move with it."""
-
-    def __init__(self, kernel: State) -> None:
-        self.kernel = kernel
-
-    @both_names
-    def __call__(
-        self,
-        x: ArrayLike,
-        t: ArrayLike = 0.0,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-    ) -> Array:
-        """The nearest state on the constraints.
-
-        Parameters
-        ----------
-        x : (n_x,) or (n_x, k) array
-        t : float or (k,) array
-            Time (s).
-        p, u : arrays, optional
-            Parameters (n_p,) and inputs, (n_u,) or (n_u, k); those bound by default.
-        out : array, optional
-            Where the result goes.
-
-        Returns
-        -------
-        (n_x,) or (n_x, k) array
-        """
-        return self.kernel(x, p=p, u=u, out=out, t=t)
-
-
 def into(out: Array | None, result: Array) -> Array:
     """A result, in the array that was given for it."""
     if out is not None:
@@ -304,40 +240,94 @@ def into(out: Array | None, result: Array) -> Array:
     return result if out is None else out
 
 
-# -- velocities without first-order states -----------------------------------------------------------------------------
-
-# A state is a velocity of unit inertia that no constraint touches, so that its rows and columns are left out.
+# -- what users call ---------------------------------------------------------------------------------------------------
 
 
-def mechanical(kernels: Kernels) -> dict[str, Any]:
-    """The functions of M, h and the constraints of a model that has first-order states, by name."""
+def public_call(kernels: Kernels, name: str) -> Call:
+    """The call of a module: of M, h and the constraints without first-order states, of the independent rows alone.
+
+    A state is a velocity of unit inertia that no constraint touches, so that its rows and columns are left out.
+    """
     layout = kernels.layout
-    count = len(layout.states)
-    n, free = layout.n_v - count, layout.n_dof - count
-    M, embedded, bias = kernels.mass_matrix, kernels.embedded_mass_matrix, kernels.bias
-    every, inverse = kernels.constraint_jacobian.every, kernels.inverse_dynamics
+    n, free = layout.moving, layout.n_dof - layout.n_states
+    if name == "jacobian":
+        return kernels.kernel(name, kind="jacobian", choose=partial(_differentiated, kernels))
+    if name == "project":
+        return kernels.kernel(name, kind="project")
+    if name in PARTS:
+        return _centroidal(kernels, name)
+    if name in ("input_jacobian", "parameter_jacobian"):
+        return kernels.derivative(name)
+    if name == "inverse_dynamics" and layout.reaction_laws:
+        return kernels.refused(name, "motion", partial(require_support, layout, name))
+    if name == "inverse_dynamics" and layout.n_states:
+        return kernels.derived(name, "motion", partial(_mechanical_forces, kernels))
+    if name in ("constraints", "constraint_jacobian", "velocity_constraints"):
+        every, rows = _places(layout.shape(name)), layout.rows
+        every = every[:, :n] if name == "constraint_jacobian" else every
+        whole = cache(lambda: kernels.kernel(name, pick=every))
 
-    def find_inverse(q: Any, v: Any, a: Any, **given: Any) -> Array:
-        states, rates = read_numbers("v", v), read_numbers("a", a)
-        if states.shape[:1] != (layout.n_v,):
-            raise ill_shaped(
-                f"inverse_dynamics of a model with first-order states takes v = [v; s], ({layout.n_v},) or "
-                f"({layout.n_v}, k), not {states.shape}: forces depend on the states {', '.join(layout.states)}, which "
-                "come after the velocities"
-            )
-        if rates.shape[:1] == (n,):
-            rates = np.concatenate([rates, np.zeros((count, *rates.shape[1:]))])
-        return np.array(inverse(q, states, rates, **given)[:n])
+        def choose(which: Any) -> Call | None:
+            if not isinstance(which, str) or which not in ("independent", "all"):
+                raise no_choice(f"rows must be 'independent' or 'all', not {which!r}")
+            return whole() if which == "all" else None
 
-    return {
-        "mass_matrix": DerivedState("mass_matrix", lambda q, **given: np.array(M(q, **given)[:n, :n])),
-        "embedded_mass_matrix": DerivedState(
-            "embedded_mass_matrix", lambda q, **given: np.array(embedded(q, **given)[:free, :free])
-        ),
-        "bias": DerivedTimed("bias", lambda x, t, **given: np.array(bias(t, x, **given)[:n])),
-        "constraint_jacobian": Rows(every, layout.rows, n),
-        "inverse_dynamics": DerivedMotion("inverse_dynamics", find_inverse),
+        return kernels.kernel(name, False, "rows", every[rows[rows < len(every)]], choose)
+    mechanical: dict[str, Any] = {
+        "mass_matrix": np.s_[:n, :n],
+        "embedded_mass_matrix": np.s_[:free, :free],
+        "bias": np.s_[:n],
     }
+    if layout.n_states and name in mechanical:
+        return kernels.kernel(name, pick=_places(layout.shape(name))[mechanical[name]])
+    return kernels.kernel(name)
+
+
+def _differentiated(kernels: Kernels, wrt: Any) -> Call | None:
+    """The Jacobian by something else than the state."""
+    if wrt is None or (isinstance(wrt, str) and wrt == "x"):
+        return None
+    if not isinstance(wrt, str) or wrt not in ("u", "p"):
+        raise ill_shaped(f"wrt must be 'x' (the state), 'u' (the inputs) or 'p' (the parameters), not {wrt!r}")
+    return kernels.derivative("input_jacobian" if wrt == "u" else "parameter_jacobian")
+
+
+def _mechanical_forces(kernels: Kernels, q: Any, v: Any, a: Any, **given: Any) -> Array:
+    """The inverse dynamics of a model with first-order states, whose rates may be left out."""
+    layout, states, rates = kernels.layout, read_numbers("v", v), read_numbers("a", a)
+    if states.shape[:1] != (layout.n_v,):
+        raise ill_shaped(
+            f"inverse_dynamics of a model with first-order states takes v = [v; s], ({layout.n_v},) or "
+            f"({layout.n_v}, k), not {states.shape}: forces depend on the states {', '.join(layout.states)}, which "
+            "come after the velocities"
+        )
+    if rates.shape[:1] == (layout.moving,):
+        rates = np.concatenate([rates, np.zeros((layout.n_states, *rates.shape[1:]))])
+    return np.array(kernels.inverse_dynamics(q, states, rates, **given)[: layout.moving])
+
+
+#: Sums over all bodies, in ground axes, which are parts of the kernel ``centroidal``.
+PARTS = ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
+
+
+def _centroidal(kernels: Kernels, name: str) -> Call:
+    layout, whole, n_v = kernels.layout, kernels.centroidal, kernels.layout.n_v
+    places: tuple[tuple[int, tuple[int, ...]], ...]
+    places = (0, (3,)), (3, (3, n_v)), (3 + 3 * n_v, (6,)), (9 + 3 * n_v, (3, 3))
+    (start, shape), rates = places[PARTS.index(name)], name == "momentum"
+    n = layout.n_x if rates else layout.n_q
+
+    def find(x: Any, **given: Any) -> Array:
+        if layout.n_com == 0:  # the model has no bodies, or none with a mass
+            raise UsageError(f"model {layout.name!r} has no {name}: no body of it has a mass", code="EG-NO-INERTIA")
+        state = read_numbers("x", x)
+        if state.shape[:1] != (n,) or state.ndim > 2:
+            raise ill_shaped(f"{'x' if rates else 'q'} must have shape ({n},) or ({n}, k), not {state.shape}")
+        full = np.concatenate([state, np.zeros((layout.n_x - n, *state.shape[1:]))])
+        found = whole(full, **given)[start : start + prod(shape)]
+        return np.array(found.reshape(shape + state.shape[1:]))
+
+    return kernels.derived(name, "state", find)
 
 
 # -- constraints -------------------------------------------------------------------------------------------------------
@@ -347,12 +337,12 @@ def mechanical(kernels: Kernels) -> dict[str, Any]:
 def constraint_system(kernels: Kernels) -> ConstraintSystem:
     """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
     layout = kernels.layout
-    C = kernels.state("constraints", nan=True)
+    C = kernels.kernel("constraints", nan=True)
     slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
-    C_q, none = kernels.state(slopes, nan=True), np.zeros((0, layout.n_q))
+    C_q, none = kernels.kernel(slopes, nan=True), np.zeros((0, layout.n_q))
     places = layout.n_h or not layout.given_rates  # rows of given velocities alone say nothing of q
-    y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
-    alignment, zero = kernels.state("alignment", nan=True), np.zeros(layout.n_v)
+    y, y_q = kernels.loop_coordinates, kernels.kernel("loop_coordinate_jacobian", nan=True)
+    alignment, zero = kernels.kernel("alignment", nan=True), np.zeros(layout.n_v)
 
     def cut(q: Array, t: float) -> tuple[Array, Array]:
         return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)

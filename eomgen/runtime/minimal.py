@@ -18,8 +18,7 @@ from ..base.limits.analyses import FOLLOWED
 from ..base.numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
 from ..base.numeric.projection import largest
 from ..errors import EvaluationError, PartitionError, ProjectionError, at_odds, ill_shaped, no_number, too_large
-from .argument_checks import read_number, read_numbers
-from .argument_names import both_names
+from .argument_checks import both_names, read_number, read_numbers
 from .failure import place
 from .kernels import Kernels
 from .layout import Layout
@@ -89,7 +88,7 @@ class DependentMotion:
         self.layout = layout = kernels.layout
         self.fail = kernels.fail
         if layout.rank:
-            self.kernel = kernels.state("kinematics", nan=True)
+            self.kernel = kernels.kernel("kinematics", nan=True)
         self.scales_i = layout.scales.q[layout.independent_moving]
 
     def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:

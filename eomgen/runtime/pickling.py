@@ -18,7 +18,7 @@ from ..base.algebra import Array
 from ..base.files import MANIFEST, find_module, load_source, read_entry, read_trusted, require_trusted
 from ..base.kernel_table import NAMED
 from ..errors import ToolchainError, cannot
-from .late import LateCore, eager
+from .kernels import LateCore, eager
 
 #: Names of all kernels of a module that makes some of them late, and of those made the name and file of the code.
 Late = tuple[tuple[str, ...], dict[str, tuple[str, str]]]

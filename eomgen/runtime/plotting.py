@@ -383,8 +383,8 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
         raise cannot(f"model {module.name!r} has no constraints, so there are no residuals")
     t, x = trajectory.t, trajectory.x
     u = trajectory.to_numpy(*module.u_names) if module.u_names else None
-    position = np.abs(module.constraints.every(x[: module.n_q], t=t, u=u)).max(axis=0, initial=0.0)
-    velocity = np.abs(module.kernels.state("velocity_constraints")(x, t=t, u=u)).max(axis=0, initial=0.0)
+    position = np.abs(module.kernels.constraints(x[: module.n_q], t=t, u=u)).max(axis=0, initial=0.0)
+    velocity = np.abs(module.kernels.velocity_constraints(x, t=t, u=u)).max(axis=0, initial=0.0)
     panels = []
     for name, found, raw in (
         ("residual (m, rad)", position, trajectory.residuals.raw_position),

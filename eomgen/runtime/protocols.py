@@ -13,10 +13,16 @@ from ..base.algebra import Array
 Given: TypeAlias = ArrayLike | Mapping[str, Any] | None
 
 
-class Timed(Protocol):
-    """A kernel of time and state; ``jacobian`` by the state, ``wrt="u"`` or ``wrt="p"``."""
+class Call(Protocol):
+    """A kernel of any arguments."""
 
     failure: tuple[int, float, Array] | None  #: with NaN for failures: (status, t, x) of the last one
+
+    def __call__(self, *args: Any, **given: Any) -> Array: ...
+
+
+class Timed(Protocol):
+    """A kernel of time and state; ``jacobian`` by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     def __call__(
         self,
@@ -35,8 +41,6 @@ class Timed(Protocol):
 class State(Protocol):
     """A kernel of the state, or of the coordinates, alone."""
 
-    failure: tuple[int, float, Array] | None
-
     def __call__(
         self,
         x: ArrayLike,
@@ -44,6 +48,39 @@ class State(Protocol):
         u: Given = None,
         out: Array | None = None,
         t: ArrayLike = 0.0,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
+    ) -> Array: ...
+
+
+class Projection(Protocol):
+    """The projection, whose second argument is the time: the constraints of drivers move with it."""
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        t: ArrayLike = 0.0,
+        p: Given = None,
+        u: Given = None,
+        out: Array | None = None,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
+    ) -> Array: ...
+
+
+class Rows(Protocol):
+    """Constraints, their Jacobian or rates: of the independent rows, or of all with ``rows="all"``."""
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        p: Given = None,
+        u: Given = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+        rows: str = "independent",
         *,
         parameters: Given = None,
         inputs: Given = None,
@@ -108,15 +145,7 @@ class Core(Protocol):
     run: Any
 
     def context(self, p: Any = None, u: Any = None, error: Callable[[str], Exception] = ValueError) -> Any: ...
-    def timed(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
-    def state(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
-    def motion(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
+    def kernel(self, name: str, context: Any, shape: tuple[int, ...], fail: Any, *options: Any, **more: Any) -> Any: ...
     def __hash__(self) -> int: ...
 
 

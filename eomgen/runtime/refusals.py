@@ -93,12 +93,7 @@ EXCLUDED: dict[str, tuple[str, ...]] = {
 
 
 def require_support(layout: Layout, call: str, name: str = "") -> None:
-    """Refuse a model of a kind that the table excludes from a call, which may go by another name in the message.
-
-    Raises
-    ------
-    UnavailableError
-    """
+    """Refuse a model of a kind that the table excludes from a call, which may go by another name in the message."""
     for kind in EXCLUDED[call]:
         if names := KINDS[kind].names(layout):
             told = KINDS[kind].message.format(call=name or call, model=layout.name, names=", ".join(names))
@@ -106,12 +101,7 @@ def require_support(layout: Layout, call: str, name: str = "") -> None:
 
 
 def require_switched(layout: Layout, states: Array) -> None:
-    """Refuse first-order states (n_s,) that are neither 0 nor 1 where they say whether a constraint is closed.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse first-order states (n_s,) that are neither 0 nor 1 where they say whether a constraint is closed."""
     given = dict(zip(layout.states, states, strict=True))
     for name, state in layout.switches.items():
         if (value := given[state]) not in (0.0, 1.0):
@@ -140,12 +130,7 @@ def refuse_closed(layout: Layout, states: Array, what: str) -> None:
 
 
 def refuse_moreau(method: object, what: str) -> None:
-    """Refuse the method for rigid contact where only integrators run.
-
-    Raises
-    ------
-    UnavailableError
-    """
+    """Refuse the method for rigid contact where only integrators run."""
     if isinstance(method, str) and method == "moreau":
         raise UnavailableError(
             f"{what} has no method moreau, which takes contacts as rigid: run by simulate with method='moreau' and "

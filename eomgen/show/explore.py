@@ -69,7 +69,7 @@ class Explorer:
 
     def _is_driven(self) -> bool:
         """Whether time moves the constraints."""
-        every = self.module.constraints.every
+        every = self.module.kernels.constraints
         return bool(np.abs(every(self.q, t=TRIED * self._end() / 3.0) - every(self.q, t=0.0)).max(initial=0.0) > SAME)
 
     def _moved(self) -> dict[str, int]:
@@ -108,7 +108,7 @@ class Explorer:
         q, first = self.q, self.module
         if np.abs(changed.poses(q) - first.poses(q)).max(initial=0.0) > SAME:
             return True
-        if np.abs(changed.constraints.every(q) - first.constraints.every(q)).max(initial=0.0) > SAME * self._size:
+        if np.abs(changed.kernels.constraints(q) - first.kernels.constraints(q)).max(initial=0.0) > SAME * self._size:
             return True
         scenes = [build_scene(one, q[:, None], names=False).items for one in (changed, first)]
         pairs = zip(*scenes, strict=False)

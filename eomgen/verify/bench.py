@@ -78,8 +78,10 @@ class Bench:
         kernels, given = self.module.kernels, {"p": case.p, "u": case.u}
         takes = NAMED[kernel].inputs
         if takes == ("q", "v", "a"):
-            return np.asarray(kernels.motion(kernel)(case.q, case.v, case.a, **given, t=case.t))
-        return np.asarray(kernels.state(kernel)(case.q if takes == ("q",) else case.x, **given, t=case.t))
+            return np.asarray(kernels.kernel(kernel)(case.q, case.v, case.a, **given, t=case.t))
+        return np.asarray(
+            kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **given, t=case.t)
+        )
 
     def rhs(self, case: Case) -> Array:
         """x'."""

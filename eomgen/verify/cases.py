@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
+from ..base.kernel_table import TIMED
 from ..base.limits.analyses import BUILDS, CLOSED, REGULAR, SPREAD_OF_ROUNDING, ZERO
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
@@ -154,9 +155,9 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     rate = np.abs(module.velocity_constraints(x, p=p, u=u, t=t, rows="all"))
     if residual.max(initial=0.0) > CLOSED or rate.max(initial=0.0) > CLOSED * (1.0 + np.abs(x).max()):
         return False
-    if layout.n_alignments and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
+    if layout.n_alignments and not (module.kernels.alignment(q, p=p, u=u, t=t) > 0.0).all():
         return False
-    J = scales.jacobian(module.kernels.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
+    J = scales.jacobian(module.kernels.constraint_jacobian(q, p=p, u=u, t=t))
     values = algebra.singular_values(J)
     rank = module.layout.n_v - module.layout.n_dof
     return bool(values[rank - 1] > REGULAR * values[0]) if rank and rank <= len(values) else True
@@ -188,7 +189,6 @@ CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
     "momentum": lambda c: (c.x,),
     "project": lambda c: (c.x,),
 }
-TIMED = ("rhs", "jacobian", "outputs", "bias")  #: take t first; the others by name
 
 
 def record_calls(name: str, module: BoundModel | None) -> str:

@@ -108,9 +108,7 @@ def _joints(bench: Bench) -> Finding:
                 flat = [*plain.position, *(x for row in plain.rotation for x in row)]
                 gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
                 labels += [f"{spec.name} {what}" for what in PARTS]
-        C = bench.module.kernels.constraint_jacobian(
-            truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all"
-        )
+        C = bench.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, bench.layout.length)
         rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
@@ -429,7 +427,7 @@ def _limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray, size: np.nd
     """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
     case, module = truth.case, bench.module
     loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
     exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
     slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
     grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)

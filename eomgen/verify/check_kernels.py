@@ -46,11 +46,11 @@ def _derived(bench: Bench) -> list[Finding]:
         outputs = Comparison("outputs: at the accelerations of the motion")
         for k, case in enumerate(bench.cases):
             a = bench.rhs(case)[module.n_q :]
-            expected = module.kernels.motion("motion_outputs")(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
+            expected = module.kernels.motion_outputs(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
             actual = module.outputs(case.t, case.x, p=case.p, u=case.u)
             bound = bench.bounds("motion_outputs", lambda: bench.terms.outputs)[1][:, k]
-            slope = module.kernels.motion("output_derivatives")(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
-            C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+            slope = module.kernels.output_derivatives(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
+            C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
             shift, n = bench.shift(k, C), module.n_x
             limit = (
                 2.0 * bound
@@ -77,7 +77,7 @@ def _batches(bench: Bench) -> Finding:
             continue
         outputs = list(bench.graph_kernels[name]())
         bounds = bounded(outputs, symbols, COLUMNS)[1]
-        kernel = module.kernels.state(name)
+        kernel = module.kernels.kernel(name, kind="state")
         states = x if KERNEL_STATES[name] == "x" else q
         batch = np.asarray(kernel(states, p=case.p, u=case.u, t=case.t)).reshape(-1, COLUMNS)
         for k in range(COLUMNS):
@@ -246,7 +246,7 @@ def accelerations(bench: Bench, truth: Truth, values: Values) -> Numbers:
 def _condition(bench: Bench, case: Case) -> float:
     """Condition of the system of accelerations and multipliers, rows and columns of like size."""
     module = bench.module
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
     M, m = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t), len(C)
     d = 1.0 / np.sqrt(np.maximum(np.diag(M), TINY + EPS * size_of(np.diag(M))))
     M, C = M * d * d[:, None], C * d
@@ -257,7 +257,7 @@ def _condition(bench: Bench, case: Case) -> float:
 def _tangent(bench: Bench, truth: Truth, rng: np.random.Generator) -> tuple[Array, Array]:
     """A random displacement w (n_v,) and change of velocity (n_v,) along the constraints."""
     case, module, n = truth.case, bench.module, bench.layout.n_v
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
     back = algebra.pinv(C) if len(C) else np.zeros((n, 0))
     free = np.eye(n) - back @ C if len(C) else np.eye(n)
     sizes = module.layout.scales.q
@@ -299,7 +299,7 @@ def _along(bench: Bench) -> Finding:
         case = truth.case
         J = bench.module.jacobian(case.t, case.x, p=case.p, u=case.u)
         condition = _condition(bench, case) * bench.dependence(
-            bench.module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+            bench.module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
         )
         # where terms of the forces cancel, their slopes do too
         exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
@@ -335,7 +335,9 @@ def _noise(bench: Bench, k: int) -> Array:
     """By how much rounding may move x' (n_x,)."""
     truth, layout = bench.truths[k], bench.layout
     a, multipliers = (numbers(x) for x in truth.solve(list(layout.rows)))
-    C = bench.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
+    C = bench.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)[
+        layout.rows
+    ]
     rates = np.abs(bench.slopes(truth.case))[: layout.n_q] @ bench.shift(k, C)
     return np.concatenate([rates, bench.acceleration_limit(k, a, multipliers)])
 

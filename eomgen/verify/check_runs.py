@@ -84,7 +84,7 @@ def _kinked(bench: Bench) -> bool:
 
 
 def _methods(bench: Bench) -> tuple[str, ...]:
-    from ..runtime.late import eager
+    from ..runtime.kernels import eager
 
     return (*eager(bench.module.core).methods, "RK4")
 

@@ -51,7 +51,7 @@ def _mass(module: BoundModel, c: Case) -> Array:
 
 
 def _jacobian(module: BoundModel, c: Case) -> Array:
-    return module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)
+    return module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[module.layout.rows]
 
 
 def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
@@ -107,7 +107,7 @@ def _slopes(module: BoundModel, cases: Sequence[Case]) -> Finding:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     found, n_h = Comparison(check), module.layout.n_h
     for c in cases:
-        C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t, rows="all")[:n_h]
+        C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[:n_h]
         for j, scale in enumerate(module.layout.scales.q):
             way = _rates(module, c.q, np.eye(module.layout.n_v)[j]) * scale
             slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))

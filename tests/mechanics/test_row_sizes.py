@@ -237,7 +237,7 @@ def rocker(unit: float, target: str, beside: bool) -> tuple[np.ndarray, float]:
         four_bar(m, m.ground, 1e4 * unit, 1e-6, "large")
     mod = m.compile(target=target)
     run = mod.simulate((0, 2), rtol=1e-10, atol=1e-13, t_eval=np.linspace(0, 2, 5))
-    gaps = mod.constraints.every(run.x[: mod.n_q])
+    gaps = mod.kernels.constraints(run.x[: mod.n_q])
     small = [k for k, label in enumerate(mod.constraint_labels) if "_small" in label]
     assert len(small) == 2
     return run["psi_small"], float(np.abs(gaps[small]).max())

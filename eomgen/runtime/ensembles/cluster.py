@@ -17,11 +17,10 @@ from ...base.files import MANIFEST, read_entry
 from ...base.value_rules import as_count
 from ...errors import MissingDependencyError, ToolchainError, UsageError, bad_file, cannot, ill_typed
 from ..argument_checks import require
-from ..late import eager
+from ..kernels import eager
 from ..pickling import processor_features, restore
-from .block import LOST, MEANING, Plan, RunBlock, Runs, run_block
+from .block import LOST, MEANING, Custom, Kept, Plan, Reduction, RunBlock, Runs, keep, run_block
 from .given_cases import Cases
-from .run_blocks import Custom, Kept, Reduction, keep
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

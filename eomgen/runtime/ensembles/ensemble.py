@@ -21,8 +21,7 @@ from ..argument_checks import require, unknown
 from ..identity import origin, plain, spell_input
 from ..runs.simulate import simulate
 from ..storage import attributes, free, table_path
-from .block import EVENT, MEANING, Runs
-from .run_blocks import Custom, Reduction, Statistics, summarise
+from .block import EVENT, MEANING, Custom, Reduction, Runs, Statistics, summarise
 
 if TYPE_CHECKING:
     import pandas

@@ -19,10 +19,10 @@ from ...errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shape
 from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
 from ..initial import Initial
 from ..kernels import Kernels
+from ..layout import silent, values_at, warn_of_fixed
 from ..refusals import require_switched
 from ..runs.events import at_next_samples, require_agreement
 from ..runs.run_arguments import find_state
-from ..start_values import silent, values_at, warn_of_fixed
 from ..trajectory import last_state
 
 if TYPE_CHECKING:

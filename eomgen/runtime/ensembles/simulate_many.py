@@ -31,10 +31,24 @@ from ..runs.run_arguments import (
     own_step,
 )
 from ..trajectory import Span
-from .block import LOST, Plan, Runs, run_block
+from .block import (
+    GRAIN,
+    LOST,
+    RUNS,
+    Kept,
+    Plan,
+    Reduction,
+    Runs,
+    Store,
+    choose_reduction,
+    choose_size,
+    keep,
+    run_block,
+    split,
+    stored_length,
+)
 from .ensemble import Ensemble
 from .given_cases import collect_cases, grid_axes, spread_grid
-from .run_blocks import GRAIN, RUNS, Kept, Reduction, Store, choose_reduction, choose_size, keep, split, stored_length
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

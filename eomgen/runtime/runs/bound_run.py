@@ -34,7 +34,7 @@ from ..inputs import Forcing
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
-    from ..protocols import Timed
+    from ..protocols import Call
 
 # -- progress ----------------------------------------------------------------------------------------------------------
 
@@ -377,14 +377,14 @@ class Run:
     def __init__(self, module: BoundModel, forcing: Forcing) -> None:
         self.module = module
         self.forcing = forcing
-        self.tangent: Timed | None = None
+        self.tangent: Call | None = None
         self.last: tuple[str, int, float, Array] | None = None
         self.sparse: bool | None = False  #: whether solvers get sparse Jacobians; None: where the first is worth it
 
     @cached_property
-    def kernel(self) -> Timed:
+    def kernel(self) -> Call:
         """The right-hand side."""
-        return self.module.kernels.timed("rhs", nan=True)
+        return self.module.kernels.kernel("rhs", nan=True)
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""
@@ -420,7 +420,7 @@ class Run:
         """Take note of further steps."""
         self.stall_check.look(t, x, steps)
 
-    def remember(self, name: str, kernel: Timed) -> None:
+    def remember(self, name: str, kernel: Call) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
         if kernel.failure is not None and (self.last is None or np.isfinite(kernel.failure[2]).all()):
             self.last = (name, *kernel.failure)
@@ -429,7 +429,7 @@ class Run:
     def jacobian(self, t: float, x: Array) -> Any:
         """d(x')/dx, inputs that depend on the state included; one of SciPy's sparse matrices where that is chosen."""
         if self.tangent is None:
-            self.tangent = self.module.kernels.timed("jacobian", nan=True)
+            self.tangent = self.module.kernels.kernel("jacobian", nan=True)
         J = self.tangent(t, x, u=self.forcing(t, x)) if self.forcing else self.tangent(t, x)
         self.remember("jacobian", self.tangent)
         extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)

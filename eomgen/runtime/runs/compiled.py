@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.algebra import Array
 from ...base.limits.runs import SCIPY_ATOL, SCIPY_RTOL
-from ...errors import UnavailableError, UsageError, cannot, ill_shaped
+from ...errors import UnavailableError, cannot, ill_shaped
 from ..argument_checks import check_names, fitting, read_plain, read_vector, require
 from ..inputs import Forcing
-from ..late import eager
+from ..kernels import eager
 from ..refusals import require_support
 from .events import Events
 from .integrate import require_one
-from .run_arguments import IMPLICIT, check_tolerances, declare, longest_step, own_step
+from .run_arguments import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -84,62 +84,6 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
     return {"rtol": require_one(given["rtol"]), "atol": atol, **limits}
 
 
-# -- arguments of plain runs -------------------------------------------------------------------------------------------
-
-# A run over a given span takes them from here, unless it has inputs, events, steps or options of its own.
-
-
-MANY = 16  #: sets of arguments that are kept for a module
-SIMPLE = frozenset((str, float, type(None)))  #: types of the arguments by which a run is found again
-
-
-class Settled(NamedTuple):
-    """What holds for every run with the same arguments; none of it is changed by a run."""
-
-    forcing: Forcing  #: of no inputs, with the module's own values
-    watched: Events
-    title: str  #: the method
-    end: float  #: by default (s)
-    settings: dict[str, Any]  #: rtol and atol, checked
-    shared: bool  #: whether runs that bind no values change nothing of the forcing: no rates, no sampled states
-
-
-def settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
-    """What holds for a run in compiled code without inputs; None where the arguments must be read one by one."""
-    key = (method, rtol, atol)
-    if not ((method is None and rtol is None and atol is None) or SIMPLE.issuperset(map(type, key))):
-        return None
-    known = module._settled
-    if key in known:
-        found: Settled | None = known[key]
-        return found
-    try:
-        found = _settle(module, method, rtol, atol)
-    except UsageError:  # told where the arguments are read
-        return None
-    if len(known) >= MANY:
-        known.clear()
-    known[key] = found
-    return found
-
-
-def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
-    named, step = own_step(module, method, None)
-    unusual = step is not None or "rigid_only" in module.metadata or "contact_shapes" in module.metadata
-    if unusual or named in ("kinematic", "moreau", "RK4") or (named is None and not module.layout.n_dof):
-        return None
-    declared = declare(module)
-    title = declared["method"] if method is None else method
-    forcing = Forcing(module.layout, None)
-    if forcing.values or title == "RK4" or longest_step(module, title) or not can_run(module, title, forcing):
-        return None
-    forcing.attach(module)
-    given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}
-    settings = check_tolerances(module.n_x, float("inf"), given)
-    shared = not (module.layout.input_rates or module.metadata.get("clocks") or module.layout.switches)
-    return Settled(forcing, Events(module.layout, None), str(title), float(declared["end"]), settings, shared)
-
-
 # -- classes of solvers ------------------------------------------------------------------------------------------------
 
 
@@ -176,15 +120,15 @@ def solver_class(core: Any, name: str) -> Any:
     """
     scipy = require("scipy.integrate", "scipy", f"method {name}")
     own: Any = getattr(scipy, name, _only_for_modules)
-    rhs = core.timed
+    kernel = core.kernel
 
     class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
         """A compiled stepper."""
 
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
             jac = options.get("jac")
-            known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
-            mine = isinstance(fun, rhs) and fun.name == "rhs" and fun.context.model is core
+            known = jac is None or (isinstance(jac, kernel) and jac.name == "jacobian" and jac.context is fun.context)
+            mine = isinstance(fun, kernel) and fun.name == "rhs" and fun.context.model is core
             if mine and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
             if callable(jac):

@@ -312,7 +312,7 @@ def at_next_samples(
         require_agreement(module, t, x, initial)
     if not clocks:
         return x
-    values = module.kernels.timed("events")
+    values = module.kernels.events
     found = np.array(x, dtype=float)
     for clock in clocks:
         event, place = int(clock["event"]), int(clock["counter"])
@@ -359,10 +359,6 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
     """Refuse a run backwards in time of a model with sampled states, or with constraints that close and open.
 
     What they were before a sample, and the velocities before an impact, are not known.
-
-    Raises
-    ------
-    UsageError
     """
     clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
     if clocks and end < start:
@@ -398,7 +394,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
         or "held_errors" not in module.kernels.core.names
     ):
         return
-    found = module.kernels.timed("held_errors")(t, x)
+    found = module.kernels.held_errors(t, x)
     fast = max(1.0, layout.scales.speed(x[layout.n_q :]))
     for k, (label, state, kind) in enumerate(rows):
         size, unit = (layout.length, "m") if kind == "length" else (1.0, "rad")

@@ -69,10 +69,10 @@ class DrivenCoordinates:
         self.scales = layout.scales
         kernels = module.kernels
         self.system: ConstraintSystem = constraint_system(kernels)
-        self._rate = kernels.state("velocity_constraints", nan=True)
+        self._rate = kernels.kernel("velocity_constraints", nan=True)
         known = layout.rank and "kinematics" in kernels.core.names
-        self._kinematics = kernels.state("kinematics", nan=True) if known else None
-        self._loops = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        self._kinematics = kernels.kernel("kinematics", nan=True) if known else None
+        self._loops = kernels.loop_coordinates if layout.n_loop_coordinates else None
         chosen = [layout.velocity_labels[i] for i in layout.independent]
         #: whether the compiled kernel leads the same coordinates
         self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)

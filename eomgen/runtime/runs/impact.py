@@ -35,7 +35,7 @@ from ...errors import (
 from ..argument_checks import read_flag, read_number, read_numbers, without_dots
 from ..constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers, with_closed_rows
 from ..inputs import derive, drift, moving_inputs, rate_pairs
-from ..late import eager
+from ..kernels import eager
 from ..layout import Layout
 from ..tapes import Expression
 from .impact_equations import Sliding, collide, require_distances, strike
@@ -71,7 +71,7 @@ class Gaps:
 
     def _kernel(self, name: str) -> Any:
         if name not in self._kernels:
-            self._kernels[name] = self.module.kernels.motion(name)
+            self._kernels[name] = self.module.kernels.kernel(name)
         return self._kernels[name]
 
     def inputs(self, t: float, x: Array) -> Array | None:
@@ -110,7 +110,7 @@ class Gaps:
         for i, _ in self.tree:
             rows[i, layout.velocity_labels.index(self.names[i])] = 1.0
         if self.loops:
-            every = self.module.kernels.state("loop_coordinate_jacobian")(q, t=t, u=u)
+            every = self.module.kernels.loop_coordinate_jacobian(q, t=t, u=u)
             for i, j in self.loops:
                 rows[i] = every[j]
         if self.outputs:
@@ -342,8 +342,8 @@ def find_sliding(
     outputs = any(name in layout.y for name in names)
     slopes, rest, values = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
     if outputs:
-        slopes, rest = (module.kernels.motion("output_derivatives")(q, w, still, t=t) for w in (v, still))
-        values = module.kernels.motion("motion_outputs")(q, v, still, t=t)
+        slopes, rest = (module.kernels.output_derivatives(q, w, still, t=t) for w in (v, still))
+        values = module.kernels.motion_outputs(q, v, still, t=t)
     for k, name in enumerate(names):
         j = layout.y.index(name) if name in layout.y else -1
         if j < 0 or not (_is_velocity(layout, name) or slopes[j, n_q : layout.n_x].any()):  # a place, whose rate it is
@@ -516,7 +516,7 @@ def describe_negative_gaps(
     module: BoundModel, t: float, x: Array, events: Sequence[Mapping[str, Any]], forcing: Forcing
 ) -> str:
     """Says which gaps of a model's events are negative where a run begins, where bodies go on through each other."""
-    values = module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x) if forcing else None)
+    values = module.kernels.kernel("events", nan=True)(t, x, u=forcing(t, x) if forcing else None)
     limit = BEYOND * max(1.0, module.layout.length)
     found = [
         f"{event['name']} is {value:.6g}"
@@ -560,7 +560,7 @@ def strike_events(
     """
     layout, u = module.layout, forcing(t, x)
     module = module.bind(None, u)
-    kernel = module.kernels.timed("events", nan=True)
+    kernel = module.kernels.kernel("events", nan=True)
     values = kernel(t, x, u=u)
     near = TOUCHING * max(1.0, layout.length)
     gaps = {
@@ -639,7 +639,7 @@ def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
         if name in layout.velocity_labels:
             rows[i, layout.velocity_labels.index(name)] = 1.0
         else:
-            every = states.evaluate(states.module.kernels.state("loop_coordinate_jacobian"), states.q)
+            every = states.evaluate(states.module.kernels.loop_coordinate_jacobian, states.q)
             rows[i] = every[layout.loops.index(name), :, 0]
     return rows
 

@@ -467,12 +467,7 @@ def _together(
 def require_distances(
     module: BoundModel, t: float, q: Array, normals: Array, names: Sequence[str], sliding: Sliding
 ) -> None:
-    """Refuse gaps with friction whose derivatives (n, n_v) by velocities are not those of distances.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse gaps with friction whose derivatives (n, n_v) by velocities are not those of distances."""
     layout = module.layout
     joints = layout.metadata.get("translations", ())
     rubs = np.flatnonzero(sliding.coefficients[sliding.owner] > 0.0)

@@ -20,7 +20,7 @@ from ..refusals import require_support
 from ..trajectory import Span, Start, Trajectory
 from .events import WAIT, Events, RunEvent
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
-from .recording import header_of
+from .integrate import header_of
 from .run_arguments import find_state, set_up
 from .simulate import simulate
 

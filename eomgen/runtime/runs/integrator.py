@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from ...base.algebra import Array
 from ...errors import EvaluationError, SimulationError, UsageError, cannot, ill_shaped, no_number, off_range
-from ..argument_checks import check_names, read_plain, read_vector, require_steps
-from ..argument_names import both_names
+from ..argument_checks import both_names, check_names, read_plain, read_vector, require_steps
 from ..inputs import Forcing
-from ..late import eager
+from ..kernels import eager
 from ..refusals import refuse_moreau, require_support
 from .bound_run import Crawling, Run, StallCheck
 from .compiled import can_run, stepper_options

@@ -40,8 +40,7 @@ from ..refusals import require_support
 from ..trajectory import Span, Start, Trajectory, last_state
 from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
-from .integrate import integrate
-from .recording import header_of
+from .integrate import header_of, integrate
 from .run_arguments import ordered_times, set_up
 
 if TYPE_CHECKING:
@@ -78,15 +77,15 @@ class MotionColumns(Columns):
     def _outputs(self) -> Array:
         module, n_q = self.module, self.module.n_q
         if not module.metadata.get("output_accelerations", True):
-            kernel = module.kernels.timed("outputs", nan=True)
+            kernel = module.kernels.kernel("outputs", nan=True)
             return kernel(self.t, self.x, u=self._varying())
-        motion = module.kernels.motion("motion_outputs")
+        motion = module.kernels.motion_outputs
         return motion(self.x[:n_q], self.x[n_q:], self.a, u=self._varying(), t=self.t)
 
     @cached_property
     def energies(self) -> Array:
         """Kinetic, potential and total energy (3, n_t)."""
-        T, V = self.module.kernels.state("energy", nan=True)(self.x, u=self._varying(), t=self.t)
+        T, V = self.module.kernels.kernel("energy", nan=True)(self.x, u=self._varying(), t=self.t)
         return np.array([T, V, T + V])
 
 
@@ -212,9 +211,9 @@ def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
     n = module.n_q
     if not module.n_rows or not t.size:
         return Residuals()
-    position = largest(module.constraints.every(x[:n], t=t))
+    position = largest(module.kernels.constraints(x[:n], t=t))
     fine = np.isfinite(x).all(axis=0)
-    rate = module.kernels.state("velocity_constraints")(x[:, fine], t=t[fine]) if fine.any() else np.empty(0)
+    rate = module.kernels.velocity_constraints(x[:, fine], t=t[fine]) if fine.any() else np.empty(0)
     return Residuals(position, largest(rate), position, largest(rate))
 
 

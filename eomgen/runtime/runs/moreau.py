@@ -57,14 +57,12 @@ from ...errors import (
 from ..argument_checks import check_names, read_number, require_room, require_steps, unknown
 from ..columns import Columns
 from ..inputs import Forcing
-from ..late import LateCore, eager
+from ..kernels import LateCore, eager
 from ..trajectory import Span, Start, Trajectory
 from .bound_run import watch_run
 from .events import Events, is_told_by_the_caller
-from .integrate import Solution
-from .meetings import deep_start
-from .recording import record
-from .run_arguments import check_step, find_state, ordered_times, set_up
+from .integrate import Solution, record
+from .run_arguments import check_step, deep_start, find_state, ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -370,7 +368,7 @@ class RigidSteps:
             core: Any = kernels.core
             if name not in core.names:
                 if name != "meeting_time" and 0 not in layout.shape(name):
-                    kernels.timed(name)(0.0, np.zeros(layout.n_x))  # refuses
+                    raise kernels.missing(name)
                 continue
             core = core.having(name) if isinstance(core, LateCore) and name not in core.core.names else eager(core)
             context = bound if core is eager(self.module.core) else core.context(bound.p, bound.u, UsageError)
@@ -542,12 +540,7 @@ def _between(times: Array, states: Array, wanted: Array) -> Array:
 
 
 def _require_no_others(module: BoundModel, events: Any) -> None:
-    """Refuse what steps of one size do not see.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse what steps of one size do not see."""
     if events is not None:
         raise cannot("method moreau watches no events; run without events=, or by another method")
     if module.layout.reaction_laws:
@@ -565,12 +558,7 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
 
 
 def _require_it(module: BoundModel, method: Any) -> None:
-    """Refuse another method for a model with rigid contacts.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse another method for a model with rigid contacts."""
     if not isinstance(method, str) or method != NAME:
         names = module.metadata["rigid_only"]
         told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"

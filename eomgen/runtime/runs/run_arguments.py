@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -12,13 +13,24 @@ from numpy.typing import ArrayLike
 from ...base import algebra
 from ...base.algebra import Array
 from ...base.limits.constraints import ALIKE
-from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL
+from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SUNK
 from ...base.texts import shown
-from ...errors import AssemblyError, ill_shaped, ill_typed, incomplete, no_choice, no_number, off_range
+from ...errors import (
+    AssemblyError,
+    EvaluationError,
+    calls_within,
+    ill_shaped,
+    ill_typed,
+    incomplete,
+    no_choice,
+    no_number,
+    off_range,
+)
 from ..argument_checks import as_real, read_flag, read_number, read_numbers, read_times, unknown
 from ..initial import Initial
 from ..inputs import Forcing
 from ..trajectory import Span, Start, last_state
+from .events import at_next_samples, is_told_by_the_caller
 from .integrate import NAMES
 
 if TYPE_CHECKING:
@@ -85,9 +97,6 @@ def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callab
     )
 
 
-# -- arguments ---------------------------------------------------------------------------------------------------------
-
-
 # -- tolerances and limits of steps ------------------------------------------------------------------------------------
 
 
@@ -133,9 +142,14 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
         checked["min_step"] = read_number("min_step", checked["min_step"])
         if checked["min_step"] < 0.0:
             raise off_range(f"min_step must not be negative, not {checked['min_step']:.6g}")
-    if checked.get("first_step", 0.0) > span:
-        raise off_range(f"first_step must not exceed the span of {span:.6g} s, not {checked['first_step']:.6g}")
+    check_first_step(checked, span)
     return checked
+
+
+def check_first_step(options: Mapping[str, Any], span: float) -> None:
+    """Refuse a first step that is longer than the run (s)."""
+    if options.get("first_step", 0.0) > span:
+        raise off_range(f"first_step must not exceed the span of {span:.6g} s, not {options['first_step']:.6g}")
 
 
 def _tolerance(name: str, given: Any, n: int) -> Any:
@@ -256,8 +270,6 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
         The loops do not close, or the inputs on which they depend change with the state that they give.
     """
     if module.metadata.get("clocks") or module.layout.switches:
-        from .events import at_next_samples
-
         span = None if forcing is None else forcing.span
         return at_next_samples(module, t, _find_state(module, initial, t, forcing), span, initial)
     return _find_state(module, initial, t, forcing)
@@ -278,3 +290,39 @@ def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing |
     if module.layout.rank:
         Initial(module.kernels, t).on_branch(x[: module.n_q], x[module.n_q :], module.layout.v)
     return x
+
+
+# -- shapes that are deep in each other at the start -------------------------------------------------------------------
+
+
+class PenetrationWarning(UserWarning):
+    """A run starts with shapes of contacts deep in each other, which stiff contacts drive apart at high speed."""
+
+
+def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
+    """The two shapes of contacts between groups that are deepest in each other, if they are deeper than they should."""
+    if "meeting_time" not in module.kernels.core.names:
+        return None
+    q, v = np.array(x[: module.n_q]), np.array(x[module.n_q :])
+    try:
+        found = module.kernels.meeting_time(q, v, np.zeros_like(v), u=u, t=t)
+    except EvaluationError:
+        return None  # the run tells of it
+    _, depth, thickness, first, second = (float(number) for number in found)
+    if depth <= SUNK * thickness:
+        return None
+    (name, one), (_, other) = (module.metadata["contact_shapes"][int(k)] for k in (first, second))
+    return f"contacts {name!r}: {one} and {other} are {depth:.3g} m deep in each other"
+
+
+def warn_of_depth(module: BoundModel, t: float, x: Array, u: Any) -> None:
+    """Tell the line of the user's that called of a start inside each other."""
+    found = None if is_told_by_the_caller() else deep_start(module, t, x, u)
+    if found is not None:
+        warnings.warn(
+            f"{module.name} starts with shapes inside each other; {found}. Stiff contacts drive them apart at once, "
+            "and a bed of soil bears what is deep in it as if it had sunk there: change the initial values, or put "
+            "only shapes into groups that are apart",
+            PenetrationWarning,
+            stacklevel=calls_within() + 1,
+        )

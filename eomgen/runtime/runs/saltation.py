@@ -88,8 +88,11 @@ class Variational:
         self.inputs = InputSlopes(module.layout, forcing, module.p)
         self.weights = _weights(module, columns)
         kernels, layout = module.kernels, module.layout
-        self.rhs, self.tangent = kernels.timed("rhs", nan=True), kernels.timed("jacobian", nan=True)
-        self.by_p, self.by_u = kernels.timed("parameter_jacobian", nan=True), kernels.timed("input_jacobian", nan=True)
+        self.rhs, self.tangent = kernels.kernel("rhs", nan=True), kernels.kernel("jacobian", nan=True)
+        self.by_p, self.by_u = (
+            kernels.kernel("parameter_jacobian", nan=True),
+            kernels.kernel("input_jacobian", nan=True),
+        )
         k = len(columns.names)
         self.dp = columns.spread(np.eye(layout.n_p), np.zeros((layout.n_p, layout.n_u)))
         self.du = columns.spread(np.zeros((layout.n_u, layout.n_p)), np.eye(layout.n_u))
@@ -148,7 +151,7 @@ class Variational:
         layout, here = self.module.layout, self.at(t, x)
         n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
         x_dot, S_dot = self.slopes(t, x, S)
-        Y, move = here.kernels.output_derivatives(t, x, x_dot[n_q:]), self.move(t, x, S)
+        Y, move = here.kernels.output_derivatives(x[:n_q], x[n_q:], x_dot[n_q:], t=t), self.move(t, x, S)
         by_u, by_p = Y[:, n_x + n_v : n_x + n_v + n_u], Y[:, n_x + n_v + n_u :]
         return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
 
@@ -183,11 +186,11 @@ class Strike:
     def __init__(self, module: BoundModel, t: float, x: Array, closed: Sequence[int] = ()) -> None:
         self.module, self.t, self.layout, self.closed = module, t, module.layout, closed
         self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
-        self.C_q, self.scales = module.kernels.constraint_jacobian(self.q, t=t, rows="all"), self.layout.scales
+        self.C_q, self.scales = module.kernels.constraint_jacobian(self.q, t=t), self.layout.scales
         if closed:
             self.C_q, self.scales = with_closed_rows(module, t, x, self.C_q)
         self.B = free_motions(self.C_q, self.scales)
-        self._slopes = module.kernels.timed("strike_derivatives")
+        self._slopes = module.kernels.strike_derivatives
 
     def rows(self, v: Array, change: Array, l: Array, g: Array) -> tuple[Array, Array, Array, Array]:
         """Derivatives by [q, v, t, u, p] of M a + C_q^T l - n^T g, of a / s^2 + C_q^T l, of C_q v + C_t and of the
@@ -296,7 +299,7 @@ def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move:
         return np.zeros_like(dq)
     x = np.concatenate([q, np.zeros(layout.n_v)])
     E = assembly_rows(module, t, x, run.input_slopes(t, x))[:n_h]
-    drift = module.velocity_constraints(x, t=t, rows="all")[:n_h]
+    drift = module.kernels.velocity_constraints(x, t=t)[:n_h]
     off = E[:, :n_q] @ dq + np.multiply.outer(drift, move.t) + E[:, n_x + layout.n_u :] @ move.p
     off = off + E[:, n_x : n_x + layout.n_u] @ run.du
     N = layout.scales.rates(q, np.eye(layout.n_v))
@@ -400,7 +403,7 @@ class Saltation:
             self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
             return found
         declared = self.events.declared
-        values = self.module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x))
+        values = self.module.kernels.kernel("events", nan=True)(t, x, u=forcing(t, x))
         near = TOUCHING * max(1.0, self.module.layout.length)
         gaps = [j for j, other in enumerate(declared) if other.get("restitution") is not None]
         touching = [str(declared[j]["name"]) for j in gaps if j != index and abs(values[j]) <= near]
@@ -446,7 +449,7 @@ class Saltation:
         """An event's value."""
         first = len(self.events.model)
         if index < first:
-            kernel = self.module.kernels.timed("events", nan=True)
+            kernel = self.module.kernels.kernel("events", nan=True)
             return float(kernel(t, x, u=self.run.forcing(t, x) if self.run.forcing else None)[index])
         return float(self.events.formulas[index - first][1].function(self.module.p)(t, x))
 
@@ -550,7 +553,7 @@ class Saltation:
         closed = [k for k, (_, state, _) in enumerate(rows) if x[0][layout.x.index(state)] > 0.5]
         if not closed or "held_errors" not in module.kernels.core.names:
             return
-        errors = module.kernels.timed("held_errors")
+        errors = module.kernels.held_errors
         for column, name in enumerate(self.run.columns.names):
             h = ASIDE / max(1.0, float(np.abs(d[0][:, column]).max()), float(np.abs(d[1][:, column]).max()))
             slopes = []

@@ -20,13 +20,12 @@ from ..argument_checks import check_names, read_names, read_number, require_step
 from ..change_points import singular_values
 from ..failure import place
 from ..inputs import Forcing
+from ..layout import start_slopes
 from ..refusals import require_support
-from ..start_values import start_slopes
 from ..trajectory import Span, Start
 from .bound_run import Crawling, StallCheck, describe_crawl
 from .events import Events, told_by_the_caller
-from .integrate import Solution, choose_solver, integrate, require_end
-from .recording import record
+from .integrate import Solution, choose_solver, integrate, record, require_end
 from .run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
 from .saltation import Saltation, Variational
 from .sensitivity_start import (
@@ -189,12 +188,7 @@ def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Arra
 
 
 def _require_same(found: Trajectory, alone: Trajectory) -> None:
-    """Refuse a run that passes over events which the run by itself finds.
-
-    Raises
-    ------
-    SimulationError
-    """
+    """Refuse a run that passes over events which the run by itself finds."""
     for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
         if len(ours) != len(theirs):
             raise SimulationError(

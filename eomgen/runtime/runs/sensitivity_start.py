@@ -342,7 +342,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
 
 def assembly_rows(module: BoundModel, t: float, x: Array, inputs: SlopesNow | None) -> Array:
     """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
-    layout, E = module.layout, module.kernels.assembly_jacobian(t, x)
+    layout, E = module.layout, module.kernels.assembly_jacobian(x, t=t)
     if inputs is not None:
         by_u = E[:, layout.n_x : layout.n_x + layout.n_u]
         by_x, by_p = E[:, : layout.n_x], E[:, layout.n_x + layout.n_u :]
@@ -491,7 +491,7 @@ def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, 
         U, sizes, _ = algebra.svd(J[: layout.n_h])
         lost = U[:, np.count_nonzero(sizes > 10.0 * PASSED * sizes.max(initial=0.0)) :]
         C = (
-            module.bind(u=u).kernels.assembly_jacobian(point.time, x)[: layout.n_h]
+            module.bind(u=u).kernels.assembly_jacobian(x, t=point.time)[: layout.n_h]
             / layout.scales.c[: layout.n_h, None]
         )
         for name, k in by:

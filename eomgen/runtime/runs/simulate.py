@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,12 +17,21 @@ from ..inputs import Forcing
 from ..option_types import Number, SolverOptions
 from ..trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
-from .compiled import can_run, settle
-from .events import WAIT, Events, is_told_by_the_caller, told_by_the_caller
-from .integrate import Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .recording import record, warn_of_limits
+from .compiled import can_run
+from .events import WAIT, ControlledEvents, Events, is_told_by_the_caller, told_by_the_caller
+from .integrate import (
+    Solution,
+    check_options,
+    choose_solver,
+    integrate,
+    record,
+    require_end,
+    takes_jacobian,
+    warn_of_limits,
+)
 from .run_arguments import (
     IMPLICIT,
+    check_first_step,
     check_method,
     check_tolerances,
     declare,
@@ -41,6 +50,81 @@ OPTIONS = (
     *("span", "initial", "parameters", "inputs", "method", "rtol", "atol", "t_eval", "events", "dense_output"),
     *("max_step", "first_step", "progress", "step", "controllers"),
 )
+
+
+# -- plans -------------------------------------------------------------------------------------------------------------
+
+# What holds before values are bound.  That of a run over a span, with no inputs, events, steps or options of its own,
+# is kept with the module for the next one.
+
+
+MANY = 16  #: plans that are kept for a module
+SIMPLE = frozenset((str, float, type(None)))  #: types of the arguments by which a plan is found again
+FEWEST = 2  #: settings of every run: rtol and atol
+
+
+class Plan(NamedTuple):
+    """How a run is made; no run changes it."""
+
+    forcing: Forcing
+    events: Events
+    solver: Any  #: a class as SciPy has them; None in compiled code
+    title: str  #: the method
+    end: float  #: by default (s)
+    size: float | None  #: of the steps of RK4 (s)
+    settings: dict[str, Any]  #: tolerances, steps and options of the method, checked but for the length of the run
+
+    @property
+    def kept(self) -> bool:
+        """Whether another run can have it."""
+        return self.solver is None and self.size is None and not self.forcing.values
+
+    @property
+    def shared(self) -> bool:
+        """Whether runs that bind no values change nothing of the forcing: no rates, no sampled states."""
+        layout = self.forcing.layout
+        return not (layout.input_rates or layout.metadata.get("clocks") or layout.switches)
+
+
+def plan_run(
+    module: BoundModel,
+    method: Any,
+    step: Any,
+    inputs: Mapping[str, Any] | None,
+    events: Any,
+    controllers: Mapping[str, Any] | None,
+    limits: Mapping[str, Any],
+    options: Mapping[str, Any],
+) -> Plan:
+    """Read the method, its tolerances and steps (``limits``) and options, inputs and events of a run.
+
+    Raises
+    ------
+    UsageError
+    """
+    size, declared, layout = check_method(method, step), declare(module), module.layout
+    method = declared["method"] if method is None else method
+    watched = events if isinstance(events, Events) else Events(layout, events)
+    if controllers is not None:
+        watched = ControlledEvents(layout, events, controllers)
+    forcing = Forcing(layout, inputs)
+    compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
+    if method == "RK4" and not compiled:
+        raise cannot("method RK4 takes no input that is a function; give an expression or a table")
+    solver = None if compiled else choose_solver(method)
+    if solver is None:
+        check_names("option of simulate", options, (), OPTIONS)
+    else:
+        check_options(solver, options, OPTIONS)
+    given = {name: value for name, value in limits.items() if value is not None}
+    settings = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method) | given | {**options}
+    if solver is None or solver.__module__.startswith("scipy."):  # another's solver may take anything
+        settings = check_tolerances(module.n_x, inf, settings)
+    title = str(method) if solver is None else solver.__name__
+    return Plan(forcing, watched, solver, title, float(declared["end"]), size, settings)
+
+
+# -- runs --------------------------------------------------------------------------------------------------------------
 
 
 def simulate(
@@ -139,62 +223,48 @@ def simulate(
             _again, module, span, *copies, events=events, method=method, rtol=rtol, atol=atol,
             dense_output=True, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
         )  # fmt: skip
-    settings: dict[str, Any] = {**options}
-    usual = size = None
-    shared = False
-    alone = inputs is None and events is None and controllers is None
-    if alone and max_step is None and first_step is None and step is None and not settings:
-        usual = settle(module, method, rtol, atol)
-    if usual is None:
+    others: dict[str, Any] = {**options}
+    key = (method, rtol, atol)
+    plain = inputs is None and events is None and controllers is None and not others
+    plain = plain and max_step is None and first_step is None and step is None and SIMPLE.issuperset(map(type, key))
+    plan: Plan | None = module._plans.get(key) if plain else None
+    if plan is None:
         method, step = own_step(module, method, step)
-    if usual is None and (
-        (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof)
-    ):
-        from .kinematic import follow_drivers
+        limits = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
+        if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
+            from .kinematic import follow_drivers
 
-        steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **settings}
-        motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, steps)
-        if motion is not None:
-            return motion
-    if usual is None and ((isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata):
-        from .moreau import step_rigidly
+            asked = {**limits, **others}
+            motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, asked)
+            if motion is not None:
+                return motion
+        if (isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata:
+            from .moreau import step_rigidly
 
-        others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
-        others |= {"dense_output": dense_output, "controllers": controllers, **settings}
-        return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
+            asked = {**limits, "dense_output": dense_output, "controllers": controllers, **others}
+            given = (module, span, initial, parameters, inputs, method, step, t_eval, events, progress, asked)
+            return step_rigidly(*given)
+        plan = plan_run(module, method, step, inputs, events, controllers, limits, others)
+        if plain and plan.kept:
+            plan.forcing.attach(module)
+            if len(module._plans) >= MANY:
+                module._plans.clear()
+            module._plans[key] = plan
     if dense_output is not False:
         dense_output = read_flag("dense_output", dense_output)
-    if usual is not None:
-        forcing, watched, title, last, settings, shared = usual
-        shared = shared and parameters is None
-        forcing = forcing if shared else forcing.again()
-        compiled, solver = True, None
-    else:
-        size = check_method(method, step)
-        declared = declare(module)
-        method, last = declared["method"] if method is None else method, float(declared["end"])
-        watched = events if isinstance(events, Events) else Events(module.layout, events)
-        if controllers is not None:
-            from .events import ControlledEvents
-
-            watched = ControlledEvents(module.layout, events, controllers)
-        forcing = Forcing(module.layout, inputs)
-        compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
-        if method == "RK4" and not compiled:
-            raise cannot("method RK4 takes no input that is a function; give an expression or a table")
-        if compiled:
-            solver, title = None, str(method)
-            check_names("option of simulate", settings, (), OPTIONS)
-        else:
-            solver = choose_solver(method)
-            title = solver.__name__
-            check_options(solver, settings, OPTIONS)
-    start, end = find_span(span, last)
-    if size is not None:
-        require_steps("step", size, start, end)
-        max_step, first_step = size, min(size, abs(end - start)) or None
+    kept = plain and plan.kept
+    shared = kept and plan.shared and parameters is None
+    forcing, watched, solver, title = plan.forcing if shared else plan.forcing.again(), *plan[1:4]
+    compiled, settings = solver is None, plan.settings
+    start, end = find_span(span, plan.end)
+    if plan.size is not None:
+        require_steps("step", plan.size, start, end)
+        settings = {**settings, "max_step": plan.size, "first_step": min(plan.size, abs(end - start))}
+    elif len(settings) > FEWEST and (compiled or solver.__module__.startswith("scipy.")):
+        check_first_step(settings, abs(end - start))
+        require_steps("max_step", float(settings.get("max_step", inf)), start, end)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    if usual is None or bound is not module:
+    if not kept or bound is not module:
         forcing.attach(bound)
     nodes = [start, end] if shared else [start, *forcing.corners(start, end, compiled), end]
     varies = not shared and bool(forcing)
@@ -214,20 +284,13 @@ def simulate(
         if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
             warnings.warn(words, stacklevel=calls_within() + 1)
     if "contact_shapes" in bound.metadata:
-        from .meetings import warn_of_depth
+        from .run_arguments import warn_of_depth
 
         warn_of_depth(bound, start, x0, forcing(start, x0) if forcing else None)
-    if usual is None:
-        given = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
-        own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
-        settings = own | {name: value for name, value in given.items() if value is not None} | settings
-        if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
-            settings = check_tolerances(module.n_x, abs(end - start), settings)
-            require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
         if solver in (choose_solver("BDF"), choose_solver("Radau")):
             run.sparse = None  # where the first Jacobian is worth it
-        settings.setdefault("jac", run.jacobian)
+        settings = {"jac": run.jacobian, **settings}
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     if again is not None and stored is not None:
