@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.analyses import ARRIVED, CLOSE, DAMPING, DIFFERENCES, GAINED, LEAST_UNKNOWN, MOVING, SHORTEST
+from ..base.limits.analyses import ARRIVED, CLOSE, DIFFERENCES, LEAST_UNKNOWN, MOVING, SHORTEST
 from ..base.limits.numbers import EPS, TINY
+from ..base.numeric.assembly import close
 from ..base.numeric.projection import largest
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
 from ..runtime.argument_checks import unknown
@@ -283,7 +284,6 @@ def _orthonormal(Z: Array) -> tuple[Array, Array]:
 
 STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
-STIFFEST = 1e16  #: largest damping of a step
 POLISHED = 8  #: most steps after the correction has reached rounding
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
@@ -366,43 +366,46 @@ def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array)
     return point
 
 
-def marquardt(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
-    """Down the residual: Levenberg and Marquardt's steps, with columns scaled by the largest norms that they have had.
+class BalanceRows:
+    """What must vanish, in the sizes of its terms at the start, as equations that :func:`close` takes.
 
-    J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows
-    the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
+    Its places are iterates with the equations near them, or None.
     """
-    damping, growth, columns = DAMPING, 2.0, np.zeros(0)
-    start = Solver(search.linearize(point)).sizes
-    for step in range(STEPS):
-        solver, here = Solver(search.linearize(point)), point.here
-        residual = search.residual(here, here)
-        change = solver.solve(residual)
-        if not residual.any() or solver.arrived(residual, change, search.rounded(point)):
-            return point, step, False  # near enough for Newton's iteration, which tells rounding from what is left
-        same = len(start) == len(solver.sizes)
-        sizes = start if same else solver.sizes
-        J, r = solver.linear.J / sizes[:, None], residual / sizes
-        norms = np.linalg.norm(J, axis=0)
-        columns = np.maximum(columns, norms) if len(columns) == len(norms) else norms
-        scale = np.where(columns > 0.0, columns, 1.0)
-        there = None
-        while damping < STIFFEST:
-            stacked = np.vstack([J, np.sqrt(damping) * np.diag(scale)])
-            change = algebra.lstsq(stacked, np.concatenate([-r, np.zeros(len(scale))]), rcond=None)
-            there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
-            gain = -1.0
-            if there is not None:
-                lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
-                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
-            if gain > GAINED:
-                damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
-                break
-            there, damping, growth = None, damping * growth, 2.0 * growth
-        if there is None:
-            return point, step, False
-        point = there
-    return point, STEPS, False
+
+    long = None
+
+    def __init__(self, search: Search, point: SearchPoint) -> None:
+        linear = search.linearize(point)
+        self.search, self.scales, self.start, self.steps = search, self, (point, linear), 0
+        self.sizes = Solver(linear).sizes
+        norms = np.linalg.norm(linear.J / self.sizes[:, None], axis=0)
+        self.columns = np.diag(1.0 / np.where(norms > 0.0, norms, 1.0))
+
+    def evaluate(self, place: tuple[SearchPoint, LinearizedResidual] | None) -> tuple[Array, Array]:
+        """The residual (m,) and its derivatives (m, k); NaN where there is none."""
+        shape = len(self.sizes), len(self.columns)
+        if place is None or place[1].J.shape != shape:
+            return np.full(shape[0], np.nan), np.full(shape, np.nan)
+        here = place[0].here
+        return self.search.residual(here, here) / self.sizes, place[1].J / self.sizes[:, None]
+
+    def move(
+        self, place: tuple[SearchPoint, LinearizedResidual], change: Array
+    ) -> tuple[SearchPoint, LinearizedResidual] | None:
+        """The place a step away."""
+        self.steps += 1
+        there = self.search.step(place[0], place[1].moved @ change, place[1].changed @ change)
+        return None if there is None else (there, self.search.linearize(there))
+
+    def rounding(self, _: Any, J: Array) -> Array:
+        """None of its own: Newton's iteration, which comes last, judges it."""
+        return np.zeros(len(J))
+
+
+def descend(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
+    """Down the residual, by the damped steps that close loops."""
+    rows = BalanceRows(search, point)
+    return close(rows, rows.start, STEPS, metric=rows.columns)[0][0], rows.steps, False
 
 
 # -- viscous descent ---------------------------------------------------------------------------------------------------
@@ -515,8 +518,8 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     """From a position: each way in turn until one leads to balance.
 
     Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
-    leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
-    Marquardt find.
+    leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what damped steps down the
+    residual find.
 
     Raises
     ------
@@ -529,7 +532,7 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
         lambda: newton(search, start),
         lambda: newton(search, start, plain=True),
-        lambda: marquardt(search, start),
+        lambda: descend(search, start),
     ]
     if not search.names:
         ways.insert(0, lambda: creep(search, start))

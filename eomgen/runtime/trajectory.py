@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,6 +64,8 @@ class Trajectory:
         of eomgen, Python, NumPy and the compiler.  Runs that are the same have the same metadata.
     """
 
+    BESIDES: ClassVar[tuple[str, ...]] = ()  #: attributes that a class of runs has besides
+
     def __init__(
         self,
         t: Array,
@@ -80,6 +82,13 @@ class Trajectory:
         self.columns = columns  #: where the columns come from: the module's calls, or the arrays of a file
         self._told, self._described = header, described
         self._times, self._states, self._sample, self._again = t_events, x_events, sample, again
+
+    @classmethod
+    def of(cls, parts: tuple[Any, ...], *besides: Any) -> Self:
+        """Make a run from the parts of a Trajectory and what its class has besides."""
+        run = cls(*parts)
+        vars(run).update(zip(cls.BESIDES, besides, strict=True))
+        return run
 
     _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
     units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
@@ -157,7 +166,8 @@ class Trajectory:
         from .storage import Stored
 
         columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
-        return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
+        parts = self.t, self.x, columns, self.metadata, self.t_events, self.x_events
+        return type(self).of, (parts, *(getattr(self, name) for name in self.BESIDES))
 
     @property
     def has_dense_output(self) -> bool:

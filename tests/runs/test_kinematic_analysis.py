@@ -6,6 +6,8 @@ tests/reference/slider_crank_kinematics.json.
 
 from __future__ import annotations
 
+import pickle
+
 import models
 import numpy as np
 import pytest
@@ -138,6 +140,13 @@ def test_a_driver_that_goes_too_far_stops_at_the_dead_centre(crank: eg.Module) -
     assert part.stop.t == pytest.approx(np.arcsin(2 / 3) / 10, abs=1e-12)
     assert np.isfinite(part.a).all()
     refuses("EG-STALLED 0.0729728 C.r_y", mod.simulate, 1.0)
+
+
+def test_a_pickle_keeps_what_an_analysis_found(crank: eg.Module) -> None:
+    part = crank.bind(p={"r": 0.3, "l": 0.2}).kinematic_analysis(t=np.linspace(0, 1, 101), partial=True)
+    again = pickle.loads(pickle.dumps(part))
+    assert (again.led, str(again.stop), again.complete, len(again)) == (part.led, str(part.stop), False, 8)
+    np.testing.assert_array_equal(again.a, part.a)
 
 
 def test_any_coordinate_leads_and_gives_the_same_motion(four_bar: eg.Module) -> None:

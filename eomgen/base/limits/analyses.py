@@ -33,9 +33,6 @@ REMAINDER = 1e-6
 DISPLACED = 1e-5
 #: A system whose condition is below this part of what its rank is told by is solved as it is, without its rank.
 WELL_ABOVE = 0.01
-#: Damping to begin with, relative to the square of each column (More, 1978), and the part of the foretold gain that a
-#: step must bring.
-DAMPING, GAINED = 1e-3, 1e-4
 #: Least size of an unknown, relative to the largest, by which its column is scaled.
 LEAST_UNKNOWN = 1e-3
 

@@ -17,6 +17,7 @@ from ...errors import SimulationError, cannot, no_such, off_range
 from ..columns import Columns, Residuals, describe
 from ..inputs import Forcing
 from ..refusals import require_support
+from ..storage import Stored
 from ..trajectory import Span, Start, Trajectory
 from .events import WAIT, Events, RunEvent
 from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
@@ -26,7 +27,6 @@ from .simulate import simulate
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
-    from ..protocols import Source
 
 
 # -- the trajectory ----------------------------------------------------------------------------------------------------
@@ -48,27 +48,15 @@ class ImpactRun(Trajectory):
         (bodies that stay in contact need a joint or a contact force); an event of the model that ends runs.
     """
 
+    BESIDES = ("impacts", "breaks", "ended")
     impacts: list[tuple[float, Impact]]
     breaks: list[int]
     ended: str
-
-    @classmethod
-    def of(
-        cls, parts: tuple[Any, ...], impacts: Sequence[tuple[float, Impact]], breaks: Sequence[int], ended: str
-    ) -> ImpactRun:
-        """Make the run from the parts of a Trajectory and the impacts."""
-        run = cls(*parts)
-        run.impacts, run.breaks, run.ended = list(impacts), list(breaks), ended
-        return run
 
     def __repr__(self) -> str:
         return (
             f"<ImpactRun of {self.name}: {len(self.t)} points, t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, {self.count}>"
         )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        _, parts = super().__reduce__()
-        return type(self).of, (parts, self.impacts, self.breaks, self.ended)
 
     @property
     def count(self) -> str:
@@ -84,30 +72,13 @@ class ImpactRun(Trajectory):
     @property
     def pieces(self) -> list[Trajectory]:
         """The trajectories between impacts."""
-        ends = [0, *self.breaks, len(self.t)]
-        found = []
+        ends, found, values = [0, *self.breaks, len(self.t)], [], self.to_numpy()
+        energies = self.energies if self.has_energies else None
         for a, b in pairwise(ends):
             header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
-            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self.columns, a, b), header))
+            columns = Stored(self.names, values[:, a:b], None if energies is None else energies[:, a:b])
+            found.append(Trajectory(self.t[a:b], self.x[:, a:b], columns, header))
         return found
-
-
-class TrajectoryPart:
-    """Columns from one point of a run to another."""
-
-    def __init__(self, whole: Source, first: int, last: int) -> None:
-        self.whole, self.names, self.range = whole, whole.names, slice(first, last)
-
-    def __getitem__(self, name: str) -> Array:
-        return self.whole[name][self.range]
-
-    @property
-    def has_energies(self) -> bool:
-        return self.whole.has_energies
-
-    @property
-    def energies(self) -> Array:
-        return self.whole.energies[:, self.range]
 
 
 # -- gaps as events ----------------------------------------------------------------------------------------------------
@@ -365,7 +336,7 @@ def _record(
         return Trajectory(times, states, Columns(module, times, states, forcing.sample(times, states)), header)
 
     made = ImpactRun.of((t, x, columns, header, t_events, x_events, sample), events.impacts, breaks, ended)
-    made.message = made.count
+    header["message"] = made.count
     return made
 
 

@@ -106,21 +106,11 @@ class KinematicAnalysis(Trajectory):
         Whether the whole range was reached.
     """
 
-    def __init__(
-        self,
-        module: BoundModel,
-        motion: tuple[Array, Array, Array, Array],
-        columns: MotionColumns,
-        header: dict[str, Any],
-        found: Sequence[Singular],
-        stop: Singular | None,
-        led: tuple[str, ...],
-        **rest: Any,
-    ) -> None:
-        t, _, _, self.a = motion
-        super().__init__(t, columns.x, columns, header, **rest)
-        self._module = module
-        self.singular, self.stop, self.led = list(found), stop, led
+    BESIDES = ("a", "singular", "stop", "led")
+    a: Array
+    singular: list[Singular]
+    stop: Singular | None
+    led: tuple[str, ...]
 
     @property
     def complete(self) -> bool:
@@ -185,12 +175,12 @@ def keep(
     u: Array | None = None,
     header: Mapping[str, Any] | None = None,
     passed: tuple[Any, ...] | None = None,
-    **rest: Any,
+    rest: tuple[Any, ...] = (),
 ) -> KinematicAnalysis:
     """Put an analysis together from its pieces; ``asked`` points were asked for.
 
     ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``passed`` what was
-    passed besides these points, as columns take it, ``rest`` what a Trajectory takes.
+    passed besides these points, as columns take it, ``rest`` what a Trajectory takes after its header.
     """
     module = driven.module
     q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
@@ -203,7 +193,7 @@ def keep(
     more = {"led": list(led), "singular": [str(s) for s in found]}
     known = header_of(module.layout, METHOD, {}, (), residuals(module, t, x), status, message, more, span)
     complete = {**describe(module), **known, **(header or {})}
-    return KinematicAnalysis(module, (t, q, v, a), columns, complete, found, stop, led, **rest)
+    return KinematicAnalysis.of((t, x, columns, complete, *rest), a, list(found), stop, led)
 
 
 def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
@@ -794,7 +784,7 @@ class _Motion:
         u = self.forcing.sample(t, np.concatenate(motion[:2]))
         return keep(
             self.followed.driven, t, [motion], self.followed.singular, None, len(t), (), u=u, header=header,
-            t_events=t_events, x_events=x_events, sample=sample,
+            rest=(t_events, x_events, sample),
         )  # fmt: skip
 
 

@@ -87,14 +87,8 @@ class RigidRun(Trajectory):
         saved runs the columns remain.
     """
 
+    BESIDES = ("contact_forces",)
     contact_forces: ContactForces
-
-    @classmethod
-    def of(cls, parts: tuple[Any, ...], forces: ContactForces) -> RigidRun:
-        """Make the run from the parts of a Trajectory and the forces."""
-        run = cls(*parts)
-        run.contact_forces = forces
-        return run
 
     @classmethod
     def beside(cls, run: Trajectory, forces: ContactForces) -> RigidRun:
@@ -102,10 +96,6 @@ class RigidRun(Trajectory):
         columns = ColumnsWithForces(cast("Columns", run.columns), forces)
         header = run._header | {"units": run.units | columns.units}
         return cls.of((run.t, run.x, columns, header, (), (), run._sample, run._described), forces)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        _, parts = super().__reduce__()
-        return type(self).of, (parts, self.contact_forces)
 
 
 class ColumnsWithForces(Columns):

@@ -18,7 +18,7 @@ from ...base.names import place_of_marker
 from ...base.numeric.projection import minimum_norm
 from ...base.results import Result, ResultTable, plain, same_keys
 from ...errors import NoDerivativeError, at_odds, cannot, ill_placed, ill_typed, incomplete, untrue
-from ..argument_checks import unknown
+from ..argument_checks import read_names, unknown
 from ..change_points import scaled_jacobians
 from ..columns import Named
 from ..initial import Initial
@@ -290,8 +290,6 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     UsageError
         A name is none of them.
     """
-    from ..argument_checks import read_names, unknown
-
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []
     for column, name in enumerate(names):
