@@ -89,7 +89,7 @@ class BaseFit(Result):
         rows = []
         for name, value in self.values.items():
             error = self.errors[name]
-            told = f"+- {error:.2g}" if np.isfinite(error) else "not told by the motion"
+            told = f"+- {error:.2g}" if np.isfinite(error) else "not determined by the motion"
             rows.append((f"{value:.6g}", f"{told}   {texts.get(name, name)}"))
         noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
         return [*rows, ("noise", noise), ("condition", f"{self.condition:.3g}")]

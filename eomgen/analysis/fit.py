@@ -190,9 +190,9 @@ class Fit(Result):
     names : tuple of str
         What was to be found.
     values, errors : dict of str to float
-        Estimates, and their standard errors; an error is NaN at a bound and infinite where the data do not tell.
+        Estimates, and their standard errors: NaN at a bound, infinite where the data do not determine a value.
     covariance, correlation : (k, k) arrays
-        In the order of ``names``; NaN in rows of values at a bound or that the data do not tell.
+        In the order of ``names``; NaN in rows of values at a bound or that the data do not determine them.
     sigma : dict of str to float
         Standard deviation of each column's noise, as given, or as found from the residuals.
     cost : float
@@ -202,7 +202,7 @@ class Fit(Result):
     degrees_of_freedom : int
         Number of residuals less that of unknowns.
     undetermined : list of dict of str to float
-        Directions of the values, relative to their sizes, that the data do not tell; empty if they tell all.
+        Directions of the values, relative to their sizes, that the data do not determine; empty if they determine all.
     at_bounds : tuple of str
     evaluations : int
         Trial values of the last round.
@@ -331,7 +331,7 @@ class Fit(Result):
             if name in self.at_bounds:
                 told = "at its bound"
             elif not np.isfinite(error):
-                told = "not told by the data"
+                told = "not determined by the data"
             else:
                 part = f" ({100.0 * error / abs(value):.2g} %)" if value else ""
                 told = f"+- {error:.2g}{part}"
@@ -341,7 +341,7 @@ class Fit(Result):
         rows.append(("residuals", f"{len(self.residuals)}, chi^2 per degree of freedom {self.reduced_chi_squared:.4g}"))
         for direction in self.undetermined:
             change = ", ".join(f"{name} {x:+.3g}" for name, x in direction.items())
-            rows.append(("not told apart", f"relative changes {change} change no measured value"))
+            rows.append(("not distinguished", f"relative changes {change} change no measured value"))
         strong = [
             f"{a} and {b} {self.correlation[i, j]:+.3f}"
             for i, a in enumerate(self.names)

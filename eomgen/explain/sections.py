@@ -210,7 +210,7 @@ def motion(author: Author) -> list[Section]:
     plane = ""
     if axis is not None:
         along, across = " and ".join(f"${'xyz'[k]}$" for k in within), f"${'xyz'[axis]}$"
-        plane = f" All bodies move in one plane: components along {along} of ground are told, and turns about {across}."
+        plane = f" All bodies move in one plane: components along {along} of ground and turns about {across}."
     place = r"\mathbf{r} + \mathbf{R} \mathbf{u}"
     position: list[Piece] = [
         Sentence(
@@ -493,7 +493,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
                 "parameters. "
             )
             + "Each line repeats the left side of a formula, then the formula with its numbers, then its value. A "
-            "value that is no more than the rounding of the numbers in it is told as 0."
+            "value that is no more than the rounding of the numbers in it is written as 0."
         ),
         Table(("symbol", "value"), rows),
     ]

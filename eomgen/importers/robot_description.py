@@ -694,7 +694,7 @@ class _Writer:
         limited = [self.joints[j.name] for j in moving if any(k != "effort" or j.clamp is None for k in j.limits)]
         if limited and self.options.limits == "note":
             remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
-            self.out.notes.append(f"the limits of joints stop nothing ({some_of(limited, SHOWN)}); {remedy}")
+            self.out.notes.append(f"joint limits are not enforced ({some_of(limited, SHOWN)}); {remedy}")
         rubbing = [self.joints[j.name] for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             remedy = "load with friction=0.01 to let it act"

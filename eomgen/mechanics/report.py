@@ -185,8 +185,8 @@ def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
             if beyond > SLACK * (1.0 + abs(limit)):
                 found.append(
-                    f"{name} starts at {at[name]:.6g}, beyond its {key} limit {limit:g}; limits alone stop nothing: "
-                    "give another initial value, or add a force of type stop"
+                    f"{name} starts at {at[name]:.6g}, beyond its {key} limit {limit:g}: joint limits are not "
+                    "enforced; give another initial value, or add a force of type stop"
                 )
     return found
 

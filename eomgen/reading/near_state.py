@@ -34,7 +34,7 @@ def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
     Raises
     ------
     PartitionError
-        The mass matrix is not finite: the independent velocities do not tell the others.
+        The mass matrix is not finite: the independent velocities do not determine the others.
     SingularMassMatrixError
         It has no inverse.
     """
@@ -46,7 +46,7 @@ def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
     if samples and not finite:
         names = ", ".join(mobility.independent)
         raise PartitionError(
-            f"linearize: the velocities of {names} do not tell the others {told(at)}: constraint_jacobian without "
+            f"linearize: the velocities of {names} do not determine the others {told(at)}: constraint_jacobian without "
             "their columns has no inverse there (a dead centre), so mass_matrix is not finite; linearize at another "
             "state, or derive with independent=[...] of another coordinate"
         )
@@ -143,8 +143,8 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     UnavailableError
         Rates of coordinates were given as functions of velocities, or constraints depend on inputs.
     SingularMassMatrixError, PartitionError, NonFiniteError
-        The mass matrix has no inverse at the state, or the velocities of the independent coordinates do not tell the
-        others, or an entry has no value.
+        The mass matrix has no inverse at the state, or the independent velocities do not determine the others,
+        or an entry has no value.
     """
     kinematics, graph = quantities.kinematics, quantities.graph
     if kinematics.state_names:

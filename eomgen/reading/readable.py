@@ -531,7 +531,7 @@ class Readable(ABC):
         SingularMassMatrixError
             The mass matrix has no inverse at the state.
         PartitionError
-            The state is a dead centre: the velocities of ``independent`` do not tell the others.
+            The state is a dead centre: the velocities of ``independent`` do not determine the others.
         NonFiniteError
             An entry of A or B has no value at the state, such as for a spring of length 0.
         UsageError

@@ -293,7 +293,7 @@ class StartBranch:
         ) + (" or ..." if len(found) > 4 else "")
         several = f"branches found have {shown}" if found else "no branch was found that has them"
         return AssemblyError(
-            f"{where}, where the given velocities do not tell its branches apart: {several}; give "
+            f"{where}, where the given velocities do not distinguish its branches: {several}; give "
             f"{' and '.join(wanted)} too, or start a little beside this position",
             code="EG-UNDETERMINED",
         )

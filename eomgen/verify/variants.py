@@ -104,7 +104,7 @@ def _state_of(bench: Bench, case: Case, other: BoundModel) -> Array:
         for name, place, rate in zip(loops, *cut[:2].tolist(), strict=True):
             values |= {name: place, f"{name}_dot": rate}
     if lacking := [name for name in other.x_names if name not in values]:
-        raise NotApplicable(f"{', '.join(lacking)} cannot be told from the coordinates here")
+        raise NotApplicable(f"{', '.join(lacking)} cannot be determined from the coordinates here")
     return np.array([values[name] for name in other.x_names])
 
 

@@ -219,7 +219,7 @@ def test_forces_and_controls_are_cut_as_in_mujoco(given: dict[str, str], target:
 def test_limits_that_do_not_act_are_noted(tmp_path: Path) -> None:
     model, _ = load(tmp_path, joint='limited="true" range="-1 2" actuatorfrcrange="-1 1"')
     (note,) = model.notes
-    assert note.startswith("the limits of joints stop nothing (j); a run that passes a limit warns; limits='stop'")
+    assert note.startswith("joint limits are not enforced (j); a run that passes a limit warns; limits='stop'")
     assert load(tmp_path, joint='actuatorfrcrange="-1 1"')[0].notes == ()
     assert eg.load(tmp_path / "pieces.xml", limits="off").notes == ()
 
@@ -419,7 +419,7 @@ CASES = [
     ({"b": 'mocap="true"', "free": ""}, "mocap"),
     ({"joint": 'actuatorgravcomp="true"', "a": 'gravcomp="1"'}, "gravity compensation"),
     ({"joint": 'frictionloss="0.1"'}, "the dry friction of joints does not act (j)"),
-    ({"joint": 'range="-1 1" limited="true"'}, "the limits of joints stop nothing"),
+    ({"joint": 'range="-1 1" limited="true"'}, "joint limits are not enforced"),
     ({"tail": '<keyframe><key name="home" qpos="0 0"/></keyframe>'}, "left out: stored states (<keyframe>)"),
     (
         {"site": '<site name="s"/>', "tail": '<actuator><motor name="jet" site="s"/></actuator>'},

@@ -122,7 +122,7 @@ def test_what_the_data_do_not_tell_is_named(module: eg.Module) -> None:
     assert {"unused"} in named or any("unused" in one for one in named)
     assert len(fit.undetermined) == 2
     assert all(np.isinf(fit.errors[name]) for name in ("k1", "k2", "unused"))
-    assert "not told apart" in repr(fit)
+    assert "not distinguished" in repr(fit)
 
 
 def test_units_orders_and_kinds_of_tables_do_not_matter(module: eg.Module) -> None:

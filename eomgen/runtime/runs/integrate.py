@@ -399,7 +399,7 @@ def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: fl
     if found:
         more = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
         warnings.warn(
-            f"the run passes limits of joints: {'; '.join(found[:SHOWN])}{more}. Limits alone stop nothing: load a "
+            f"the run passes limits of joints: {'; '.join(found[:SHOWN])}{more}. Joint limits are not enforced: load a "
             "robot with limits='stop', or add forces of type stop to a model; limits: off turns this warning off",
             LimitWarning,
             stacklevel=calls_within() + 1,
