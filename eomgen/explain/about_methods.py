@@ -15,7 +15,7 @@ from ..expr.differentiate import gradient
 from ..reading import Quantities
 from ..reading.quantities import needed
 from .author import Author, Shown
-from .document import FormulaLine, Piece, Section, Sentence
+from .document import Piece, Section, Sentence
 
 
 def energies(author: Author) -> Section | None:
@@ -72,7 +72,7 @@ def _embedding(author: Author) -> list[Piece]:
     return [
         *pieces,
         Sentence("The mass matrix of the independent accelerations is the sum over all bodies"),
-        FormulaLine((r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots")),
+        author.line(r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots"),
         Sentence(
             "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
             "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "

@@ -9,13 +9,16 @@ from typing import Any, NamedTuple
 import sympy
 
 from ..base.names import acceleration_name
-from ..base.notation import literal, with_instance
+from ..base.notation import Notation, literal, with_instance
 from ..errors import UnavailableError
 from ..expr.core import Expr
+from ..expr.printing import Formulas, number
+from ..expr.printing.formula import ROUNDED, Formula, Letter
 from ..mechanics.report import plane_axis
 from ..reading import Quantities, ReadingView
+from ..reading.printed import order_of
 from ..reading.quantities import Written, needed, write
-from .document import Folded, FormulaLine, Piece, Printer, PutIn, Sentence
+from .document import Folded, FormulaLine, Piece, Sentence
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
 FOLD = 900  #: nodes of a quantity from which a page shows it only on request
@@ -65,7 +68,8 @@ class Author:
         self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
         self.put_in: Mapping[str, float | None] = equations.numbers_put_in()
         self.mechanism = equations.kinematics.mechanism
-        self.printer = Printer(equations)
+        self.names: Notation = equations.notation
+        self._formula = Formulas(order_of(equations), digits=ROUNDED)
         self.shown: list[Shown] = []
         self.formed: list[tuple[str, Sequence[Expr], Written]] = []
         self._told: list[tuple[Any, Any]] = []
@@ -100,7 +104,7 @@ class Author:
 
     def symbol(self, name: str) -> str:
         """LaTeX of a name of the model."""
-        return str(self.printer.names.latex(name))
+        return self.names.latex(name)
 
     def variation(self, name: str) -> Any:
         """The variation of a coordinate in SymPy, printed with a delta."""
@@ -160,16 +164,16 @@ class Author:
         if size > MOST:
             where = f"`eqs.{key[0]}`" if key[0] else "the attributes of the equations"
             return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
-        self.printer.meet(str(symbol) for symbol, _ in named)
+        self.names = self.names.with_names(str(symbol) for symbol, _ in named)
         entries = list(self._entries(left, value, symmetric))
         self.shown.append(Shown(*key, named, entries))
-        found: list[Piece] = [FormulaLine((self.printer.latex(s), x)) for s, x in named if s not in told]
+        found: list[Piece] = [self.line(s, x) for s, x in named if s not in told]
         if not isinstance(value, sympy.MatrixBase) or (
             size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS
         ):
-            found.append(FormulaLine((left, value)))
+            found.append(self.line(left, value))
         else:
-            found += [FormulaLine(entry) for entry in entries]
+            found += [self.line(*entry) for entry in entries]
             rest = len(value) - len(entries)
             if rest:
                 same = ", or stand above the diagonal of a symmetric matrix" if symmetric else ""
@@ -181,9 +185,24 @@ class Author:
     def balance(self, left: Any, right: Any, named: Sequence[tuple[Any, Any]]) -> list[Piece]:
         """An equation between two expressions, with the named parts that it uses and that were not shown before."""
         parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._told]
-        self.printer.meet(str(symbol) for symbol, _ in parts)
+        self.names = self.names.with_names(str(symbol) for symbol, _ in parts)
         self._told += parts
-        return [*(FormulaLine((self.printer.latex(s), x)) for s, x in parts), FormulaLine((left, right))]
+        return [*(self.line(*pair) for pair in parts), self.line(left, right)]
+
+    def line(self, *sides: Any) -> FormulaLine:
+        """A line of formulas, each LaTeX, a SymPy expression or matrix, or a number."""
+        return FormulaLine(tuple(map(self._side, sides)))
+
+    def in_numbers(self, left: str, expression: Any, numbers: Mapping[str, float], value: float) -> FormulaLine:
+        """The line of a calculation by hand: left side = expression with its numbers = value."""
+        if not expression.free_symbols or not expression.args:
+            return self.line(left, value)
+        return FormulaLine((Letter(left), Formulas(self._formula.order, numbers, ROUNDED)(expression), number(value)))
+
+    def _side(self, side: Any) -> Formula:
+        if isinstance(side, str):
+            return Letter(side)
+        return number(side) if isinstance(side, float | int) else self._formula(side)
 
     def form(self, what: str, choose: Callable[[Quantities], Sequence[Expr]], prefix: str) -> Written:
         """Expressions that no attribute has, formed in a copy of the graph; ``what`` calls them in the comparison."""
@@ -214,10 +233,3 @@ def nodes(value: Any) -> int:
     """Terms, factors and symbols of an expression or matrix."""
     flat = list(value) if isinstance(value, sympy.MatrixBase) else [value]
     return sum(1 for x in flat for _ in sympy.preorder_traversal(x))
-
-
-def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> FormulaLine:
-    """The line of a calculation by hand: left side = expression with its numbers = value."""
-    if not expression.free_symbols or not expression.args:
-        return FormulaLine((left, value))
-    return FormulaLine((left, PutIn(expression, numbers), value))

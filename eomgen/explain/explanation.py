@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.files import write_whole
+from ..base.notation import Notation
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..expr.pairs import opaque_names
-from .document import DrawnPicture, Folded, Piece, Printer, Section
+from .document import DrawnPicture, Folded, Piece, Section
 from .writers import write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:
@@ -41,24 +42,24 @@ class Explanation:
     sections : tuple of Section
     """
 
-    def __init__(self, title: str, sections: Sequence[Section], printer: Printer, difference: float | None) -> None:
+    def __init__(self, title: str, sections: Sequence[Section], names: Notation, difference: float | None) -> None:
         self.title, self.sections, self.difference = title, tuple(sections), difference
-        self._printer = printer
+        self._names = names
 
     @cached_property
     def html(self) -> str:
         """A page that stands alone."""
-        return write_html(self.title, self.sections, self._printer)
+        return write_html(self.title, self.sections, self._names)
 
     @cached_property
     def markdown(self) -> str:
         """Text with formulas between dollars."""
-        return write_markdown(self.title, self.sections, self._printer)
+        return write_markdown(self.title, self.sections, self._names)
 
     @cached_property
     def latex(self) -> str:
         """A document for pdflatex; the picture is the file that :meth:`save` writes beside it."""
-        return write_tex(self.title, self.sections, self._printer)
+        return write_tex(self.title, self.sections, self._names)
 
     def save(self, file: str | Path) -> Path:
         """Write the document; the ending of the name says in which form.
@@ -96,7 +97,7 @@ class Explanation:
     def _save_tex(self, path: Path) -> None:
         picture = next(_pictures(self.sections), None)
         name = f"{path.stem}.png"
-        text = write_tex(self.title, self.sections, self._printer, None if picture is None else name)
+        text = write_tex(self.title, self.sections, self._names, None if picture is None else name)
         if picture is not None:
             write_whole(path.with_name(name), picture.png)
         write_whole(path, text)
@@ -168,7 +169,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
         values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
         title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
     kept = [section for section in sections if section is not None]
-    return Explanation(title, kept, author.printer, None if found is None else found.largest)
+    return Explanation(title, kept, author.names, None if found is None else found.largest)
 
 
 def _folded(section: Section | None) -> Section | None:

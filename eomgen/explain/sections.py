@@ -15,7 +15,7 @@ from ..errors import EomgenError, UnavailableError
 from ..expr.core import Expr
 from ..model.mechanism import JointSpec, Switched
 from ..model.placement import axis_word
-from .author import Author, in_numbers, nodes
+from .author import Author, nodes
 from .comparison import Difference, is_rounding, known_values, value_of
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 
@@ -103,14 +103,14 @@ def bodies(author: Author) -> Section | None:
         for body in m.bodies:
             properties = [body.mass, *body.com, *(x for row in body.inertia for x in row)]
             mass, *rest = map(_as_given, author.write("masses and inertias", properties).expressions)
-            formulas.append(FormulaLine((author.of("m", body.name), mass)))
+            formulas.append(author.line(author.of("m", body.name), mass))
             if any(x != 0 for x in rest[:3]):
                 centre = sympy.Matrix(3, 1, rest[:3])[within, 0]
-                formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), centre)))
+                formulas.append(author.line(author.of(r"\mathbf{c}", body.name), centre))
             if any(x != 0 for x in rest[3:]):
                 inertia = sympy.Matrix(3, 3, rest[3:])
                 own = ("J", inertia[axis, axis]) if axis is not None else (r"\mathbf{J}", inertia)
-                formulas.append(FormulaLine((author.of(own[0], body.name), own[1])))
+                formulas.append(author.line(author.of(own[0], body.name), own[1]))
         if len(m.bodies) > MANY or not author.full:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
@@ -395,10 +395,10 @@ def _lines(
 ) -> Iterator[Piece]:
     """Named quantities and their formulas, after what stands in these."""
     written = author.write(what, [x for _, x in pairs], prefix)
-    author.printer.meet(str(symbol) for symbol, _ in written.intermediates)
-    yield from (FormulaLine((author.printer.latex(s), x)) for s, x in written.intermediates)
+    author.names = author.names.with_names(str(symbol) for symbol, _ in written.intermediates)
+    yield from (author.line(*pair) for pair in written.intermediates)
     left = (author.symbol(f"{name}{suffix}") for name, _ in pairs)
-    yield from (FormulaLine(pair) for pair in zip(left, written.expressions, strict=True))
+    yield from (author.line(*pair) for pair in zip(left, written.expressions, strict=True))
 
 
 def _work(author: Author, column: Any) -> Any:
@@ -421,7 +421,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
             "\\mathbf{r}_c$, with "
             "the field of gravity in ground axes"
         ),
-        FormulaLine((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),
+        author.line(r"\mathbf{g}", sympy.Matrix(3, 1, gravity)),
     ]
 
 
@@ -436,7 +436,7 @@ def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
             (value,) = author.write("events", [event.expression]).expressions
             pieces += [
                 Sentence(f"{what} where this falls to 0:"),
-                FormulaLine((rf"\mathrm{{{what.split()[1]}}}", value)),
+                author.line(rf"\mathrm{{{what.split()[1]}}}", value),
             ]
     return pieces
 
@@ -448,7 +448,7 @@ def _law(author: Author, force: Any) -> list[Piece]:
         for key, value in vars(part).items():
             if isinstance(value, Expr) and not key.startswith("_"):
                 (expression,) = author.write("laws of force elements", [value]).expressions
-                pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
+                pieces.append(author.line(rf"\mathrm{{{key.replace('_', '.')}}}", expression))
     return pieces
 
 
@@ -505,9 +505,9 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
             found = []
             here = {str(symbol): float(value) for symbol, value in known.items() if isinstance(symbol, sympy.Symbol)}
             for symbol, expression in shown.named:
-                found.append(_line(author.printer.latex(symbol), expression, shown.named, here, known, numbers))
+                found.append(_line(author, author.symbol(str(symbol)), expression, shown.named, here, known, numbers))
             entries = [entry for entry in shown.entries if entry[1].free_symbols]
-            found += [_line(left, x, shown.named, here, known, numbers) for left, x in entries]
+            found += [_line(author, left, x, shown.named, here, known, numbers) for left, x in entries]
         except (TypeError, ValueError):  # reactions, variations and momenta have no number of their own
             continue
         room = max(0, MOST - len(lines))
@@ -524,6 +524,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
 
 
 def _line(
+    author: Author,
     left: str,
     expression: Any,
     named: Sequence[tuple[Any, Any]],
@@ -535,8 +536,8 @@ def _line(
     if is_rounding(expression, value, named, numbers):
         value = 0.0
     if nodes(expression) > LONG:
-        return FormulaLine((left, value))
-    return in_numbers(left, expression, here, value)
+        return author.line(left, value)
+    return author.in_numbers(left, expression, here, value)
 
 
 def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
@@ -546,7 +547,7 @@ def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
     if not names:
         return []
     told = Sentence("The equations of motion then give the accelerations")
-    return [told, *(FormulaLine((author.symbol(name), state[name])) for name in names)]
+    return [told, *(author.line(author.symbol(name), state[name]) for name in names)]
 
 
 def _acceleration_names(eqs: Any) -> list[str]:

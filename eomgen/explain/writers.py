@@ -7,9 +7,20 @@ from base64 import b64encode
 from collections.abc import Sequence
 
 from ..base.inline_pictures import image_html
+from ..base.notation import Notation
 from ..base.texts import html_text
-from ..expr.printing import given_mathml
-from .document import DrawnPicture, Folded, FormulaLine, Piece, Printer, Section, Sentence, Table, written
+from ..expr.printing import given_mathml, latex, latex_lines, mathml, mathml_lines, text
+from ..expr.printing.formula import Letter, MatrixOf
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, written
+
+SHORT = 32  #: characters of a side that leaves room for another one in its line
+
+
+def _is_short(formula: FormulaLine, names: Notation) -> bool:
+    """Whether all sides go into one line."""
+    trees = [side for side in formula.sides if not isinstance(side, Letter)]
+    return all(not isinstance(x, MatrixOf) and len(text(x, names)) <= SHORT for x in trees)
+
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
 
@@ -37,25 +48,25 @@ _ESCAPES = {
 _TEX_SPECIAL = re.compile(r"[\\{}$&#%_^~<>]")
 
 
-def write_tex(title: str, sections: Sequence[Section], printer: Printer, picture: str | None = PICTURE) -> str:
+def write_tex(title: str, sections: Sequence[Section], names: Notation, picture: str | None = PICTURE) -> str:
     """A LaTeX document; its pictures are the file ``picture`` beside it, left out where None."""
     found = [_HEAD, rf"\title{{{_tex_text(title)}}}\date{{}}", r"\begin{document}", r"\maketitle"]
     for section in sections:
         command = "section" if section.level == 1 else "subsection"
         found.append(rf"\{command}*{{{_tex_text(section.title)}}}")
-        found += [_tex_piece(piece, printer, picture) for piece in section.pieces]
+        found += [_tex_piece(piece, names, picture) for piece in section.pieces]
     return "\n".join([*found, r"\end{document}", ""])
 
 
-def formula_body(formula: FormulaLine, printer: Printer) -> str:
+def formula_body(formula: FormulaLine, names: Notation) -> str:
     """LaTeX of a formula, in lines where a side is a long sum or a third one follows."""
     first, *others = formula.sides
     rows: list[str] = []
     for side in others:
-        lines = printer.latex_lines(side)
+        lines = latex_lines(side, names)
         rows += [f"= {lines[0]}", *(rf"\quad {line}" for line in lines[1:])]
-    left = printer.latex(first)
-    if len(rows) < 2 or printer.is_short(formula):
+    left = latex(first, names)
+    if len(rows) < 2 or _is_short(formula, names):
         return " ".join([left, *rows])
     inner = " \\\\\n".join(f"{left if k == 0 else ''} & {row}" for k, row in enumerate(rows))
     return f"\\begin{{aligned}}\n{inner}\n\\end{{aligned}}"
@@ -71,12 +82,12 @@ def _tex_text(text: str) -> str:
     return written(text, "${}$".format, lambda name: rf"\texttt{{{escaped(name)}}}", escaped)
 
 
-def _tex_piece(piece: Piece, printer: Printer, picture: str | None) -> str:
+def _tex_piece(piece: Piece, names: Notation, picture: str | None) -> str:
     match piece:
         case Sentence():
             return _tex_text(piece.text) + "\n"
         case FormulaLine():
-            return rf"\fitted{{{formula_body(piece, printer)}}}"
+            return rf"\fitted{{{formula_body(piece, names)}}}"
         case Table():
             columns = _columns(piece)
             rows = [" & ".join(map(_tex_text, row)) + r" \\" for row in piece.rows]
@@ -88,7 +99,7 @@ def _tex_piece(piece: Piece, printer: Printer, picture: str | None) -> str:
             width = min(1.0, piece.width / 640)
             return rf"\includegraphics[width={width:.2f}\linewidth]{{{picture}}}" + "\n"
         case Folded():
-            inner = [_tex_piece(part, printer, picture) for part in piece.pieces]
+            inner = [_tex_piece(part, names, picture) for part in piece.pieces]
             return "\n".join([rf"\textit{{{_tex_text(piece.title)}}}" + "\n", *inner])
 
 
@@ -142,7 +153,7 @@ nav{columns:2;font-size:.95em}
 """
 
 
-def write_html(title: str, sections: Sequence[Section], printer: Printer) -> str:
+def write_html(title: str, sections: Sequence[Section], names: Notation) -> str:
     """A page that stands alone."""
     body = [f"<h1>{_html(title)}</h1>"]
     links = [f"<li><a href='#s{k}'>{_html(s.title)}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1]
@@ -155,7 +166,7 @@ def write_html(title: str, sections: Sequence[Section], printer: Printer) -> str
             body += ["</details>"] * opened
             opened = section.folded
         body.append(f"<details class='section'><summary>{heading}</summary>" if section.folded else heading)
-        body += [_html_piece(piece, printer) for piece in section.pieces]
+        body += [_html_piece(piece, names) for piece in section.pieces]
     body += ["</details>"] * opened
     plain = html_text(title.replace("`", "").replace("$", ""))
     head = (
@@ -172,12 +183,12 @@ def _html(text: str) -> str:
     )
 
 
-def _html_piece(piece: Piece, printer: Printer) -> str:
+def _html_piece(piece: Piece, names: Notation) -> str:
     match piece:
         case Sentence():
             return f"<p>{_html(piece.text)}</p>"
         case FormulaLine():
-            return f"<div class='formula'><math displaystyle='true'>{_formula(piece, printer)}</math></div>"
+            return f"<div class='formula'><math displaystyle='true'>{_formula(piece, names)}</math></div>"
         case Table():
             head = "".join(f"<th>{_html(cell)}</th>" for cell in piece.head)
             rows = "".join("<tr>" + "".join(f"<td>{_html(cell)}</td>" for cell in row) + "</tr>" for row in piece.rows)
@@ -185,22 +196,22 @@ def _html_piece(piece: Piece, printer: Printer) -> str:
         case DrawnPicture():
             return f"<p>{image_html(piece.png, 'png', piece.width, piece.words)}</p>"
         case Folded():
-            inner = "\n".join(_html_piece(part, printer) for part in piece.pieces)
+            inner = "\n".join(_html_piece(part, names) for part in piece.pieces)
             return f"<details><summary>{_html(piece.title)}</summary>\n{inner}\n</details>"
 
 
-def _formula(formula: FormulaLine, printer: Printer) -> str:
+def _formula(formula: FormulaLine, names: Notation) -> str:
     """One row of sides, or several lines where a side is a long sum or a third one follows."""
     first, *others = formula.sides
-    left = f"<mrow>{printer.mathml(first)}</mrow>"
+    left = f"<mrow>{mathml(first, names)}</mrow>"
     rows: list[str] = []
     for side in others:
-        lines = printer.mathml_lines(side)
+        lines = mathml_lines(side, names)
         rows.append(f"<mo>=</mo><mrow>{lines[0]}</mrow>")
         rows += [f"<mspace width='1.2em'/><mrow>{line}</mrow>" for line in lines[1:]]
     if len(rows) == 0:
         return left
-    if len(rows) == 1 or printer.is_short(formula):
+    if len(rows) == 1 or _is_short(formula, names):
         return f"<mrow>{left}{''.join(rows)}</mrow>"
     cells = [f"<mtr><mtd>{left if k == 0 else ''}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows)]
     return f"<mtable class='lines' displaystyle='true'>{''.join(cells)}</mtable>"
@@ -212,12 +223,12 @@ def _formula(formula: FormulaLine, printer: Printer) -> str:
 _MARKDOWN_SPECIAL = re.compile(r"([\\*_#<>|\[\]$])")
 
 
-def write_markdown(title: str, sections: Sequence[Section], printer: Printer) -> str:
+def write_markdown(title: str, sections: Sequence[Section], names: Notation) -> str:
     """A Markdown document; pictures are in it."""
     found = [f"# {_markdown_text(title)}"]
     for section in sections:
         found.append(f"{'#' * (section.level + 1)} {_markdown_text(section.title)}")
-        found += [_markdown_piece(piece, printer) for piece in section.pieces]
+        found += [_markdown_piece(piece, names) for piece in section.pieces]
     return "\n\n".join(found) + "\n"
 
 
@@ -225,12 +236,12 @@ def _markdown_text(text: str) -> str:
     return written(text, "${}$".format, "`{}`".format, lambda x: _MARKDOWN_SPECIAL.sub(r"\\\1", x))
 
 
-def _markdown_piece(piece: Piece, printer: Printer) -> str:
+def _markdown_piece(piece: Piece, names: Notation) -> str:
     match piece:
         case Sentence():
             return _markdown_text(piece.text)
         case FormulaLine():
-            return f"$$\n{formula_body(piece, printer)}\n$$"
+            return f"$$\n{formula_body(piece, names)}\n$$"
         case Table():
             rows = [piece.head, tuple("---" for _ in piece.head), *piece.rows]
             return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
@@ -238,7 +249,7 @@ def _markdown_piece(piece: Piece, printer: Printer) -> str:
             data = b64encode(piece.png).decode()
             return f"![{_markdown_text(piece.words)}](data:image/png;base64,{data})"
         case Folded():
-            inner = "\n\n".join(_markdown_piece(part, printer) for part in piece.pieces)
+            inner = "\n\n".join(_markdown_piece(part, names) for part in piece.pieces)
             plain = html_text(piece.title.replace("`", "").replace("$", ""))
             return f"<details><summary>{plain}</summary>\n\n{inner}\n\n</details>"
 
