@@ -111,9 +111,9 @@ def one_line(text: str) -> str:
     return visible(" ".join(text.split()), lines=False)
 
 
-def summary_text(text: str, longest: int = 500) -> str:
+def summary_text(text: str) -> str:
     """One printable line, as the descriptions of packages must be; shortened where it is long."""
-    return shortened(one_line(text), longest)
+    return shortened(one_line(text), 500)
 
 
 def markdown_text(text: str) -> str:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import sympy
 
-from ..base.names import acceleration_name
 from ..base.notation import Notation, literal, with_instance
 from ..errors import UnavailableError
 from ..expr.core import Expr
@@ -17,7 +16,7 @@ from ..expr.printing.formula import ROUNDED, Formula, Letter
 from ..mechanics.report import plane_axis
 from ..reading import Quantities, ReadingView
 from ..reading.printed import order_of
-from ..reading.quantities import Written, needed, write
+from ..reading.quantities import Written, needed
 from .document import Folded, FormulaLine, Piece, Sentence
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
@@ -73,8 +72,6 @@ class Author:
         self.shown: list[Shown] = []
         self.formed: list[tuple[str, Sequence[Expr], Written]] = []
         self._told: list[tuple[Any, Any]] = []
-        names = equations.kinematics.velocity_names
-        self._rates = frozenset((*names, *map(acceleration_name, names)))
 
     @cached_property
     def plane(self) -> int | None:
@@ -123,7 +120,6 @@ class Author:
         name: str,
         part: str | None = None,
         pick: Callable[[Any], Any] | None = None,
-        symmetric: bool = False,
     ) -> list[Piece]:
         """A quantity that equations have, and its formula; a sentence where the method does not have it.
 
@@ -135,14 +131,12 @@ class Author:
             What :meth:`~eomgen.reading.Readable.written` takes.
         pick : callable, optional
             What of the value is shown.
-        symmetric : bool
-            Whether entries below the diagonal are left out where a matrix is shown entry by entry.
         """
         try:
             named, value = self.equations.written(name, part)
         except UnavailableError as error:
             return [Sentence(f"Not shown: {str(error).partition(chr(10))[0]}.")]
-        return self.formulas(left, value if pick is None else pick(value), named, (name, part), symmetric)
+        return self.formulas(left, value if pick is None else pick(value), named, (name, part))
 
     def formulas(
         self,
@@ -155,7 +149,7 @@ class Author:
     ) -> list[Piece]:
         """Named parts, save those in ``told``, and the formula of an expression or matrix.
 
-        Large ones are folded or left out.
+        Large ones are folded or left out; of a symmetric matrix entry by entry, those above the diagonal are.
         """
         if isinstance(value, sympy.MatrixBase) and len(value) == 1:
             value = value[0]
@@ -210,8 +204,8 @@ class Author:
 
     def write(self, what: str, expressions: Sequence[Expr], prefix: str = "z") -> Written:
         """Expressions in SymPy, kept to be compared with what they were."""
-        k, expressions = self.equations.kinematics, self.equations.with_values(expressions)
-        written = write(expressions, None, prefix, (), self._rates, k.parameter_names, k.euler_parameters)
+        expressions = self.equations.with_values(expressions)
+        written = self.equations.in_sympy(expressions, prefix)
         self.formed.append((what, expressions, written))
         return written
 

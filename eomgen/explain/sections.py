@@ -9,6 +9,7 @@ from typing import Any
 import sympy
 
 from ..base.inline_pictures import trimmed_png
+from ..base.names import acceleration_name
 from ..elements.constraints.switching import event_of
 from ..elements.frames import GROUND
 from ..errors import EomgenError, UnavailableError
@@ -543,17 +544,11 @@ def _line(
 def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
     """The accelerations that the compiled module finds at the state."""
     eqs = author.equations
-    names = [n for n in _acceleration_names(eqs) if n in state]
+    names = [n for n in map(acceleration_name, eqs.kinematics.velocity_names) if n in state]
     if not names:
         return []
     told = Sentence("The equations of motion then give the accelerations")
     return [told, *(author.line(author.symbol(name), state[name]) for name in names)]
-
-
-def _acceleration_names(eqs: Any) -> list[str]:
-    from ..base.names import acceleration_name
-
-    return [acceleration_name(name) for name in eqs.kinematics.velocity_names]
 
 
 def counts(author: Author) -> Section:

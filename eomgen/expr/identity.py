@@ -27,9 +27,7 @@ TRIES = 3  #: random points at which an expression has to vanish
 DRAWS = 9  #: points that are drawn for it: some lie outside of the domain of a root or logarithm
 
 
-def with_bounds(
-    outputs: Sequence[Expr], values: Mapping[str, Value], independent: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
+def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
     """Values of expressions and the bounds of their rounding.
 
     Parameters
@@ -38,9 +36,6 @@ def with_bounds(
         Expressions of one graph.
     values : mapping of str to float or (k,) array
         Of all symbols, taken as exact.
-    independent : bool
-        Take roundings as independent: squares of bounds add up.  No strict bound, but it stays near the error in long
-        products of rotations, where the other grows with every factor.
 
     Returns
     -------
@@ -52,7 +47,7 @@ def with_bounds(
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
-    return _bounds_at(graph, outputs, _values_of_nodes(graph, outputs, values), values, independent)
+    return _bounds_at(graph, outputs, _values_of_nodes(graph, outputs, values), values, independent=False)
 
 
 def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str, Value]) -> dict[int, Value]:
@@ -66,7 +61,10 @@ def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str,
 def _bounds_at(
     graph: Graph, outputs: Sequence[Expr], found: Mapping[int, Value], values: Mapping[str, Value], independent: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What :func:`with_bounds` gives, from the values of all nodes."""
+    """What :func:`with_bounds` gives, from the values of all nodes; of independent roundings squares add up.
+
+    That is no strict bound, but stays near the error in long products of rotations, where the other grows.
+    """
     nodes = graph.nodes
     bounds: dict[int, Value] = {}
     with np.errstate(all="ignore"):

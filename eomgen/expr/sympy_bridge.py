@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial, reduce
 from typing import Any
@@ -64,7 +64,7 @@ class _Fault(Exception):
     """Why one sub-expression cannot be lowered."""
 
 
-def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str] = ()) -> Expr:
+def lower(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
     """Build a SymPy expression in a graph.
 
     Parameters
@@ -76,8 +76,6 @@ def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str
     resolve : callable
         Gives the meaning of a symbol, an applied function such as ``q(t)``, a ``Derivative`` or anything else that is
         not known here; None if it has none.
-    allowed : iterable of str, optional
-        Names that would have been accepted, for the message of the error.
 
     Returns
     -------
@@ -96,11 +94,11 @@ def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str
     walk = _Walk(graph, resolve)
     result = walk.run(expression)
     if walk.unresolved or walk.faults:
-        raise _error(walk, sorted(allowed))
+        raise _error(walk)
     return Expr(graph, result)
 
 
-def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
+def _error(walk: _Walk) -> LoweringError:
     lines = [f"{shortened(part)}: {why}" for part, why in walk.faults]
     unresolved = sorted(walk.unresolved, key=shortened)
     if unresolved:
@@ -110,7 +108,7 @@ def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
             isinstance(x, AppliedUndef) and [getattr(a, "name", "") for a in x.args] != ["t"] for x in calls
         )
         declare = "declare functions first, by model.table or model.native" if functions else "declare them"
-        lines.append(f"unknown names {names}; " + (f"known are {', '.join(allowed)}" if allowed else declare))
+        lines.append(f"unknown names {names}; {declare}")
     first = walk.faults[0][0] if walk.faults else unresolved[0]
     return LoweringError(first, "\n".join(lines), unresolved)
 

@@ -389,6 +389,7 @@ def _finish(ax: Any, report: MechanismReport, middle: float, half: float, layers
 
 TIMED = {"holds": "for a time"}  #: of a constraint that closes and opens
 WIDTH = 110  #: of the lines of a report, at most
+LISTED = 12  #: names in one of them
 
 
 @dataclass(frozen=True)
@@ -556,15 +557,15 @@ def _values(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
-def _list(names: list[str], limit: int = 12) -> str:
-    if len(names) <= limit:
+def _list(names: list[str]) -> str:
+    if len(names) <= LISTED:
         return ", ".join(names)
-    return ", ".join(names[: limit - 2]) + f", ... ({len(names) - limit + 2} more)"
+    return ", ".join(names[: LISTED - 2]) + f", ... ({len(names) - LISTED + 2} more)"
 
 
-def _list_joints(joints: list[dict[str, Any]], limit: int = 12) -> str:
+def _list_joints(joints: list[dict[str, Any]]) -> str:
     """Each with its type, or many of them by type."""
-    if len(joints) <= limit:
+    if len(joints) <= LISTED:
         return ", ".join(f"{j['name']} ({j['type']})" for j in joints)
     types = Counter(j["type"] for j in joints)
     return ", ".join(f"{count} {kind}" for kind, count in types.most_common())

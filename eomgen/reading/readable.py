@@ -34,7 +34,7 @@ from .methods import (
     read_values,
 )
 from .near_state import SymbolicLinearization, linearize, over_one_denominator, told
-from .quantities import Quantities, SpatialMotion, needed, require_bodies, write
+from .quantities import Quantities, SpatialMotion, Written, needed, require_bodies, write
 from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
 if TYPE_CHECKING:
@@ -631,17 +631,21 @@ class Readable(ABC):
         """
         formed, names = self._form(choose, given)
         prefix = prefix or f"{name.replace('.', '_')}_"
-        k = self.kinematics
-        of_motion = given is not None
-        written = write(
-            formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters, of_motion
-        )
+        written = self.in_sympy(formed, prefix, names, of_motion=given is not None)
         if self._put_in:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._told}")
         self._named[name] = written.intermediates
         self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
         return written.expressions
+
+    def in_sympy(
+        self, formed: Sequence[Expr], prefix: str, names: Sequence[tuple[str, Expr]] = (), of_motion: bool = False
+    ) -> Written:
+        """Expressions in SymPy as they are read, with their named parts; ``names`` are those that stand in them."""
+        k = self.kinematics
+        rates = frozenset((*k.velocity_names, *map(acceleration_name, k.velocity_names)))
+        return write(formed, self._symbol, prefix, names, rates, k.parameter_names, k.euler_parameters, of_motion)
 
     def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
         """Expressions of the quantities with values put in, and what names in them stand for."""
@@ -699,11 +703,6 @@ class Readable(ABC):
                 f"{name} has no finite value {where}: it divides by zero there, as at a dead centre or where a "
                 "rotation is singular; put in other values, or leave one as a symbol"
             )
-
-    @cached_property
-    def _rates(self) -> frozenset[str]:
-        v = self.kinematics.velocity_names
-        return frozenset((*v, *map(acceleration_name, v)))
 
     def _plain(self, name: str) -> str:
         """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
@@ -797,7 +796,4 @@ class Readable(ABC):
     def symbols_put_in(self, names: Sequence[str]) -> list[Any]:
         """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
         graph = Graph()
-        found = [graph.symbol(name) for name in names]
-        for values in self._put_in:
-            found = put_in(found, values)
-        return write(found, self._symbol).expressions
+        return write(self.with_values([graph.symbol(name) for name in names]), self._symbol).expressions

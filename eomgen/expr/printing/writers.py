@@ -124,10 +124,10 @@ def latex(formula: tree.Formula, names: Notation) -> str:
     return _LatexWriter(names).write(formula)
 
 
-def fenced(inside: str, left: str = "(", right: str = ")") -> str:
+def fenced(inside: str) -> str:
     """In parentheses that grow with what they hold."""
     tall = r"\frac" in inside or r"\begin" in inside
-    return rf"\left{left}{inside}\right{right}" if tall else f"{left}{inside}{right}"
+    return rf"\left({inside}\right)" if tall else f"({inside})"
 
 
 class _LatexWriter(FormulaWriter):
@@ -468,11 +468,12 @@ def _of_text(shown: str) -> float:
     return total
 
 
-def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE - LABEL) -> list[tree.Formula]:
+def sums_in_lines(formula: tree.Formula, names: Notation) -> list[tree.Formula]:
     """A sum as sums that are about as wide as a page at most; anything else alone.
 
     A product with a sum that is wider than a line is multiplied out in as few parts as fit.
     """
+    room = PAGE - LABEL
     wide = isinstance(formula, tree.Product) and width(formula, names) > room
     given = formula.terms if isinstance(formula, tree.SumOf) else ((False, formula),) if wide else ()
     terms = [(subtracted, part) for subtracted, term in given for part in _in_parts(term, names, room)]
