@@ -143,12 +143,10 @@ def _newton_euler(author: Author) -> list[Piece]:
     eqs = author.equations
     pieces: list[Piece] = [
         Sentence(
-            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is "
-            "the sum of "
-            "all forces on it, and the rate of its angular momentum is the sum of their moments about the "
-            "centre of mass. "
-            "Symbols with the name of a joint are the components of its force and its moment on the body that "
-            "it carries."
+            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is the sum "
+            "of all forces on it, and the rate of its angular momentum is the sum of their moments about the centre of "
+            "mass. Symbols with the name of a joint are the components of its force and its moment on the body that it "
+            "carries."
         )
     ]
     for name in eqs.free_bodies:
@@ -192,10 +190,8 @@ def _augmented(author: Author) -> list[Piece]:
     return [
         Sentence(
             "The accelerations of the tree and the multipliers $\\boldsymbol{\\lambda}$ of the constraints are the "
-            "unknowns: "
-            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
-            "\\mathbf{Q}_v$ and "
-            "$\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
+            "unknowns: $\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
+            "\\mathbf{Q}_v$ and $\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
         ),
         *_block(author),
     ]
@@ -240,13 +236,11 @@ def _recursive(author: Author) -> list[Piece]:
     k = author.equations.kinematics
     pieces: list[Piece] = [
         Sentence(
-            "From ground outwards, the velocity of each link is that of the link that carries it plus that of "
-            "its joint, "
-            "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the "
-            "link; its wrench is "
-            "$\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. "
-            "From the last link "
-            "inwards, wrenches and inertias of the links that a link carries are added to its own."
+            "From ground outwards, the velocity of each link is that of the link that carries it plus that of its "
+            "joint, $\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the "
+            "link; its wrench is $\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j "
+            "\\mathbf{v}_j$. From the last link inwards, wrenches and inertias of the links that a link carries are "
+            "added to its own."
         )
     ]
     for place, branch in enumerate(k.topology.branches):

@@ -354,9 +354,8 @@ def forces(author: Author) -> list[Section]:
         text = "There are no degrees of freedom for forces to act on." if parts else "No forces act."
         return [Section("Forces", (Sentence(text),))]
     text = (
-        "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of "
-        "the variations of "
-        "the independent coordinates are its generalized forces."
+        "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of the "
+        "variations of the independent coordinates are its generalized forces."
     )
     found = [Section("Forces and their virtual work", (Sentence(text),))]
     elements = {force.name: force for force in m.forces}
@@ -418,9 +417,8 @@ def _weight(author: Author, name: str) -> list[Piece]:
     gravity = author.write("gravity", list(author.mechanism.gravity)).expressions
     return [
         Sentence(
-            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta "
-            "\\mathbf{r}_c$, with "
-            "the field of gravity in ground axes"
+            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta \\mathbf{r}_c$, "
+            "with the field of gravity in ground axes"
         ),
         author.line(r"\mathbf{g}", sympy.Matrix(3, 1, gravity)),
     ]

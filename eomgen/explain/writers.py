@@ -170,9 +170,8 @@ def write_html(title: str, sections: Sequence[Section], names: Notation) -> str:
     body += ["</details>"] * opened
     plain = html_text(title.replace("`", "").replace("$", ""))
     head = (
-        "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
-        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>{plain}</title><style>{_STYLE}</style></head>\n<body>"
+        "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
+        f"content='width=device-width,initial-scale=1'><title>{plain}</title><style>{_STYLE}</style></head>\n<body>"
     )
     return "\n".join([head, *body, "</body></html>", ""])
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 # -- atoms -------------------------------------------------------------------------------------------------------------
 
@@ -42,14 +42,39 @@ class Atom(NamedTuple):
     what: Any
 
 
+Value = TypeVar("Value")
+
+
+class PerAtom(Generic[Value]):
+    """A value of each atom, made once and in order: what is inside an atom has smaller numbers, however deep it is."""
+
+    def __init__(self, make: Callable[[int], Value]) -> None:
+        self._make = make
+        self._known: list[Value] = []
+
+    def __call__(self, atom: int) -> Value:
+        """The value of an atom."""
+        while len(self._known) <= atom:
+            self._known.append(self._make(len(self._known)))
+        return self._known[atom]
+
+
 class Atoms:
-    """A table of interned atoms."""
+    """A table of interned atoms.
+
+    Attributes
+    ----------
+    names_in : callable
+        The atoms of names that an atom is made of, itself included.
+    choices_in : callable
+        How deep choices between values stand in each other in an atom, itself included.
+    """
 
     def __init__(self) -> None:
         self.table: list[Atom] = []
         self._ids: dict[Atom, int] = {}
-        self._names: list[frozenset[int]] = []
-        self._choices: list[int] = []
+        self.names_in = PerAtom(self._names_in)
+        self.choices_in = PerAtom(self._choices_in)
 
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
@@ -79,25 +104,24 @@ class Atoms:
                 left += self.inside(atom)
         return found
 
+    def factors(self, poly: Poly, within: Collection[str] = SUMS) -> Iterator[tuple[int, Fraction | int]]:
+        """The atoms of a sum of products with their exponents, and those of the kinds of factors ``within``."""
+        for monomial in poly:
+            for atom, n in monomial:
+                yield atom, n
+                if self.table[atom].kind in within:
+                    yield from self.factors(dict(self.table[atom].what), within)
+
     def names(self, poly: Poly) -> frozenset[int]:
         """The atoms of names that stand in a polynomial, at any depth."""
         return frozenset().union(*(self.names_in(a) for monomial in poly for a, _ in monomial))
 
-    def names_in(self, atom: int) -> frozenset[int]:
-        """The atoms of names that an atom is made of, itself included."""
-        while len(self._names) <= atom:  # what is inside an atom has smaller numbers
-            k = len(self._names)
-            own = frozenset({k} if self.table[k].kind == "name" else ())
-            self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
-        return self._names[atom]
+    def _names_in(self, atom: int) -> frozenset[int]:
+        own = frozenset({atom} if self.table[atom].kind == "name" else ())
+        return own.union(*map(self.names_in, self.inside(atom)))
 
-    def choices_in(self, atom: int) -> int:
-        """How deep choices between values stand in each other in an atom, itself included."""
-        while len(self._choices) <= atom:
-            k = len(self._choices)
-            inside = max((self._choices[part] for part in self.inside(k)), default=0)
-            self._choices.append(inside + (self.table[k].kind == CHOICE))
-        return self._choices[atom]
+    def _choices_in(self, atom: int) -> int:
+        return max(map(self.choices_in, self.inside(atom)), default=0) + (self.table[atom].kind == CHOICE)
 
     def without_squared_signs(self, monomial: Monomial, kind: str) -> Monomial:
         """With x^2 for |x|^2; a sum in it is an atom of the kind."""
@@ -126,6 +150,13 @@ class Atoms:
                 powers[atom] += 1
                 x = ratio(x, factor)
         return tuple(sorted((a, n) for a, n in powers.items() if n)), x
+
+    def leaf(self, kind: str, value: Any) -> Poly:
+        """The polynomial of a symbol or a number of the graph."""
+        if kind == "sym":
+            return self.poly("sym", value)
+        amount, of_pi = number(value)
+        return {((self.id("pi", ""), 1),): amount} if of_pi else constant(amount)
 
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""
@@ -273,23 +304,15 @@ STACKED = 30.0  #: a fraction in a fraction: it is set small, and no line is bro
 
 
 class Costs:
-    """Lengths of what is made of a table of atoms."""
+    """Lengths of what is made of a table of atoms, ``of_atom`` of one by itself."""
 
     def __init__(self, atoms: Atoms, rates: Collection[str] = ()) -> None:
         self.atoms = atoms
         self.rates = rates
-        self._of: list[float] = []
-        self._roles_of: list[frozenset[str]] = []
-        self._fractions_of: list[int] = []
+        self.of_atom = PerAtom(self._atom)
+        self._roles = PerAtom(self._roles_in)
+        self._fractions = PerAtom(self._fractions_in)
         self._products: dict[Monomial, float] = {}
-
-    def of_atom(self, atom: int) -> float:
-        """An atom by itself."""
-        while (
-            len(self._of) <= atom
-        ):  # those inside an atom have smaller numbers: no recursion, calls may be nested deep
-            self._of.append(self._atom(len(self._of)))
-        return self._of[atom]
 
     def _atom(self, atom: int) -> float:
         kind, what = self.atoms.table[atom]
@@ -310,13 +333,10 @@ class Costs:
         """What a product holds beside lengths, masses and the like: rates, sines and cosines."""
         return frozenset(role for a, _ in monomial for role in self._roles(a))
 
-    def _roles(self, atom: int) -> frozenset[str]:
-        while len(self._roles_of) <= atom:
-            kind, what = self.atoms.table[len(self._roles_of)]
-            found = {"rate"} if kind in ("sym", "name") and what in self.rates else {"turn"} if kind in TURNS else set()
-            found.update(r for part in self.atoms.inside(len(self._roles_of)) for r in self._roles_of[part])
-            self._roles_of.append(frozenset(found))
-        return self._roles_of[atom]
+    def _roles_in(self, atom: int) -> frozenset[str]:
+        kind, what = self.atoms.table[atom]
+        own = {"rate"} if kind in ("sym", "name") and what in self.rates else {"turn"} if kind in TURNS else set()
+        return frozenset(own).union(*map(self._roles, self.atoms.inside(atom)))
 
     def of_power(self, atom: int, n: Fraction | int) -> float:
         """A power of an atom, without the sign that joins it to its neighbours."""
@@ -349,14 +369,12 @@ class Costs:
             cost += STACKED * sum(self._fractions(a) for a, n in monomial if n > 0)
         return cost
 
-    def _fractions(self, atom: int) -> int:
+    def _fractions_in(self, atom: int) -> int:
         """How many fractions there are in a factored sum, at any depth."""
-        while len(self._fractions_of) <= atom:
-            kind, what = self.atoms.table[len(self._fractions_of)]
-            sums = [monomial for monomial, _ in what] if kind == "factor" else []
-            inside = sum(self._fractions_of[a] for monomial in sums for a, _ in monomial)
-            self._fractions_of.append(inside + sum(any(n < 0 for _, n in monomial) for monomial in sums))
-        return self._fractions_of[atom]
+        kind, what = self.atoms.table[atom]
+        sums = [monomial for monomial, _ in what] if kind == "factor" else []
+        inside = sum(self._fractions(a) for monomial in sums for a, _ in monomial)
+        return inside + sum(any(n < 0 for _, n in monomial) for monomial in sums)
 
     def of_term(self, monomial: Monomial, x: Number) -> float:
         """A term of a sum with the sign that joins it; nothing where x is zero."""

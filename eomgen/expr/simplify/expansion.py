@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from math import gcd, lcm
-from typing import Any
+from typing import Any, Generic, TypeVar
 
-from ..core import Graph, reachable
+from ..core import LEAVES, Graph, reachable
 from .atoms import (
     ONE,
     TURNS,
@@ -20,12 +21,10 @@ from .atoms import (
     Work,
     add,
     common,
-    constant,
     freeze,
     inverse,
     join,
     multiply,
-    number,
     ratio,
     scaled,
 )
@@ -263,8 +262,34 @@ FEW = 3  #: terms up to which a sum of sines and cosines is taken for a product 
 MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
 
 
-class Expansion:
-    """Polynomials of the nodes of one graph.
+Made = TypeVar("Made")
+
+
+class OfNodes(ABC, Generic[Made]):
+    """What is made of the nodes of a graph, of each once, from its operands."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self._of: dict[int, Made] = {}
+
+    def put(self, i: int, made: Made) -> None:
+        """Let something, such as a name, stand for a node from here on."""
+        self._of[i] = made
+
+    def of(self, i: int) -> Made:
+        """What is made of a node."""
+        for k in reachable(self.graph, [i], stop=self._of):
+            if k not in self._of:
+                self._of[k] = self._made(k, *self.graph.nodes[k])
+        return self._of[i]
+
+    @abstractmethod
+    def _made(self, i: int, kind: str, *args: Any) -> Made:
+        """Of a node whose operands are made."""
+
+
+class Expansion(OfNodes[Poly]):
+    """Polynomials of the nodes of one graph, multiplied out.
 
     Attributes
     ----------
@@ -276,31 +301,15 @@ class Expansion:
     """
 
     def __init__(self, graph: Graph, work: Work) -> None:
-        self.graph = graph
+        super().__init__(graph)
         self.work = work
         self.atoms = Atoms()
         self.angles = JoinedAngles(self.atoms, work)
         self.under_roots: set[int] = set()
-        self._of: dict[int, Poly] = {}
 
-    def expand(self, i: int) -> Poly:
-        """The polynomial of a node."""
-        for k in reachable(self.graph, [i], stop=self._of):
-            if k not in self._of:
-                self._of[k] = self._expanded(k)
-        return self._of[i]
-
-    def put(self, i: int, poly: Poly) -> None:
-        """Let a polynomial, such as a name, stand for a node from here on."""
-        self._of[i] = poly
-
-    def _expanded(self, i: int) -> Poly:
-        kind, *args = self.graph.nodes[i]
-        if kind == "const":
-            value, of_pi = number(args[0])
-            return {((self.atoms.id("pi", ""), 1),): value} if of_pi else constant(value)
-        if kind == "sym":
-            return self.atoms.poly("sym", args[0])
+    def _made(self, i: int, kind: str, *args: Any) -> Poly:
+        if kind in LEAVES:
+            return self.atoms.leaf(kind, args[0])
         parts = [self._of[k] for k in args]
         if kind in ("add", "sub"):
             return self._sum(parts[0], parts[1], 1 if kind == "add" else -1)

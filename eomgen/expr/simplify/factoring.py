@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from fractions import Fraction
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ..core import reachable
+from ..core import LEAVES
 from .atoms import (
     ONE,
     STACKED,
@@ -23,16 +23,14 @@ from .atoms import (
     Work,
     add,
     common,
-    constant,
     freeze,
     inverse,
     join,
     multiply,
-    number,
     ratio,
     scaled,
 )
-from .expansion import Expansion, content, divided
+from .expansion import Expansion, OfNodes, content, divided
 
 # -- factors -----------------------------------------------------------------------------------------------------------
 
@@ -221,21 +219,27 @@ def _divided_by(poly: Poly, atom: int, atoms: Atoms) -> Poly:
     divisor: Poly = dict(atoms.table[atom].what)
     if len(divisor) < 2:
         return poly
-    own = {a for m in divisor for a, _ in m}
-    groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
-    for m, x in poly.items():
-        power = next((n for a, n in m if a == atom), 0)
-        if power <= -1:
-            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
-            group = groups.setdefault((outer, power), {})
-            group[tuple(f for f in m if f[0] in own)] = x
-    for (outer, power), above in groups.items():
+    for (outer, power), above in _over(poly, atom, divisor, lambda n: n <= -1).items():
         quotient = divided(above, divisor) if above else None
         if quotient is not None:
             rest = ((atom, power + 1),) if power != -1 else ()
             poly = add(poly, multiply(above, {join(outer, ((atom, power),)): 1}), -1)
             poly = add(poly, multiply(quotient, {join(outer, rest): 1}))
     return poly
+
+
+def _over(
+    poly: Poly, atom: int, divisor: Poly, is_below: Callable[[Fraction | int], bool]
+) -> dict[tuple[Monomial, Fraction | int], Poly]:
+    """What stands over powers of an atom, by what is beside it but for symbols of the divisor, and by the power."""
+    own = {a for m in divisor for a, _ in m}
+    groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
+    for m, x in poly.items():
+        power = dict(m).get(atom, 0)
+        if is_below(power):
+            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
+            groups.setdefault((outer, power), {})[tuple(f for f in m if f[0] in own)] = x
+    return groups
 
 
 # -- signs as quotients ------------------------------------------------------------------------------------------------
@@ -260,14 +264,7 @@ def _is_below(atom: int, n: Fraction | int, atoms: Atoms) -> bool:
 
 def _sign_divided_by(poly: Poly, atom: int, atoms: Atoms) -> Poly:
     divisor = dict(atoms.table[atom].what[0])
-    own = {a for m in divisor for a, _ in m}
-    groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
-    for m, x in poly.items():
-        power = dict(m).get(atom, 0)
-        if _is_below(atom, power, atoms):
-            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
-            groups.setdefault((outer, power), {})[tuple(f for f in m if f[0] in own)] = x
-    for (outer, power), above in groups.items():
+    for (outer, power), above in _over(poly, atom, divisor, lambda n: _is_below(atom, n, atoms)).items():
         left, once = above, _quotient(above, divisor)
         rest = power
         while rest < 0 and once is not None and (twice := _quotient(once, divisor)) is not None:  # x^2 is |x|^2
@@ -302,33 +299,18 @@ def _sign(outer: Monomial, power: Fraction | int, atom: int, atoms: Atoms) -> Po
 # -- products as they were formed --------------------------------------------------------------------------------------
 
 
-class Literal:
+class Literal(OfNodes[Poly]):
     """Forms of nodes as they stand; sums in products are atoms of kind ``factor``."""
 
     def __init__(self, expansion: Expansion) -> None:
+        super().__init__(expansion.graph)
         self.expansion = expansion
         self.atoms = expansion.atoms
-        self._of: dict[int, Poly] = {}
 
-    def put(self, i: int, poly: Poly) -> None:
-        """Let a polynomial, such as a name, stand for a node from here on."""
-        self._of[i] = poly
-
-    def form(self, i: int) -> Poly:
-        """The form of a node."""
-        graph = self.expansion.graph
-        for k in reachable(graph, [i], stop=self._of):
-            if k not in self._of:
-                self._of[k] = self._formed(*graph.nodes[k])
-        return self._of[i]
-
-    def _formed(self, kind: str, *args: object) -> Poly:
-        if kind == "const":
-            value, of_pi = number(args[0])  # type: ignore[arg-type]
-            return {((self.atoms.id("pi", ""), 1),): value} if of_pi else constant(value)
-        if kind == "sym":
-            return self.atoms.poly("sym", args[0])
-        parts = [self._of[k] for k in args]  # type: ignore[index]
+    def _made(self, i: int, kind: str, *args: Any) -> Poly:
+        if kind in LEAVES:
+            return self.atoms.leaf(kind, args[0])
+        parts = [self._of[k] for k in args]
         if kind in ("add", "sub"):
             return add(parts[0], parts[1], 1 if kind == "add" else -1)
         if kind == "neg":
@@ -368,34 +350,26 @@ class Parts(NamedTuple):
     out: Poly  #: multiplied out
 
 
-class Mixed:
+class Mixed(OfNodes[Parts]):
     """Sums of products that are kept and of what is multiplied out."""
 
     def __init__(self, expansion: Expansion, factoring: Factoring, simplified: Callable[[Poly], Poly]) -> None:
+        super().__init__(expansion.graph)
         self.expansion, self.factoring, self.simplified = expansion, factoring, simplified
         self.atoms: Atoms = expansion.atoms
-        self._of: dict[int, Parts] = {}
-
-    def put(self, i: int, poly: Poly) -> None:
-        """Let a polynomial, such as a name, stand for a node from here on."""
-        self._of[i] = Parts({}, poly)
 
     def form(self, i: int) -> Poly | None:
         """The form of a node; None where nothing is kept."""
-        for k in reachable(self.expansion.graph, [i], stop=self._of):
-            if k not in self._of:
-                self._of[k] = self._parts(k)
-        parts = self._of[i]
+        parts = self.of(i)
         return self._whole(parts) if parts.kept else None
 
     def _whole(self, parts: Parts) -> Poly:
         """Both together, with common factors taken out."""
         return self.factoring.factored(add(parts.kept, self.simplified(parts.out)))
 
-    def _parts(self, i: int) -> Parts:
-        kind, *args = self.expansion.graph.nodes[i]
+    def _made(self, i: int, kind: str, *args: Any) -> Parts:
         if kind not in ("add", "sub", "neg", "mul", "absorb", "div"):
-            return Parts({}, self.expansion.expand(i))
+            return Parts({}, self.expansion.of(i))
         first, *rest = (self._of[k] for k in args)
         if kind == "neg":
             return Parts(scaled(first.kept, -1), scaled(first.out, -1))
@@ -413,10 +387,10 @@ class Mixed:
             if many.kept:  # a sum of which some products are kept: each has one more factor
                 return Parts(multiply(many.kept, self._factor(few)), self.expansion.times(many.out, few.out))
             if max(len(a.out), len(b.out)) < 2:
-                return Parts({}, self.expansion.expand(i))
+                return Parts({}, self.expansion.of(i))
         if a.kept and b.kept:
             return Parts(multiply(self._factor(a), self._factor(b)), {})
-        out = self.expansion.expand(i)
+        out = self.expansion.of(i)
         if self._has_lengths(out):
             kept = multiply(self._factor(a), self._factor(b))
             costs = self.factoring.costs.of_terms
@@ -433,11 +407,11 @@ class Mixed:
 
     def _quotient(self, i: int, above: Parts, below: int) -> Parts:
         if not above.kept:
-            return Parts({}, self.expansion.expand(i))
-        over = self.expansion.quotient({ONE: 1}, self.expansion.expand(below))
+            return Parts({}, self.expansion.of(i))
+        over = self.expansion.quotient({ONE: 1}, self.expansion.of(below))
         if len(over) != 1:
-            return Parts({}, self.expansion.expand(i))
-        return Parts(multiply(above.kept, over), self.expansion.quotient(above.out, self.expansion.expand(below)))
+            return Parts({}, self.expansion.of(i))
+        return Parts(multiply(above.kept, over), self.expansion.quotient(above.out, self.expansion.of(below)))
 
     def _factor(self, parts: Parts) -> Poly:
         """One term, a sum in it being one factor."""

@@ -18,7 +18,7 @@ from ...base.records import dataclass
 from ..core import LEAVES, Expr, Graph, common_graph, operands, reachable
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .expansion import Expansion
-from .factoring import Factoring, Literal, Mixed, with_signs, without_exact_quotients
+from .factoring import Factoring, Literal, Mixed, Parts, with_signs, without_exact_quotients
 from .names import EACH, NAME, GoodNames, Named, SharedSums, inlined, is_plain
 
 WHOLE = (10**9,)
@@ -248,7 +248,7 @@ class _Attempt:
             alike = scaled(alike, sign)
             self.expansion.put(i, alike)
             self.literal.put(i, alike)
-            self.mixed.put(i, alike)
+            self.mixed.put(i, Parts({}, alike))
         polys = [self._shortest(x.id) for x in exprs]
         fixed = {self.expansion.atoms.id("name", name) for name, _ in given}
         self.work.left = max(self.work.left, LATER)
@@ -257,11 +257,11 @@ class _Attempt:
 
     def _shortest(self, i: int) -> Poly:
         """A node multiplied out, simplified and factored, or as it stands where that is shorter."""
-        as_formed = self.literal.form(i)
+        as_formed = self.literal.of(i)
         cost = self.factoring.costs.of_terms(as_formed)
         try:
             with self.work.at_most(EACH * cost):
-                expanded = self.factoring.factored(self._simplified(self.expansion.expand(i)))
+                expanded = self.factoring.factored(self._simplified(self.expansion.of(i)))
         except TooLongError:
             return as_formed
         shortest = expanded if self.factoring.costs.of_terms(expanded) <= cost else as_formed

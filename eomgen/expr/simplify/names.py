@@ -186,8 +186,8 @@ class GoodNames:
         uses: Counter[int] = Counter()
         in_root: set[int] = set()
         for poly in (*(poly for _, poly in named), *polys):
-            for atom, n in self.powers(poly):
-                if n < 0 or n != int(n):
+            for atom, n in self.atoms.factors(poly):
+                if self.atoms.table[atom].kind in SUMS and (n < 0 or n != int(n)):
                     uses[atom] += 1
                     in_root.update([atom] if n != int(n) else [])
         for atom, count in sorted(uses.items()):
@@ -197,19 +197,11 @@ class GoodNames:
                 self.roots[atom] = name, 2 if atom in in_root else 1
                 self._taken.add(name)
 
-    def powers(self, poly: Poly) -> Iterator[tuple[int, Fraction | int]]:
-        """Sums that stand in products in a sum, with their exponents, those in its factors included."""
-        for monomial in poly:
-            for atom, n in monomial:
-                kind, what = self.atoms.table[atom]
-                if kind in SUMS:
-                    yield atom, n
-                    yield from self.powers(dict(what))
-
     def choose(self, named: Named, polys: Sequence[Poly], prefix: str) -> None:
         """Of a form with intermediates, those that begin with ``prefix`` and a number get better names."""
         every = [*(poly for _, poly in named), *polys]
-        for atom, uses in sorted(Counter(a for poly in every for a in self._turns(poly)).items()):
+        turns = (a for poly in every for a, _ in self.atoms.factors(poly) if self.atoms.table[a].kind in TURNS)
+        for atom, uses in sorted(Counter(turns).items()):
             name = self._of_turn(atom)
             saved = uses * (self.costs.of_atom(atom) - len(name)) - self.costs.of_atom(atom) - NAME
             if saved > 0 and name not in self._taken:
@@ -228,16 +220,6 @@ class GoodNames:
                     better = self._free(CONSTANT if atom in constant else prefix)
                 self.intermediates[text] = better
                 self._taken.add(better)
-
-    def _turns(self, poly: Poly) -> Iterator[int]:
-        """Sines and cosines in a sum, those in its factors included."""
-        for monomial in poly:
-            for atom, _ in monomial:
-                kind, what = self.atoms.table[atom]
-                if kind in TURNS:
-                    yield atom
-                elif kind in SUMS:
-                    yield from self._turns(dict(what))
 
     def _of_turn(self, atom: int) -> str:
         kind, angle = self.atoms.table[atom]
@@ -330,20 +312,12 @@ class SharedSums:
     def _sums(self) -> Counter[Frozen]:
         """Sums of the form and how often each is written."""
         found: Counter[Frozen] = Counter()
-
-        def look_into(poly: Poly) -> None:
-            for monomial in poly:
-                for atom, _ in monomial:
-                    kind, what = self.atoms.table[atom]
-                    if kind == "factor":
-                        found[what] += 1
-                        look_into(dict(what))
-
         outputs = {freeze(poly): poly for poly in self.polys}  # one that comes twice, as M_12 and M_21, is told once
         for poly in (*(poly for _, poly in self.named), *outputs.values()):
             if len(poly) > 1:
                 found[freeze(poly)] += 1
-            look_into(poly)
+            inside = (self.atoms.table[a] for a, _ in self.atoms.factors(poly, ("factor",)))
+            found.update(what for kind, what in inside if kind == "factor")
         return found
 
     def _shared(self, sums: Collection[Frozen]) -> Iterator[Frozen]:
