@@ -6,7 +6,7 @@ from collections.abc import Callable
 from copy import copy
 from functools import cached_property
 
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from ..expr.schedule import count
 from ..mechanics import Kinematics
 from ..mechanics.methods import METHODS, TreeEquations
@@ -107,7 +107,7 @@ def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> 
         u.name: u.value for u in m.inputs
     }
     known = (*kinematics.names, *kinematics.velocity_names, *numbers, "t")
-    evaluate = compile_evaluator([bodies.is_sound], known)
+    evaluate = Evaluator([bodies.is_sound], known)
     rest = [0.0] * len(kinematics.velocity_names)
     found = [bool(evaluate([*sample, *rest, *numbers.values(), 0.0])[0] == 1.0) for sample in mobility.samples]
     return found[0] and 2 * sum(found) > len(found)

@@ -15,7 +15,7 @@ from ..base import algebra, texts
 from ..base.algebra import Array
 from ..base.files import Kept, shipped
 from ..errors import EomgenError
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from .program import Program
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def _followed(program: Program, q: list[float], v: Array, dependent: list[int]) 
         return none
     names = [*program.coordinates, *program.velocities, *program.parameters, *program.inputs, program.time]
     try:
-        evaluate = compile_evaluator(rows, names)
+        evaluate = Evaluator(rows, names)
 
         def residual(change: Array) -> Array:
             return np.array(evaluate([*q, *(v + change), *values[0], *values[1], 0.0]), dtype=float)

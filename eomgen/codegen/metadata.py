@@ -18,7 +18,7 @@ from ..elements.joints.joint_types import Cylindrical, Free, Planar, Prismatic, 
 from ..errors import TO_BE_FINITE, ModelError, UsageError
 from ..expr.core import Expr, reachable, symbols_of
 from ..expr.differentiate import gradient
-from ..expr.evaluate import compile_evaluator, evaluate
+from ..expr.evaluate import Evaluator, evaluate
 from ..expr.schedule import record_tape
 from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import row_groups, row_scales, row_velocities
@@ -365,4 +365,4 @@ def _longest_step(kinematics: Kinematics) -> dict[str, float]:
     rates = kinematics.resolve([s.stabilisation for s in kinematics.mechanism.switched])
     if not rates or any(values.get(name) is None for name in symbols_of(rates)):
         return {}
-    return {"max_step": HELD_STEP / max(compile_evaluator(rates, tuple(values))(list(values.values())))}
+    return {"max_step": HELD_STEP / max(Evaluator(rates, tuple(values))(list(values.values())))}

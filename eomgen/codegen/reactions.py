@@ -21,7 +21,7 @@ from ..elements.forces.friction import is_carried, multiplier_of, reaction_of
 from ..errors import ModelError, Problem
 from ..expr.core import Expr, common_graph, operands, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
 from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import ConstraintFunctions
@@ -136,7 +136,7 @@ def _probed(expressions: Sequence[Expr]) -> np.ndarray:
     names = sorted(symbols_of(expressions))
     values = np.random.default_rng(2).uniform(0.5, 1.5, (PROBES, len(names)))
     with np.errstate(all="ignore"):
-        evaluate = compile_evaluator(expressions, names)
+        evaluate = Evaluator(expressions, names)
         return np.array([evaluate(row.tolist()) for row in values])
 
 
@@ -209,7 +209,7 @@ def without_inertia(kinematics: Kinematics, mobility: Mobility, mass_matrix: Seq
         return []
     flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
     names = sorted(symbols_of(flat))
-    evaluator = compile_evaluator(flat, names)
+    evaluator = Evaluator(flat, names)
     weights = None
     for place in mobility.samples or (mobility.q_reference,):
         known = dict(zip(kinematics.names, place, strict=True)) | values
@@ -283,7 +283,7 @@ def _shared(
     functions = ConstraintFunctions(kinematics, {name: float(value or 0.0) for name, value in numbers.items()})
     slopes = jacobian(list(values.values()), list(multipliers))
     names = sorted(symbols_of(list(slopes.values())))
-    evaluate = compile_evaluator(list(slopes.values()), names)
+    evaluate = Evaluator(list(slopes.values()), names)
     found, judged = set[str](), False
     for place in mobility.samples:
         J = functions.scaled_jacobian(np.array(place))

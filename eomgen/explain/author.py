@@ -205,7 +205,7 @@ class Author:
     def write(self, what: str, expressions: Sequence[Expr], prefix: str = "z") -> Written:
         """Expressions in SymPy, kept to be compared with what they were."""
         expressions = self.equations.with_values(expressions)
-        written = self.equations.in_sympy(expressions, prefix)
+        written: Written = self.equations.in_sympy(expressions, prefix)
         self.formed.append((what, expressions, written))
         return written
 

@@ -24,12 +24,19 @@ def _pack(*values: Any) -> tuple[Any, ...]:
 
 
 class Evaluator:
-    """A schedule that evaluates the same expressions again and again; made by :func:`compile_evaluator`.
+    """A schedule that evaluates the same expressions again and again.
 
-    Attributes
+    Parameters
     ----------
-    names : tuple of str
-        Order of the values when they are given as a sequence.
+    outputs : sequence of Expr
+        Expressions of one graph.
+    names : sequence of str
+        Symbols that will be given, at least those the outputs depend on, in the order of values given as a sequence.
+
+    Raises
+    ------
+    UsageError
+        The outputs depend on a symbol that is not named.
     """
 
     def __init__(self, outputs: Sequence[Expr], names: Sequence[str]) -> None:
@@ -170,29 +177,6 @@ class Evaluator:
                     data[s] = None
         found = (data[s] for s in self._outputs)  # of a sum over pairs a list
         return [x if isinstance(x, list) or np.ndim(x) else float(x) for x in found]
-
-
-def compile_evaluator(outputs: Sequence[Expr], names: Sequence[str]) -> Evaluator:
-    """Prepare the outputs for many evaluations.
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-    names : sequence of str
-        Symbols that will be given, at least those the outputs depend on.
-
-    Returns
-    -------
-    Evaluator
-        Called with a mapping, or with a sequence in the order of ``names``.
-
-    Raises
-    ------
-    UsageError
-        The outputs depend on a symbol that is not named.
-    """
-    return Evaluator(outputs, names)
 
 
 def evaluate(outputs: Sequence[Expr], values: Mapping[str, Value]) -> list[Value]:

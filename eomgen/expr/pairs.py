@@ -240,9 +240,9 @@ class PairFunction:
     @cached_property
     def in_floats(self) -> PairSum:
         """Its loops on floats and arrays."""
-        from .evaluate import compile_evaluator
+        from .evaluate import Evaluator
 
-        return self.evaluator(compile_evaluator)
+        return self.evaluator(Evaluator)
 
 
 @dataclass(frozen=True, eq=False)

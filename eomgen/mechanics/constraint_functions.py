@@ -12,7 +12,7 @@ from ..base.limits.numbers import BY_CHANCE, LARGE_LOOP, ROUNDED, SMALL_LOOP, TI
 from ..base.numeric.assembly import RESTARTS, Assembly, ConstraintSystem, CutJoints, close, close_nearest
 from ..base.numeric.scales import Scales, Space
 from ..expr.core import Expr, reachable, substitute, symbols_of
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from ..expr.identity import is_rounding, terms_of, with_bounds, with_likely_bounds
 from .kinematics import Kinematics
 
@@ -280,7 +280,7 @@ class ConstraintFunctions:
         self.system = ConstraintSystem(position, place, kinematics.names, kinematics.kinds, c.labels, cut, aligned)
 
     def _compile(self, outputs: Sequence[Expr]) -> Callable[[Array, float], Array]:
-        evaluator, rest = compile_evaluator(list(outputs), self._names), list(self.values.values())
+        evaluator, rest = Evaluator(list(outputs), self._names), list(self.values.values())
 
         def call(q: Array, t: float) -> Array:
             with np.errstate(all="ignore"):

@@ -18,7 +18,7 @@ from ..elements.constraints import Driver, RollingDisc
 from ..elements.constraints.rolling import LYING
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..expr.core import Expr, substitute, symbols_of
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
@@ -424,7 +424,7 @@ def initial_values(
 ) -> dict[str, float]:
     """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
     given: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
-    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
+    numbers = Evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
     return {name: float(x) for name, x in zip(given, numbers, strict=True)}
 
 

@@ -26,7 +26,7 @@ from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.differentiate import jacobian
-from ..expr.evaluate import compile_evaluator
+from ..expr.evaluate import Evaluator
 from ..expr.identity import settled_vector, size_of
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
@@ -368,7 +368,7 @@ def _radius_of_gyration(mechanism: Mechanism, size: Expr) -> float:
     entries = [x for b in mechanism.bodies for x in (b.mass, b.inertia[0][0], b.inertia[1][1], b.inertia[2][2])]
     if not entries or any(p.value is None for p in mechanism.parameters):
         return 0.0
-    numbers = compile_evaluator([size, *entries], [p.name for p in mechanism.parameters])
+    numbers = Evaluator([size, *entries], [p.name for p in mechanism.parameters])
     declared, *found = numbers([p.value for p in mechanism.parameters])
     mass, inertia = sum(found[::4]), sum(found) - sum(found[::4])
     radius = float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0

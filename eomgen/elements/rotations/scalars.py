@@ -16,7 +16,7 @@ from ...base.algebra import quarter_turns
 from ...base.limits.numbers import UNIT
 from ...expr.core import Expr
 
-Scalar = Any  #: a number, an :class:`~eomgen.expr.Expr` or a SymPy expression
+Scalar = Any  #: a number, an :class:`~eomgen.expr.core.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]
 
 

@@ -370,9 +370,6 @@ class Expansion(OfNodes[Poly]):
         above = multiply(a, {inverse(monomial): ratio(1, x)})
         if below == {ONE: 1}:
             return self._settled(above)
-        quotient = divided(above, below)
-        if quotient is not None:
-            return quotient
         return multiply(above, {((self.atoms.id("sum", freeze(below)), -1),): 1})
 
     def _root(self, a: Poly) -> Poly:

@@ -14,7 +14,7 @@ from ...base.numeric.ranks import partition
 from ...base.records import dataclass
 from ...elements.frames import Frame, Marker
 from ...errors import EvaluationError, ModelError, PartitionError, Problem
-from ...expr.evaluate import compile_evaluator, evaluate
+from ...expr.evaluate import Evaluator, evaluate
 from ...model.mechanism import Mechanism
 from .. import Kinematics
 from ..constraint_functions import ConstraintFunctions
@@ -160,7 +160,7 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
         return []
     found = tree.pivots or (tree.constrained().pivots if tree.constrained is not None and functions.m else ())
     if found:
-        moved = compile_evaluator(list(found), (*kinematics.names, *numbers, "t"))
+        moved = Evaluator(list(found), (*kinematics.names, *numbers, "t"))
         for sample in mobility.samples:
             pivots = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
             sizes = np.array(pivots)
@@ -214,7 +214,7 @@ def _inertia_at_samples(
     """q, M in the scales of the coordinates, and the motions B that the constraints allow, where these are known."""
     kinematics, n, scales = functions.kinematics, functions.n, functions.scales.q
     entries = [x for row in tree.mass_matrix for x in row]
-    mass = compile_evaluator(entries, (*kinematics.names, *functions.values, "t"))
+    mass = Evaluator(entries, (*kinematics.names, *functions.values, "t"))
     independent = [kinematics.velocity_labels.index(name) for name in mobility.independent]
     for sample in mobility.samples:
         q, flat = np.array(sample), mass([*sample, *functions.values.values(), 0.0])
