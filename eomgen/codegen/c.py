@@ -24,9 +24,8 @@ from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import NoSeriesError
 from .standalone_c import in_single_precision, operations_of, refuse_double, stack_of, states_beside_change_points
 
-#: Headers of the numbers that functions compute with, and those that lanes need besides.
+#: Headers of the numbers that functions compute with, and of what stands around functions.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h")
-PROCESSOR = "eomgen_processor.h"
 #: Pieces of long functions that take more text than this (bytes) go into files of about this length each.
 LENGTH = 150_000
 #: Characters of a C literal, which compilers need not take longer than 4095, and of one of its lines.  gcc reads the
@@ -97,7 +96,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     }
     if program.drivers:
         sources |= {name: read_header(name) for name in SOLVER_HEADERS} | {SOLVER: read_layer()[SOLVER]}
-    sources |= {name: read_header(name) for name in (*HEADERS, *([PROCESSOR] if lanes else []))}
+    sources |= {name: read_header(name) for name in HEADERS}
     if precision:
         context |= {"costs": _costs(program, sources), "most_states": states_beside_change_points()}
     sources |= {f"{name}.h": render("c/model.h.j2", context), "model.json": metadata_json(program)}

@@ -25,7 +25,7 @@ LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
 DERIVATIVES = ("inverse_dynamics_derivatives",)
 
 #: Width -> instructions it needs on x86-64 beyond those that every such processor has, and their name in
-#: eomgen_processor.h.
+#: eomgen_calls.h.
 WIDTHS: dict[int, tuple[tuple[str, ...], str]] = {
     2: ((), ""),
     4: (("avx2",), "EOMGEN_AVX2"),

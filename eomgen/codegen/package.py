@@ -47,9 +47,6 @@ ANALYSES = ("motion_range", "linearize", "modes", "equilibrium", "reactions", "u
 CARRIED = ("errors.py", "module.py", "base", "runtime")
 CARRIED_ANALYSES = ("analysis",)
 
-#: Files of every package.
-ABOUT = ("LICENSE.txt", "PROVENANCE.md")
-
 
 def emit_package(
     program: Program,
@@ -94,8 +91,9 @@ def emit_package(
     if analyses and not row.module:
         raise cannot(f"analyses are for Python packages; target {target} is none")
     context = _context(program, analyses) | {"precision": precision}
-    about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
-    return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})
+    files = {"LICENSE.txt": render("python/LICENSE.txt.j2", context), **row.files(program, context)}
+    files["README.md"] += render("python/provenance.md.j2", context)
+    return SourceSet({"model.json": metadata_json(program), **files})
 
 
 def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:

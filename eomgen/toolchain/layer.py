@@ -46,7 +46,7 @@ LAYER = {
 }
 
 #: Headers that models and the layer share.
-HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h", "eomgen_processor.h", *SOLVER_HEADERS)
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h", *SOLVER_HEADERS)
 
 
 @cache

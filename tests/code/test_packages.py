@@ -139,7 +139,7 @@ def test_packages_say_whence_they_are_and_whose(target: str, tmp_path: Path) -> 
     assert found["versions"]["numpy"] == np.__version__
     assert {"python", "sympy", "eomgen"} <= found["versions"].keys()
     assert found["model_digest"] == facts["model_digest"]
-    text = (folder / "PROVENANCE.md").read_text()
+    text = (folder / "README.md").read_text()
     assert facts["model_digest"] in text
     assert f"| version of numpy | `{np.__version__}` |" in text
     told = (folder / "LICENSE.txt").read_text()
@@ -304,7 +304,7 @@ def test_a_wheel_in_c_has_the_bits_of_the_module_here(tmp_path: Path, monkeypatc
         file.extractall(tmp_path / "there")
         names, core = file.namelist(), file.read("pendulum/_native.abi3.so")
         about = file.read("pendulum-0.1.0.dist-info/METADATA").decode()
-    files = {"__init__.pyi", "py.typed", "PROVENANCE.md", "model.json", "tests/test_recorded.py", "tests/recorded.json"}
+    files = {"__init__.pyi", "py.typed", "model.json", "tests/test_recorded.py", "tests/recorded.json"}
     assert {f"pendulum/{name}" for name in files} <= {*names}
     assert "pendulum-0.1.0.dist-info/licenses/LICENSE.txt" in names
     assert re.findall(r"^Requires-Dist: (\w+)", about, re.MULTILINE)[0] == "numpy"

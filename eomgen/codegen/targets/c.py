@@ -11,7 +11,7 @@ from ..standalone_c import in_single_precision
 
 
 def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
-    """Sources, headers, Makefile, CMakeLists.txt, what pkg-config reads, README."""
+    """Sources, headers, Makefile, CMakeLists.txt, README."""
     name, precision = program.name, context["precision"]
     sources = dict(emit_c(program, precision))
     c_files = [file for file in sources if file.endswith(".c")]
@@ -27,6 +27,5 @@ def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
         **(in_single_precision(example) if precision == "float" else example),
         "Makefile": render("c/Makefile.j2", context),
         "CMakeLists.txt": render("c/CMakeLists.txt.j2", context),
-        f"{name}.pc.in": render("c/pkg_config.pc.in.j2", context),
         "README.md": render("c/README.md.j2", context),
     }

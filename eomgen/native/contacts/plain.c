@@ -10,7 +10,8 @@
 #include "eomgen_contact_steps.h"
 
 #ifdef EOMGEN_TWO_WIDTHS
-#include "eomgen_processor.h"
+#define EOMGEN_ASKS_PROCESSOR
+#include "eomgen_calls.h"
 #define SUITED(wide, name) ((wide) ? eomgen_wide_##name : eomgen_plain_##name)
 int eomgen_contacts_wide(void) { return eomgen_processor() != 0; }
 #else

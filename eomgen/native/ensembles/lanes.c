@@ -7,7 +7,7 @@
 
 #if EOMGEN_LANES & LANES
 #define EOMGEN_CONTRACT
-#include "eomgen_processor.h"
+#include "eomgen_calls.h"
 #if LANES == 4 && defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
 #elif LANES == 4

@@ -7,7 +7,8 @@
 enum { WIDE_FROM = 6 };
 
 #if defined(EOMGEN_VECTORS) && defined(__x86_64__)
-#include "eomgen_processor.h"
+#define EOMGEN_ASKS_PROCESSOR
+#include "eomgen_calls.h"
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
 #else
