@@ -151,7 +151,7 @@ def actuator_forces(
     rest = needed - np.einsum("jik,ik->jk", S, forces - base[:, None])
     multipliers = solve_multipliers(C_q, rest, layout.scales)
     reactions = None
-    if module.metadata.get("wrenches"):
+    if module.info.wrenches:
         reactions = _with_drives(states, names, accelerations, multipliers, forces)
     shaped = states.shaped
     return ActuatorForces(

@@ -588,7 +588,7 @@ class _Problem:
 
 def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, Array]:
     low, high = np.full(len(problem.names), -np.inf), np.full(len(problem.names), np.inf)
-    for name, pair in bounds_of(problem.module.metadata).items():  # outside of which there is no run
+    for name, pair in bounds_of(problem.module.info).items():  # outside of which there is no run
         if name in problem.names:
             low[problem.names.index(name)], high[problem.names.index(name)] = pair
     if given is not None:

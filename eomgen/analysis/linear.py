@@ -63,9 +63,9 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
     places = _chosen(layout.q, names, n_q - count)
-    if places is None and "independent_places" in layout.metadata:
+    if places is None and layout.info.independent_places:
         places = (
-            np.array([layout.q.index(name) for name in layout.metadata["independent_places"]], dtype=np.intp),
+            np.array([layout.q.index(name) for name in layout.info.independent_places], dtype=np.intp),
             False,
         )
     Z, positions = _basis(J, count, places, layout.place_scales.q)

@@ -193,7 +193,7 @@ class Modes(Result):
 
     def _repr_html_(self) -> str:
         table = self._table()
-        if self._module.metadata.get("picture") is None or not len(self.squares):
+        if self._module.info.picture is None or not len(self.squares):
             return table
         swinging = [k for k in range(len(self.squares)) if self.hertz[k]] or list(range(len(self.squares)))
         shown = [self._shown(k) for k in swinging[:SHAPES]]

@@ -41,7 +41,7 @@ class Geometry(NamedTuple):
     origins: Array  #: (n_bodies, 3, k)
 
 
-def joint_table(module: BoundModel) -> dict[str, Any]:
+def joint_table(module: BoundModel) -> Mapping[str, Any]:
     """What the model's metadata says of its joints.
 
     Raises
@@ -49,7 +49,7 @@ def joint_table(module: BoundModel) -> dict[str, Any]:
     UsageError
         There are no bodies, or the model was generated without these kernels.
     """
-    table: dict[str, Any] | None = module.metadata.get("wrenches")
+    table = module.info.wrenches
     if table is None:
         raise cannot(
             f"model {module.name!r} has no joints between bodies, so there are no reactions; "
@@ -90,7 +90,7 @@ def shift(wrench: Array, start: Array, end: Array) -> Array:
     return moved
 
 
-def transmitted(table: dict[str, Any], geometry: Geometry, needed: Array) -> Array:
+def transmitted(table: Mapping[str, Any], geometry: Geometry, needed: Array) -> Array:
     """What passes through the joints of the tree when each body gets what it needs (n_bodies, 6, k).
 
     Returns
@@ -108,14 +108,14 @@ def transmitted(table: dict[str, Any], geometry: Geometry, needed: Array) -> Arr
     return result
 
 
-def on_successor(table: dict[str, Any], geometry: Geometry, joint: int, row: Array) -> Array:
+def on_successor(table: Mapping[str, Any], geometry: Geometry, joint: int, row: Array) -> Array:
     """The wrench (6, k) about S that wrenches on bodies (n_bodies, 6, k) of one equation of a cut joint mean for S."""
     outer, inner = table["ends"][joint]
     body, sign = (inner, 1.0) if inner != GROUND else (outer, -1.0)
     return sign * shift(row[body], geometry.origins[body], geometry.points[joint])
 
 
-def free_of(table: dict[str, Any], joint: int) -> list[int]:
+def free_of(table: Mapping[str, Any], joint: int) -> list[int]:
     """Numbers of the free directions of a joint."""
     return [i for i, owner in enumerate(table["columns"]) if owner == joint]
 
@@ -156,7 +156,7 @@ def along_free(free: Array, wrench: Array) -> tuple[Array, Array]:
 # equations that the mechanism's symmetry makes vanish, so that it does not matter where loops were cut.
 
 
-def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:
+def bases(table: Mapping[str, Any], geometry: Geometry, length: float) -> list[Array]:
     """Orthonormal columns (k, 6, r) of the wrenches that each joint can exert at S, moments in units of the length.
 
     A state in which there are fewer than in others has columns of zeros.
@@ -184,7 +184,7 @@ def _per(length: float) -> Array:
     return np.array([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length])
 
 
-def element_wrenches(states: ProjectedStates, table: dict[str, Any], geometry: Geometry) -> Array:
+def element_wrenches(states: ProjectedStates, table: Mapping[str, Any], geometry: Geometry) -> Array:
     """What unit multipliers of constraint elements exert on each body, along coordinates of the tree too.
 
     Returns
@@ -219,7 +219,7 @@ def _driving(free: Array, forces: Array) -> Array:
 
 
 def remove_self_stress(
-    states: ProjectedStates, table: dict[str, Any], geometry: Geometry, reactions: Array, multipliers: Array
+    states: ProjectedStates, table: Mapping[str, Any], geometry: Geometry, reactions: Array, multipliers: Array
 ) -> tuple[Array, Array]:
     """The smallest reactions, and which components a self-stress changes.
 
@@ -246,7 +246,7 @@ def remove_self_stress(
 
 
 def self_stresses(
-    table: dict[str, Any], geometry: Geometry, joints: Sequence[Array], elements: Array, length: float
+    table: Mapping[str, Any], geometry: Geometry, joints: Sequence[Array], elements: Array, length: float
 ) -> Array:
     """Orthonormal rows (k, r, n) of what joints (in their bases) and elements exert in balance; rows of zeros as well.
 
@@ -311,7 +311,7 @@ def find_reactions(
     a = states.accelerations() if a is None else a
     if multipliers is None:
         multipliers = solve_multipliers(states.jacobian(), states.residual(a), module.layout.scales)
-    width = max(1, CHUNK // max(1, module.layout.n_wrench_geometry, (6 * len(joint_table(module)["ends"])) ** 2))
+    width = max(1, CHUNK // max(1, module.layout.sizes.n_wrench_geometry, (6 * len(joint_table(module)["ends"])) ** 2))
     parts = []
     for k in range(0, len(states.t), width):
         some = slice(k, k + width)

@@ -91,7 +91,7 @@ def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64]
 
 def takes_impulses(module: BoundModel, options: Mapping[str, Any]) -> bool:
     """Whether a run is one of method moreau, in which impulses of contacts do work at their instants."""
-    return bool(options.get("method", module.metadata["simulation"]["method"]) == MOREAU)
+    return bool(options.get("method", module.info.simulation["method"]) == MOREAU)
 
 
 def counts_work(equations: Equations) -> bool:

@@ -97,7 +97,7 @@ def ensemble(
     for name, column in values.items():
         kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
         sorted_values[kind][name] = column
-    last = module.metadata.get("simulation", {}).get("end") or 10.0
+    last = module.info.simulation.get("end") or 10.0
     times = None if samples is None else _even(end or float(last), samples)
     with stage("integrate"):
         found = module.simulate_many(

@@ -437,7 +437,7 @@ def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[s
     found["degrees_of_freedom"] = equations.report.degrees_of_freedom
     with _timed(seconds, "compile"):
         module = equations.compile(target=target)
-    found["end"] = PART * float(module.metadata["simulation"]["end"])
+    found["end"] = PART * float(module.info.simulation["end"])
     with _timed(seconds, "simulate"):
         trajectory = module.simulate(found["end"])
     found["steps"] = len(trajectory) - 1

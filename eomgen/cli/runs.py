@@ -278,7 +278,7 @@ def _range_values(module: Module, asked: list[tuple[str, float, float, int | Non
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
             raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
-        asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
+        asked = [("t", 0.0, float(module.info.simulation.get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     require_once("--range", names)
     counts = {count for *_, count in asked if count is not None} or {COUNT}

@@ -24,14 +24,13 @@ from ..mechanics import Kinematics
 from ..mechanics.methods.positive import require_inertia
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
+from ..runtime.layout import ABI, ModelInfo
 from .contact_columns import COLUMNS
 from .kernels import BlockMaker
 from .metadata import collect_metadata
 from .program import SHIFTS, Block, KernelDriver, Limits, Program, count_apart, hoist
 from .terms import SystemTerms
 
-#: Version of the generated functions' signatures and of the table that describes them.
-ABI = 1
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
 
@@ -47,8 +46,7 @@ def program_of(
     if (massless or indefinite) and tree.accelerations is not None:
         tree = tree.without_accelerations()  # which divide by pivots before they are looked at
     metadata = collect_metadata(kinematics, mobility, tree) | made
-    metadata |= {"no_inertia": massless} if massless else {}
-    metadata |= {"indefinite": True} if indefinite else {}
+    metadata |= {"no_inertia": massless or "", "indefinite": bool(indefinite)}
     limits = Limits(unrolled_loops=0) if arrays else Limits()
     if massless or indefinite:
         limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
@@ -59,9 +57,7 @@ def program_of(
 def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] | None, limits: Limits) -> Program:
     """Decide what functions to generate, of all kernels or some.
 
-    The metadata are completed with ``abi``, the sizes, ``kernels`` (shapes by name), ``sparsity`` (of derivatives:
-    places, row by row, of entries that do not vanish identically) and ``operations`` (counts per block; hoisted work
-    under ``precompute``).
+    The metadata are completed with sizes, shapes and counts.
 
     Raises
     ------
@@ -78,7 +74,7 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
     blocks: dict[str, Block] = {}
     drivers: list[KernelDriver] = []
     needed: dict[str, None] = {}
-    for kernel in _select(terms, bool(metadata.get("energy_known", True)), kernels):
+    for kernel in _select(terms, bool(metadata["energy_known"]), kernels):
         block = maker.public(kernel.name)
         if block is not None:
             blocks[kernel.name] = block
@@ -94,19 +90,19 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
     counts = {b.name: count_apart((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
     counts["precompute"] = count_apart(hoisted, frozenset())
     derivatives = [b for b in blocks.values() if b.outputs and b.name in SPARSE]
-    complete = {
+    info = ModelInfo(
         **metadata,
-        "abi": ABI,
-        **sizes._asdict(),
-        "output_accelerations": maker.outputs_need_accelerations,
-        "kernels": {k.name: list(k.shape(sizes)) for k in KERNELS if k.name in made},
-        "sparsity": {b.name: [k for k, x in enumerate(b.outputs) if not x.is_zero] for b in derivatives},
-        "operations": {key: value.as_dict() for key, value in counts.items()},
-    }
+        abi=ABI,
+        sizes=sizes,
+        output_accelerations=maker.outputs_need_accelerations,
+        kernels={k.name: list(k.shape(sizes)) for k in KERNELS if k.name in made},
+        sparsity={b.name: [k for k, x in enumerate(b.outputs) if not x.is_zero] for b in derivatives},
+        operations={key: value.as_dict() for key, value in counts.items()},
+    )
     _check_symbols(terms, blocks.values())
     return Program(
         name=name,
-        metadata=complete,
+        metadata=info.to_dict(),
         graph=terms.graph,
         time=terms.t,
         coordinates=terms.q,

@@ -31,13 +31,6 @@ from ..model.requirements import Requirement
 from .picture import describe_picture
 from .terms import flag_forces, independent_places, resets, resolved
 
-#: Entries that models have which need them.
-OPTIONAL = frozenset({
-    "states", "velocity_outputs", "independent_places", "row_groups", "row_velocities", "not_finite_where",
-    "reaction_laws", "held_rows", "latex", "instances", "translations", "input_rates", "constraint_inputs",
-    "contact_shapes",
-})  # fmt: skip
-
 
 def describe_discs(kinematics: Kinematics) -> list[list[Any]]:
     """Per disc: constraint, body and axle of the wheel, body (-1: ground) and normal of the plane, in body axes.
@@ -71,7 +64,7 @@ def keep_rules(requirements: Sequence[Requirement], names: Sequence[str]) -> dic
         used = sorted(names.index(name) for name in symbols_of(numbers) - {*local})
         with suppress(UsageError):
             rules.append([path, rule, list(data), used, list(record_tape(numbers, places.__getitem__))])
-    return {**({"ranges": ranges} if ranges else {}), **({"rules": rules} if rules else {})}
+    return {"ranges": ranges, "rules": rules}
 
 
 def describe_start(kinematics: Kinematics) -> dict[str, Any]:
@@ -85,11 +78,7 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     m = kinematics.mechanism
     given = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
     values = {p.name: p.value for p in m.parameters}
-    found: dict[str, Any] = {
-        key: initial_values(kinematics, values, key)
-        for key, terms in given.items()
-        if terms or key != "initial_outputs"
-    }
+    found: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in given}
     if bad := [(key, name) for key, of in found.items() for name, x in of.items() if not isfinite(x)]:
         what = "is no number at the declared parameters"
         raise ModelError(
@@ -139,8 +128,11 @@ def describe_events(kinematics: Kinematics) -> dict[str, Any]:
         }
         for e in m.events
     ]
-    found = {"events": events, "resets": [[i, k] for i, k, _ in resets(kinematics)]}
-    return found | ({"clocks": _clocks(kinematics)} if m.clocks else {})
+    return {
+        "events": events,
+        "resets": [[i, k] for i, k, _ in resets(kinematics)],
+        "clocks": _clocks(kinematics) if m.clocks else [],
+    }
 
 
 def _clocks(kinematics: Kinematics) -> list[dict[str, Any]]:
@@ -180,7 +172,7 @@ def find_translations(kinematics: Kinematics) -> list[list[Any]]:
 
 
 def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> dict[str, Any]:
-    """What a module knows of itself without any expression; sizes and kernels are added by the program."""
+    """Entries of :class:`~eomgen.runtime.layout.ModelInfo`; sizes and kernels are added by the program."""
     m, c, loop = kinematics.mechanism, kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     velocities, states = list(kinematics.velocity_names), list(kinematics.state_names)
@@ -209,7 +201,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     names_of_start = used | symbols_of(starts)
     shapes = [[force.name, shape] for force in m.forces for shape in force.met_shapes()]
     independent = [*independent_places(kinematics, mobility), *range(n, n + len(states))]
-    found = {
+    return {
         "name": m.name,
         "doc": m.doc,
         "method": equations.method,
@@ -233,23 +225,19 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "coordinate_kinds": list(kinematics.kinds),
         "velocity_kinds": [*kinematics.velocity_kinds, *("state" for _ in states)],
         "quaternion_slots": [list(slot) for slot in kinematics.quaternion_slots],
-        **({"coordinate_of": list(kinematics.coordinate_of)} if m.written is not None else {}),
+        "coordinate_of": list(kinematics.coordinate_of) if m.written is not None else None,
         "independent_places": list(mobility.places),
-        **({"energy_known": False} if m.written is not None and m.written.kinetic_energy.is_zero else {}),
+        "energy_known": m.written is None or not m.written.kinetic_energy.is_zero,
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
         "row_groups": list(groups) if any(groups := row_groups(kinematics)) else [],
-        "row_velocities": [list(row) for row in row_velocities(kinematics) or ()],
+        "row_velocities": [list(row) for row in row_velocities(kinematics) or ()] or None,
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "not_finite_where": {x.name: x.not_finite_where for x in forces if x.not_finite_where},
         "reaction_laws": list(kinematics.reaction_laws),
-        **(
-            {"switched": {s.constraint.name: s.state for s in m.switched if s.constraint is not None}}
-            if m.switched
-            else {}
-        ),
+        "switched": {s.constraint.name: s.state for s in m.switched if s.constraint is not None},
         "held_rows": [list(row) for row in kinematics.held_rows],
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
@@ -263,7 +251,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "q_reference": list(mobility.q_reference),
         **describe_start(kinematics),
         "length_scale": mobility.length_scale,
-        **({} if m.limits_told else {"limits_told": False}),
+        "limits_told": m.limits_told,
         "limits": {
             name: dict(limits)
             for j in m.joints
@@ -291,7 +279,6 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             **_longest_step(kinematics),
         },
     }
-    return {key: value for key, value in found.items() if value or key not in OPTIONAL}
 
 
 def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:

@@ -96,7 +96,7 @@ def told_state(module: Any, x: np.ndarray) -> dict[str, float]:
     """Numbers of all symbols at a state, in which 0 stands for what rounding left of it."""
     case = Case(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
     values, layout = state_values(module, case), module.layout
-    places = np.ones(module.n_q) if layout.metadata["quaternion_slots"] else layout.place_scales.q[: module.n_q]
+    places = np.ones(module.n_q) if layout.info.quaternion_slots else layout.place_scales.q[: module.n_q]
     known = [(module.x_names[: module.n_q], places, 1.0)]
     names, sizes = layout.v[: module.n_v], layout.scales.q[: module.n_v]  # first-order states come after them
     for rates in (names, [acceleration_name(name) for name in names]):

@@ -76,14 +76,14 @@ class BoundModel:
         names, key = (layout.p, "p_values") if what == "parameter" else (layout.u, "u_values")
         if not isinstance(given, Mapping):
             return given
-        current = np.array([np.nan if value is None else value for value in layout.metadata[key]], dtype=float)
+        current = np.array([np.nan if value is None else value for value in getattr(layout.info, key)], dtype=float)
         return layout.values(what, names, given, current)
 
     def _setup(self, core: Core, layout: Layout, p: Any, u: Any) -> None:
         self.kernels = kernels = Kernels(core, layout, p, u)
         self.layout = layout = kernels.layout
-        self.metadata = layout.metadata
-        self.name, self.doc, self.limits = layout.name, str(layout.metadata.get("doc") or ""), layout.limits
+        self.metadata, self.info = layout.metadata, layout.info
+        self.name, self.doc, self.limits = layout.name, layout.info.doc, layout.limits
         moving = layout.n_v - len(layout.states)
         self.q_names, self.v_names, self.s_names, self.x_names = layout.q, layout.v[:moving], layout.states, layout.x
         self.u_names, self.p_names, self.y_names = layout.u, layout.p, layout.y
@@ -157,7 +157,7 @@ class BoundModel:
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of :meth:`reactions`."""
-        return tuple(self.kernels.layout.metadata.get("joint_names", ()))
+        return tuple(self.kernels.layout.info.joint_names)
 
     @property
     def constraint_labels(self) -> tuple[str, ...]:

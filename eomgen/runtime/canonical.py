@@ -36,9 +36,9 @@ class Canonical:
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
         require_support(layout, "the canonical form")
-        if layout.n_momenta != layout.n_v:
+        if layout.sizes.n_momenta != layout.n_v:
             raise UnavailableError(
-                f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "
+                f"model {layout.name!r} was derived by method {layout.info.method!r}, which has no momenta; "
                 "derive it with method='hamilton'"
             )
         self._module = module
@@ -94,7 +94,7 @@ class Canonical:
         right = N.T @ (s * (p - still) - M @ least)  # N^T (M v + b) = N^T p, v = least + N y
         embedded = N.T @ M @ N
         sizes = algebra.eigvalsh(correlated(embedded)) if np.isfinite(embedded).all() else np.zeros(1)
-        if layout.metadata.get("indefinite"):
+        if layout.info.indefinite:
             sizes = np.abs(sizes)
         if sizes.min(initial=np.inf) <= SINGULAR:  # momenta determine no velocities
             raise module.kernels.fail.exception("canonical", 2, t, np.concatenate([q, np.zeros(layout.n_v)]))

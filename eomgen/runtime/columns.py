@@ -264,8 +264,10 @@ def _described(layout: Layout) -> dict[str, Any]:
         "loop_names": list(layout.loops),
         "y_names": list(layout.y),
         "u_names": list(layout.u),
-        "model_method": layout.metadata.get("method"),
-        **{key: layout.metadata.get(key, {}) for key in ("docs", "latex", "instances")},
+        "model_method": layout.info.method,
+        "docs": layout.info.docs,
+        "latex": layout.info.latex,
+        "instances": layout.info.instances,
     }
 
 

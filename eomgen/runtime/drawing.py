@@ -73,7 +73,7 @@ def listed(names: Sequence[str]) -> str:
 
 def facts(module: BoundModel) -> list[tuple[str, str]]:
     """Label and value of each line of the report."""
-    layout, data = module.layout, module.metadata
+    layout, info = module.layout, module.info
     lines = [
         ("degrees of freedom", str(layout.n_dof - len(layout.states))),
         ("coordinates", listed(layout.q)),
@@ -81,8 +81,8 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
     ]
     if layout.n_c:
         lines.append(("independent", listed([layout.velocity_labels[i] for i in layout.independent_moving])))
-        lines.append(("cut joints", listed(data.get("loop_joint_names", ()))))
-        redundant = [layout.constraint_labels[i] for i in data.get("redundant_rows", ())]
+        lines.append(("cut joints", listed(info.loop_joint_names)))
+        redundant = [layout.constraint_labels[i] for i in info.redundant_rows]
         rows = f"{layout.n_c}" + (f", redundant at the reference: {listed(redundant)}" if redundant else "")
         lines.append(("constraint rows", rows))
     if layout.loops:
@@ -94,9 +94,9 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
         ("parameters", listed(values)),
         ("inputs", listed(layout.u)),
         ("outputs", listed(layout.y)),
-        ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
+        ("method, target", f"{info.method}, {info.target}"),
     ]
-    operations = data.get("operations", {})
+    operations = info.operations
     known = (("rhs",), ("regular_closing", "regular_dynamics"), ("closing", "dynamics"), ("terms",))
     parts = next((p for p in known if operations.get(p[-1])), None)
     if parts:  # terms alone: linear algebra comes on top
@@ -337,14 +337,14 @@ def module_html(module: BoundModel) -> str:
 
 def mechanism_html(module: BoundModel) -> str:
     """A small picture of the mechanism at its declared initial position; nothing without bodies."""
-    if module.metadata.get("picture") is None:
+    if module.info.picture is None:
         return ""
     return picture_html(lambda: load_show("draw").small_figure(module))
 
 
 def _quantities(module: BoundModel) -> str:
     """Coordinates, parameters, inputs and outputs: name, symbol, unit, value, doc; folded up."""
-    layout, docs = module.layout, module.metadata.get("docs", {})
+    layout, docs = module.layout, module.info.docs
     printed = Notation.of(module.metadata).html
     values = dict(zip(layout.p, (f"{value:.6g}" for value in module.kernels.context.p), strict=True))
     kinds = {"coordinate": (*layout.q, *layout.loops), "parameter": layout.p, "input": layout.u, "output": layout.y}

@@ -28,7 +28,7 @@ def find_culprit(kernels: Any, status: int, t: float, x: Array, p: Array | None,
         if not np.isfinite(M).all():
             return ""
         values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
-        if layout.metadata.get("indefinite"):
+        if layout.info.indefinite:
             return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
         if values[0] > SINGULAR:
             return "because its reactions are not unique; method='embedding' does not need them"
@@ -56,10 +56,10 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
     bad = [name for name, value in zip(layout.u, inputs, strict=True) if not np.isfinite(value).all()]
     if bad:
         return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
-    if layout.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
+    if layout.sizes.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
         finite = kernels.kernel("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         bad = [name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0]
-        known = layout.metadata.get("not_finite_where", {})
+        known = layout.info.not_finite_where
         own = {known[name]: None for name in bad if name in known}
         if bad and set(bad) <= set(layout.reaction_laws):
             return (
@@ -158,7 +158,7 @@ class Fail:
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
-        elif status == 2 and (idle := self.layout.metadata.get("no_inertia")):
+        elif status == 2 and (idle := self.layout.info.no_inertia):
             what, remedy = f"the model is for kinematics only: {idle}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
@@ -205,7 +205,7 @@ def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
 def flat_disc(kernels: Any, x: Array, t: float, p: Array | None) -> tuple[str, str] | None:
     """A rolling disc that lies flat at a state, and the remedy; None if none does."""
     layout = kernels.layout
-    discs = layout.metadata.get("rolling_discs", ())
+    discs = layout.info.rolling_discs
     if not discs or "poses" not in kernels.core.names or len(x) < layout.n_q:
         return None
     poses = kernels.kernel("poses", nan=True)
@@ -222,7 +222,7 @@ def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
     """What is wrong with how a rotation is described at a state, and the remedy; None if nothing is."""
     if trouble := no_rotation(layout, x):
         return trouble
-    for joint, k, vanishing in layout.metadata.get("euler_angles", ()):
+    for joint, k, vanishing in layout.info.euler_angles:
         if abs(np.cos(x[k]) if vanishing == "cos" else np.sin(x[k])) < LOCKED:
             what = f"the Euler angles of joint {joint!r} are singular here ({layout.q[k]} = {np.degrees(x[k]):.6g} deg)"
             return what, f"describe joint {joint!r} with rotation: euler_parameters, or with another sequence"

@@ -117,15 +117,15 @@ def origin(module: BoundModel) -> dict[str, Any]:
         version); ``target``; ``versions`` of eomgen that made the code, of Python, NumPy and the compiler (None where
         there is none).
     """
-    facts = module.layout.metadata
+    info = module.info
     return {
-        "model_digest": facts.get("model_digest"),
-        "target": facts.get("target"),
+        "model_digest": info.model_digest,
+        "target": info.target,
         "versions": {
-            "eomgen": facts.get("eomgen"),
+            "eomgen": info.eomgen,
             "python": sys.version.partition(" ")[0],
             "numpy": np.__version__,
-            "compiler": None if facts.get("target") == "numpy" else getattr(module.core, "compiler", None),
+            "compiler": None if info.target == "numpy" else getattr(module.core, "compiler", None),
         },
     }
 

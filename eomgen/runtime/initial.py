@@ -61,7 +61,7 @@ def require_rank(kernels: Kernels, J: Array) -> None:
         Scaled constraint Jacobian at an assembled position.
     """
     layout = kernels.layout
-    pairs = list(zip(layout.p, kernels.context.p, layout.metadata["p_values"], strict=True))
+    pairs = list(zip(layout.p, kernels.context.p, layout.info.p_values, strict=True))
     changed = [name for name, value, declared in pairs if value != declared]
     if not changed:
         return
@@ -521,7 +521,7 @@ class Initial:
         ``rough``.
         """
         layout, system = self.layout, self.system
-        declared = {**layout.metadata["initial"], **layout.metadata.get("initial_outputs", {})}
+        declared = {**layout.info.initial, **layout.info.initial_outputs}
         before = self.sort({name: declared[name] for name in layout.initial}).positions
         now = self.sort(layout.initial).positions
         if before == now:

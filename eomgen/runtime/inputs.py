@@ -329,9 +329,9 @@ class Forcing:
         values = self.values = {name: self._read(name, value) for name, value in given.items()}
         self.derived = fill_rates(layout, values, derive) if layout.input_rates else {}
         values |= {name: value for name, (_, _, value) in self.derived.items()}
-        for name, tape in layout.metadata.get("signals", {}).items():
+        for name, tape in layout.info.signals.items():
             if name not in values:
-                slopes = layout.metadata["signal_slopes"][name]
+                slopes = layout.info.signal_slopes[name]
                 values[name] = Expression(DECLARED, tape, lambda slopes=slopes: slopes)  # type: ignore[misc]
         for name, value in values.items():
             if name not in layout.u:
@@ -590,7 +590,7 @@ def fill_rates(
         A rate is given of an input that is held.
     """
     found: dict[str, tuple[str, int, Any]] = {}
-    signals = layout.metadata.get("signals", {})
+    signals = layout.info.signals
     for first, rates in layout.input_rates.items():
         last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
         led = first in given or first in signals or first not in layout.u

@@ -117,7 +117,7 @@ class Kernels:
             shape, order = layout.shape("scales"), ORDERS["state"]
             scales = core.kernel("scales", self.context, shape, self._unscaled, *order, False, ill_shaped)
             self.layout = layout = layout.sized(scales(np.empty(0)))
-        if p is not None and not layout.metadata.keys().isdisjoint(("start_terms", "start_fixed")):
+        if p is not None and (layout.info.start_terms or layout.info.start_fixed):
             self.layout = layout = at_parameters(layout, self.context.p)
         self.fail = Fail(self)
         self._derivatives: dict[str, Call] = {}
@@ -318,7 +318,7 @@ def _centroidal(kernels: Kernels, name: str) -> Call:
     n = layout.n_x if rates else layout.n_q
 
     def find(x: Any, **given: Any) -> Array:
-        if layout.n_com == 0:  # the model has no bodies, or none with a mass
+        if layout.sizes.n_com == 0:  # the model has no bodies, or none with a mass
             raise UsageError(f"model {layout.name!r} has no {name}: no body of it has a mass", code="EG-NO-INERTIA")
         state = read_numbers("x", x)
         if state.shape[:1] != (n,) or state.ndim > 2:
@@ -338,7 +338,7 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
     """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
     layout = kernels.layout
     C = kernels.kernel("constraints", nan=True)
-    slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
+    slopes = "coordinate_slopes" if layout.sizes.n_coordinate_slopes else "constraint_jacobian"
     C_q, none = kernels.kernel(slopes, nan=True), np.zeros((0, layout.n_q))
     places = layout.n_h or not layout.given_rates  # rows of given velocities alone say nothing of q
     y, y_q = kernels.loop_coordinates, kernels.kernel("loop_coordinate_jacobian", nan=True)
@@ -348,7 +348,7 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
         return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
 
     joints = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut)
-    aligned = (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None
+    aligned = (lambda q, t: alignment(q, t=t)) if layout.sizes.n_alignments else None
     named = layout.place_scales, layout.q, layout.coordinate_kinds, layout.constraint_labels
     evaluate = (lambda q, t: (C(q, t=t), C_q(q, t=t))) if places else lambda q, t: (np.zeros(0), none)
     return ConstraintSystem(evaluate, *named, joints, aligned)

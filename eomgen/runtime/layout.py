@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
+from dataclasses import MISSING, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -17,10 +18,147 @@ from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
 from ..base.names import acceleration_name
 from ..base.numeric.scales import Scales, Space
+from ..base.records import dataclass
 from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
 from ..errors import ParameterError, Problem, bad_data, calls_within, cannot, ill_shaped
 from .argument_checks import check_names, plain_name, read_number, read_numbers, without_dots
 from .tapes import play_arrays
+
+# -- model.json --------------------------------------------------------------------------------------------------------
+
+
+ABI = 1  #: version of the generated functions' signatures and of the metadata that describe them
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """What a module knows of its model without any expression: the schema of model.json, both ways.
+
+    Entries with a default are left out of the file where they have it.  A tape is as :mod:`.tapes` has it, a place one
+    in q, v, x, u or p; numbers of bodies count from 0, and -1 is ground.
+    """
+
+    name: str
+    doc: str
+    method: str
+    q_names: Sequence[str]
+    v_names: Sequence[str]
+    x_names: Sequence[str]
+    u_names: Sequence[str]
+    p_names: Sequence[str]
+    y_names: Sequence[str]
+    body_names: Sequence[str]
+    joint_names: Sequence[str]
+    loop_joint_names: Sequence[str]
+    loop_names: Sequence[str]
+    loop_kinds: Sequence[str]
+    coordinate_kinds: Sequence[str]
+    velocity_kinds: Sequence[str]
+    quaternion_slots: Sequence[Sequence[int]]  #: first place in q and in v of each rotation by Euler parameters
+    euler_angles: Sequence[Sequence[Any]]  #: joint, place of its middle angle, 'cos' or 'sin': 0 where singular
+    rolling_discs: Sequence[Sequence[Any]]  #: constraint, body and axle of the wheel, body and normal of the plane
+    constraint_labels: Sequence[str]
+    constraint_kinds: Sequence[str]
+    constraint_scales: Sequence[str | float]
+    alignment_labels: Sequence[str]
+    fragile_forces: Sequence[str]  #: whose loads may be no numbers
+    p_values: Sequence[float | None]
+    u_values: Sequence[float | None]
+    units: Mapping[str, str]
+    docs: Mapping[str, str]
+    independent: Sequence[int]
+    independent_rows: Sequence[int]
+    redundant_rows: Sequence[int]
+    q_reference: Sequence[float]
+    initial: Mapping[str, float]
+    guess: Mapping[str, float]
+    length_scale: float
+    limits: Mapping[str, Mapping[str, float]]
+    system: Mapping[str, Any] | None  #: where the entries of the linear system of the method stand, if it solves one
+    baumgarte: Sequence[float] | None
+    dry_friction: Mapping[str, float]
+    wrenches: Mapping[str, Any] | None
+    start_parameters: Sequence[int]  #: on which assembled states depend, but for values of outputs and markers
+    picture: Any
+    simulation: Mapping[str, Any]
+    sizes: Sizes  #: each an entry of its own
+    output_accelerations: bool
+    kernels: Mapping[str, Sequence[int]]  #: shapes by name
+    sparsity: Mapping[str, Sequence[int]]  #: places, row by row, of entries of derivatives that do not vanish
+    operations: Mapping[str, Mapping[str, Any]]  #: counts per block; hoisted work under ``precompute``
+    abi: int = 0
+    target: str = ""
+    model_digest: str | None = None
+    eomgen: str | None = None  #: the version that made it
+    states: Sequence[str] = ()  #: of first order, the last of the velocities
+    velocity_outputs: Sequence[str] = ()
+    ranges: Sequence[Sequence[Any]] = ()  #: of single parameters: place in p, path, then as Allowed takes them
+    rules: Sequence[Sequence[Any]] = ()  #: path, rule, its data, places in p, tape of the numbers judged
+    coordinate_of: Sequence[int] | None = None  #: of each velocity of given equations, or -1
+    independent_places: Sequence[str] = ()
+    energy_known: bool = True
+    row_groups: Sequence[int] = ()
+    row_velocities: Sequence[Sequence[int]] | None = None  #: on which each constraint row depends
+    not_finite_where: Mapping[str, str] = field(default_factory=dict)  #: force -> where its law has no number
+    reaction_laws: Sequence[str] = ()  #: elements whose forces depend on reactions of joints
+    switched: Mapping[str, str] = field(default_factory=dict)  #: constraint that closes and opens -> its state
+    held_rows: Sequence[Sequence[str]] = ()  #: label, state and kind of each of their equations
+    latex: Mapping[str, str] = field(default_factory=dict)
+    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix of their names
+    initial_outputs: Mapping[str, float] = field(default_factory=dict)
+    start_fixed: Mapping[str, Sequence[int]] = field(default_factory=dict)  #: initial values that no tape can play
+    start_terms: Mapping[str, Sequence[Any]] = field(default_factory=dict)  #: section -> names and tape
+    start_slopes: Sequence[Any] = ((), ((), (), ()))  #: name and place in p of each derivative; tape
+    limits_told: bool = True
+    events: Sequence[Mapping[str, Any]] = ()
+    resets: Sequence[Sequence[int]] = ()  #: event, and place in x of what it gives a value
+    clocks: Sequence[Mapping[str, Any]] = ()
+    translations: Sequence[Sequence[Any]] = ()  #: joint, the next one towards the ground, body, velocities
+    signals: Mapping[str, Any] = field(default_factory=dict)  #: input over time -> tape
+    signal_slopes: Mapping[str, Any] = field(default_factory=dict)
+    input_rates: Mapping[str, Sequence[Sequence[Any]]] = field(default_factory=dict)
+    constraint_inputs: Sequence[str] = ()
+    contact_shapes: Sequence[Sequence[str]] = ()
+    rigid_contacts: Mapping[str, Any] = field(default_factory=dict)
+    rigid_by_motion: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    rigid_only: Sequence[str] = ()
+    no_inertia: str = ""  #: why the model is for kinematics only
+    indefinite: bool = False
+    lanes: Sequence[str] = ()
+    series: bool = False
+    no_series: str = "its module was compiled without one, as with target='numpy'"
+    start: Sequence[float] = ()  #: x at the start, of a package
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    precision: str = ""
+    files: Sequence[str] = ()
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> ModelInfo:
+        """Read what model.json holds.
+
+        Raises
+        ------
+        UsageError
+            It is one of another layout.
+        """
+        if data.get("abi") != ABI:
+            raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
+        sizes = Sizes(**{name: data[name] for name in Sizes._fields if name in data})
+        return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data}, sizes=sizes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What model.json holds."""
+        found: dict[str, Any] = {}
+        for one in fields(self):
+            value, usual = getattr(self, one.name), one.default
+            if one.default_factory is not MISSING:
+                usual = one.default_factory()
+            if one.name == "sizes":
+                found |= value._asdict()
+            elif usual is MISSING or (value != usual and (value or usual)):
+                found[one.name] = value
+        return found
+
 
 # -- rules -------------------------------------------------------------------------------------------------------------
 
@@ -64,39 +202,38 @@ def _rows(found: Sequence[Any], count: int) -> Array:
 # -- allowed parameters ------------------------------------------------------------------------------------------------
 
 
-def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
+def require_allowed(info: ModelInfo, p: Array) -> None:
     """Refuse values of parameters (n_p,), or (n_p, k) of many runs, that the model itself could not declare.
 
     Values that are not finite are told by whatever computes with them.
     """
     columns, problems = p.reshape(len(p), -1), list[Problem]()
-    for k, path, *data in metadata.get("ranges", ()):
+    for k, path, *data in info.ranges:
         wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
         if len(wrong):
             flaws = judge_range(columns[k, wrong[:1]], *data)
-            problems += told(metadata, path, flaws, [k], p, wrong.tolist())
-    if rules := metadata.get("rules"):
-        for path, flaws, used, runs in broken_rules(rules, columns):
-            problems += told(metadata, path, flaws, used, p, runs)
+            problems += told(info, path, flaws, [k], p, wrong.tolist())
+    for path, flaws, used, runs in broken_rules(info.rules, columns):
+        problems += told(info, path, flaws, used, p, runs)
     if problems:
         raise ParameterError(list(dict.fromkeys(problems)))
 
 
-def bounds_of(metadata: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+def bounds_of(info: ModelInfo) -> dict[str, tuple[float, float]]:
     """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
     found: dict[str, tuple[float, float]] = {}
-    for k, _, low, high, *_ in metadata.get("ranges", ()):
-        least, most = found.get(metadata["p_names"][k], (-np.inf, np.inf))
+    for k, _, low, high, *_ in info.ranges:
+        least, most = found.get(info.p_names[k], (-np.inf, np.inf))
         least = least if low is None else max(least, low)
-        found[metadata["p_names"][k]] = (least, most if high is None else min(most, high))
+        found[info.p_names[k]] = (least, most if high is None else min(most, high))
     return found
 
 
 def told(
-    metadata: Mapping[str, Any], path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
+    info: ModelInfo, path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
 ) -> list[Problem]:
     """Flaws of the first of the runs that break a rule, with the values of the parameters that it depends on."""
-    names, values = metadata["p_names"], p.reshape(len(p), -1)[:, runs[0]]
+    names, values = info.p_names, p.reshape(len(p), -1)[:, runs[0]]
     given = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
     where = ""
     if p.ndim > 1:
@@ -107,9 +244,6 @@ def told(
 
 
 # -- the layout --------------------------------------------------------------------------------------------------------
-
-
-ABI = 1  #: layout of the metadata this file reads
 
 
 class Layout:
@@ -126,85 +260,56 @@ class Layout:
     rebound: tuple[Array, dict[str, str]] | None = None
 
     def __init__(self, metadata: str | Mapping[str, Any]) -> None:
-        data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
-        if data.get("abi") != ABI:
-            raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
-        self.metadata = data
-        self.name: str = data["name"]
-        self.q: tuple[str, ...] = tuple(data["q_names"])
-        self.v: tuple[str, ...] = tuple(data["v_names"])
-        self.x: tuple[str, ...] = tuple(data.get("x_names") or self.q + self.v)
-        self.u: tuple[str, ...] = tuple(data["u_names"])
-        self.p: tuple[str, ...] = tuple(data["p_names"])
-        self.y: tuple[str, ...] = tuple(data["y_names"])
-        self.bodies: tuple[str, ...] = tuple(data["body_names"])
-        self.loops: tuple[str, ...] = tuple(data.get("loop_names", ()))
+        #: what model.json holds, as public calls show it
+        self.metadata: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
+        self.info = info = ModelInfo.of(self.metadata)
+        self.sizes = sizes = info.sizes
+        self.name = info.name
+        self.q, self.v, self.x = tuple(info.q_names), tuple(info.v_names), tuple(info.x_names)
+        self.u, self.p, self.y = tuple(info.u_names), tuple(info.p_names), tuple(info.y_names)
+        self.bodies, self.loops = tuple(info.body_names), tuple(info.loop_names)
         self.a = tuple(acceleration_name(name) for name in self.v)
         self.loop_rates = tuple(f"{name}_dot" for name in self.loops)
         self.loop_accelerations = tuple(f"{name}_ddot" for name in self.loops)
-        self.constraint_labels: tuple[str, ...] = tuple(data.get("constraint_labels", ()))
-        self.alignment_labels: tuple[str, ...] = tuple(data.get("alignment_labels", ()))
-        self.fragile_forces: tuple[str, ...] = tuple(data.get("fragile_forces", ()))
-        #: elements whose forces depend on reactions of joints
-        self.reaction_laws: tuple[str, ...] = tuple(data.get("reaction_laws", ()))
-        self.n_q, self.n_v, self.n_x = len(self.q), len(self.v), len(self.q) + len(self.v)
-        self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
-        self.n_c: int = data.get("n_c", 0)
-        self.n_h: int = data.get("n_h", self.n_c)
-        self.quaternion_slots: tuple[tuple[int, int], ...] = tuple(
-            (int(i), int(j)) for i, j in data.get("quaternion_slots", ())
-        )
-        self.states: tuple[str, ...] = tuple(data.get("states", ()))  #: of first order, the last of the velocities
-        self.n_states = len(self.states)
-        self.switches: dict[str, str] = data.get("switched", {})  #: constraint that closes and opens -> its state
+        self.constraint_labels, self.fragile_forces = tuple(info.constraint_labels), tuple(info.fragile_forces)
+        self.reaction_laws, self.states = tuple(info.reaction_laws), tuple(info.states)
+        self.n_q, self.n_v, self.n_x, self.n_u, self.n_p, self.n_y, self.n_c, self.n_h, self.n_dof = sizes[:9]
+        self.n_bodies, self.n_loop_coordinates, self.n_events = sizes.n_bodies, sizes.n_loop_coordinates, sizes.n_events
+        self.n_held, self.n_states = sizes.n_held, sizes.n_states
+        self.quaternion_slots = tuple((int(i), int(j)) for i, j in info.quaternion_slots)
         self.moving = self.n_v - self.n_states  #: velocities of the mechanism
         self.space = Space.of(self.n_v, self.quaternion_slots, self.n_states)
         self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
-        coordinate_of: list[int] | None = data.get("coordinate_of")
-        if coordinate_of is not None:  # given equations name their velocities as they like
-            self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
-        #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
-        self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
-        self.energy_known: bool = data.get("energy_known", True)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])
-        if coordinate_of is not None:
+        given = info.coordinate_of  # given equations name their velocities as they like
+        if given is not None:
+            self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, given, strict=True))
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
-        self.n_dof: int = data.get("n_dof", self.n_v)
-        first = ("n_coordinate_slopes", "n_wrenches", "n_wrench_geometry", "n_com", "n_momenta")
-        counts: list[int] = [
-            data.get(name, 0) for name in (*first, "n_dae", "n_events", "n_resets", "n_strike", "n_spots", "n_held")
-        ]
-        self.n_coordinate_slopes, self.n_wrenches, self.n_wrench_geometry, self.n_com, self.n_momenta = counts[:5]
-        self.n_dae, self.n_events, self.n_resets, self.n_strike, self.n_spots, self.n_held = counts[5:]
-        self.n_bodies, self.n_loop_coordinates = len(self.bodies), len(self.loops)
-        self.n_alignments = len(self.alignment_labels)
-        self.n_finite_forces = len(self.fragile_forces)
+        #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
+        self.given_rates = given is not None and list(given) != list(range(self.n_q))
+        self.energy_known = info.energy_known
         #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
         #: itself, or stands in the equations by its rates only.
         self.input_rates: dict[str, list[tuple[str, int]]] = {
-            name: [(str(rate), int(times)) for rate, times in rates]
-            for name, rates in data.get("input_rates", {}).items()
+            name: [(str(rate), int(times)) for rate, times in rates] for name, rates in info.input_rates.items()
         }
         #: places in u of the inputs on which constraints depend
-        self.constraint_inputs = [self.u.index(name) for name in data.get("constraint_inputs", ())]
-        #: places in p of the parameters on which assembled states depend, but for values of outputs and markers
-        self.start_parameters = data.get("start_parameters", [*range(self.n_p)])
-        self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
-        self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
+        self.constraint_inputs = [self.u.index(name) for name in info.constraint_inputs]
+        self.start_parameters = list(info.start_parameters)
+        self.independent = np.array(info.independent, dtype=np.intp)
+        self.rows = np.array(info.independent_rows, dtype=np.intp)
         self.rank = self.n_v - self.n_dof
-        self.projects = data.get("baumgarte") is None  #: whether rhs takes the projected state
-        self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
-        self.velocity_kinds: tuple[str, ...] = tuple(data.get("velocity_kinds") or data["coordinate_kinds"])
+        self.projects = info.baumgarte is None  #: whether rhs takes the projected state
+        self.coordinate_kinds, self.velocity_kinds = tuple(info.coordinate_kinds), tuple(info.velocity_kinds)
         self.velocity_lengths = np.array([kind == "length" for kind in self.velocity_kinds], dtype=bool)
-        self.length: float = float(data.get("length_scale") or 1.0)
-        rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
-        groups = data.get("row_groups")
+        self.length = float(info.length_scale or 1.0)
+        rows = info.constraint_scales or info.constraint_kinds
         self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)._replace(
-            groups=np.array(groups, dtype=np.intp) if groups else None,
-            known=_table(data["row_velocities"], self.n_v) if "row_velocities" in data else None,
+            groups=np.array(info.row_groups, dtype=np.intp) if info.row_groups else None,
+            known=_table(info.row_velocities, self.n_v) if info.row_velocities is not None else None,
         )
-        self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
+        self.row_lengths = np.array([kind == "length" for kind in info.constraint_kinds], dtype=bool)
         self.independent_moving = self.independent[self.independent < self.moving]  #: of the mechanism
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
@@ -212,22 +317,14 @@ class Layout:
         self.place_scales = (
             Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
         )
-        self.units: dict[str, str] = data.get("units", {})
-        self.instances: dict[str, str] = data.get("instances", {})  #: of components: name -> prefix of their names
-        self.loop_kinds: tuple[str, ...] = tuple(
-            data.get("loop_kinds") or ("length" if self.units.get(name) == "m" else "angle" for name in self.loops)
-        )
+        self.units, self.instances, self.loop_kinds = info.units, info.instances, tuple(info.loop_kinds)
         self.loop_angles = np.array([kind == "angle" for kind in self.loop_kinds], dtype=bool)
         self.loop_lengths = np.array([kind == "length" for kind in self.loop_kinds], dtype=bool)
         self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
-        starts = ("initial", "initial_outputs", "guess")
-        self.initial, self.initial_outputs, self.guess = (dict[str, float](data.get(key, {})) for key in starts)
-        self.limits: dict[str, dict[str, float]] = data.get("limits", {})
-        reference = data.get("q_reference")
-        neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
-        self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+        self.initial, self.initial_outputs, self.guess = map(dict, (info.initial, info.initial_outputs, info.guess))
+        self.limits, self.switches = info.limits, info.switched
+        self.q_reference = np.array(info.q_reference, dtype=float)
         self._allowed = b""  #: the last parameters that were allowed
-        self.sizes = Sizes(**{name: getattr(self, name) for name in Sizes._fields})
 
     def sized(self, sizes: Array) -> Layout:
         """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values.
@@ -292,7 +389,7 @@ class Layout:
     def names(self) -> frozenset[str]:
         """All names of numbers, bodies and joints."""
         rates = (*self.loop_rates, *self.a, *self.loop_accelerations, *self.parameter_rates, *self.velocity_labels)
-        elements = (*self.bodies, *self.metadata.get("joint_names", ()))
+        elements = (*self.bodies, *self.info.joint_names)
         return frozenset((*self.x, *self.loops, *self.u, *self.p, *self.y, *rates, *elements))
 
     def plain(self, name: Any) -> Any:
@@ -320,10 +417,10 @@ class Layout:
     def require_allowed(self, p: Array) -> None:
         """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost."""
         if p.ndim > 1:
-            return require_allowed(self.metadata, p)
+            return require_allowed(self.info, p)
         given = p.tobytes()
         if given != self._allowed:
-            require_allowed(self.metadata, p)
+            require_allowed(self.info, p)
             self._allowed = given
 
 
@@ -351,7 +448,7 @@ def at_parameters(layout: Layout, p: Array) -> Layout:
     changed, undefined = copy(layout), dict[str, str]()
     changed.rebound = p, undefined
     rotations = [layout.q[i : i + 4] for i, _ in layout.quaternion_slots]
-    for section, (names, tape) in layout.metadata.get("start_terms", {}).items():
+    for section, (names, tape) in layout.info.start_terms.items():
         values = dict(zip(names, map(float, play_arrays(tape, p, NO_STATE)), strict=True))
         for name in [name for name, value in values.items() if not np.isfinite(value)]:
             for other in next((four for four in rotations if name in four), (name,)):
@@ -363,7 +460,7 @@ def at_parameters(layout: Layout, p: Array) -> Layout:
 
 def warn_of_fixed(layout: Layout, p: Array, names: Iterable[str]) -> None:
     """Warn of initial values among these that call tables, if parameters (n_p,), or (n_p, k) of runs, are others."""
-    fixed, declared = layout.metadata.get("start_fixed", {}), layout.metadata["p_values"]
+    fixed, declared = layout.info.start_fixed, layout.info.p_values
     for name in () if _SILENT.get() else names:
         places = fixed.get(name, ())
         if any((p[k] != declared[k]).any() for k in places):
@@ -386,13 +483,13 @@ def silent() -> Iterator[None]:
 
 def values_at(layout: Layout, p: Array) -> dict[str, Any]:
     """Initial values that follow from parameters, (n_p,) or (n_p, k) of k runs, each a number or an array (k,)."""
-    names, tape = layout.metadata.get("start_terms", {}).get("initial", ((), ((), (), ())))
+    names, tape = layout.info.start_terms.get("initial", ((), ((), (), ())))
     return dict(zip(names, play_arrays(tape, p, NO_STATE), strict=True))
 
 
 def start_slopes(layout: Layout, p: Array) -> dict[str, Array]:
     """Derivatives (n_p,) of the initial values that follow from parameters, by name, at parameters (n_p,)."""
-    places, tape = layout.metadata.get("start_slopes", ((), ((), (), ())))
+    places, tape = layout.info.start_slopes
     found: dict[str, Array] = {}
     for (name, k), slope in zip(places, play_arrays(tape, p, NO_STATE), strict=True):
         found.setdefault(name, np.zeros(len(p)))[k] = slope

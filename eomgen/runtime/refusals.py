@@ -21,7 +21,7 @@ class Kind(NamedTuple):
 
 
 def _sampled(layout: Layout) -> list[str]:
-    return [name for clock in layout.metadata.get("clocks", []) for name in clock["states"]]
+    return [name for clock in layout.info.clocks for name in clock["states"]]
 
 
 #: What calls with some kinds of models can be used instead.
@@ -55,7 +55,7 @@ KINDS = {
     ),
     "rigid": Kind(
         "rigid contacts, which exert impulses alone",
-        lambda layout: [repr(name) for name in layout.metadata.get("rigid_only") or ()],
+        lambda layout: [repr(name) for name in layout.info.rigid_only],
         "{call} is not available for models with rigid contacts, and contacts {names} of {model!r} have normal_law: "
         "rigid, which exerts impulses, not forces: shapes would pass through each other; run by simulate with "
         "method='moreau' and step=, or choose another normal_law",

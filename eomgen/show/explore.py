@@ -65,7 +65,7 @@ class Explorer:
 
     def _end(self) -> float:
         """The end time that the model declares, else 1 s."""
-        return float(self.module.metadata.get("simulation", {}).get("end") or 1.0)
+        return float(self.module.info.simulation.get("end") or 1.0)
 
     def _is_driven(self) -> bool:
         """Whether time moves the constraints."""

@@ -112,7 +112,7 @@ class Bench:
             "loop_coordinates": [("value", "rate", "acceleration"), layout.loops],
             "loop_coordinate_jacobian": [layout.loops, layout.v],
             "motion_outputs": [layout.y],
-            "alignment": [layout.alignment_labels],
+            "alignment": [layout.info.alignment_labels],
         }
         labels = [""]
         for names in table.get(kernel, []):

@@ -96,7 +96,7 @@ def draw(module: BoundModel, rng: np.random.Generator, geometric: Array | None, 
 
 
 def _sizes(module: BoundModel, kinds: tuple[str, ...]) -> Array:
-    length = float(module.metadata.get("length_scale") or 1.0)
+    length = float(module.info.length_scale or 1.0)
     return np.array([length if kind == "length" else 1.0 for kind in kinds])
 
 
@@ -137,7 +137,7 @@ def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: 
     for k in range(HALVINGS):
         try:
             x = module.project(np.concatenate([reference + shift * 0.5**k, v]), t=t, p=p, u=u)
-            idle = bool(module.metadata.get("no_inertia"))
+            idle = bool(module.info.no_inertia)
             if _closed(module, x, t, p, u) and (idle or np.isfinite(module.rhs(t, x, p=p, u=u)).all()):
                 return x
         except EomgenError:
@@ -155,7 +155,7 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     rate = np.abs(module.velocity_constraints(x, p=p, u=u, t=t, rows="all"))
     if residual.max(initial=0.0) > CLOSED or rate.max(initial=0.0) > CLOSED * (1.0 + np.abs(x).max()):
         return False
-    if layout.n_alignments and not (module.kernels.alignment(q, p=p, u=u, t=t) > 0.0).all():
+    if layout.sizes.n_alignments and not (module.kernels.alignment(q, p=p, u=u, t=t) > 0.0).all():
         return False
     J = scales.jacobian(module.kernels.constraint_jacobian(q, p=p, u=u, t=t))
     values = algebra.singular_values(J)

@@ -391,7 +391,7 @@ def check_reactions(bench: Bench) -> list[Finding]:
 
 def _inapplicable(bench: Bench) -> str:
     """Why the balance cannot be made up here, empty if it can."""
-    table = bench.layout.metadata.get("wrenches")
+    table = bench.layout.info.wrenches
     if table is None:
         return "there are no joints between bodies"
     if not bench.layout.projects:
@@ -525,7 +525,7 @@ def _along(truth: Truth, a: Array) -> dict[str, Number]:
 def check_reaction_laws(bench: Bench) -> list[Finding]:
     """One finding, of models with such friction."""
     laws = [terms for terms in bench.kinematics.forces if isinstance(terms.force, ReactionFriction)]
-    if not laws or bench.layout.metadata.get("wrenches") is None or not bench.layout.projects:
+    if not laws or bench.layout.info.wrenches is None or not bench.layout.projects:
         return []
     found = Comparison("friction: laws at the joints' reactions")
     specs = {spec.name: spec for spec in bench.mechanism.joints}
@@ -534,7 +534,7 @@ def check_reaction_laws(bench: Bench) -> list[Finding]:
     for k, truth in enumerate(bench.truths):
         case = truth.case
         wrenches = reactions(bench.module, case.t, case.x, p=case.p, u=case.u)
-        carried = dict(zip(bench.layout.metadata["joint_names"], wrenches, strict=True))
+        carried = dict(zip(bench.layout.info.joint_names, wrenches, strict=True))
         loose = force_limit(bench, k, truth, wrenches)
         acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
         expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])

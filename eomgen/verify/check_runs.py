@@ -66,7 +66,7 @@ def check_runs(bench: Bench) -> list[Finding]:
 def _inapplicable(bench: Bench) -> str:
     if not bench.module.layout.n_dof:
         return "drivers move the whole mechanism, so nothing is integrated"
-    if bench.layout.metadata.get("rigid_only"):
+    if bench.layout.info.rigid_only:
         return RIGID
     if Events(bench.layout, None).resets:
         return "events reset its state, and an integrator finds no events"

@@ -36,7 +36,7 @@ def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
     found = []
     for name, check in CHECKS.items():
-        if module.metadata.get("no_inertia") and check not in KINEMATIC:
+        if module.info.no_inertia and check not in KINEMATIC:
             found.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
@@ -61,7 +61,7 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
         return Finding.skipped(
             check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given"
         )
-    if module.metadata.get("indefinite"):
+    if module.info.indefinite:
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in cases:

@@ -53,7 +53,7 @@ def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Findin
         Of the turns of frames, and of which joint is cut.
     """
     end = perf_counter() + seconds
-    target = bench.module.metadata.get("target", "numpy")
+    target = bench.module.info.target
     changes: dict[str, Callable[[], BoundModel]] = {
         "body frames turned": partial(_turned, bench, seed),
         "another joint cut": partial(_cut_another, bench, seed),
@@ -136,7 +136,7 @@ def _turned(bench: Bench, seed: int) -> BoundModel:
     mechanism, random = _own(bench), np.random.default_rng(seed)
     if not mechanism.bodies:
         raise NotApplicable("there are no bodies")
-    graph, size = mechanism.graph, SHIFT * float(bench.module.metadata.get("length_scale") or 1.0)
+    graph, size = mechanism.graph, SHIFT * float(bench.module.info.length_scale or 1.0)
     places = {
         k: Frame(
             vec.matrix(graph, from_quaternion(*random.normal(size=4)).tolist()),

@@ -138,7 +138,7 @@ def _with_equations(
 
     bench, found = Bench(module, equations, cases), []
     parts = equations.kinematics, equations.mobility, equations.tree
-    idle = module.metadata.get("no_inertia")
+    idle = module.info.no_inertia
     if idle:
         why = f"the model is for kinematics only: {idle}"
         found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs, variants", why))

@@ -31,7 +31,7 @@ from ...errors import ModelError, Problem, bad_file, no_choice
 from ...model.units import read_unit
 from ...runtime.bound_model import BoundModel
 from ...runtime.inputs import Forcing
-from ...runtime.layout import bounds_of
+from ...runtime.layout import ModelInfo, bounds_of
 from ...toolchain.build import compile_sources
 from ...toolchain.compiler import Options
 from ...toolchain.layer import read_layer
@@ -102,7 +102,7 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
     """All variables; the model starts at x = ``start``."""
     metadata, units, docs = program.metadata, program.metadata["units"], program.metadata["docs"]
     x_names, taken = metadata["x_names"], set(metadata["x_names"])
-    exact, bounds = find_exact(program), bounds_of(metadata)
+    exact, bounds = find_exact(program), bounds_of(ModelInfo.of(metadata))
     found: list[Variable] = []
 
     def add(name: str, group: str, unit: str, doc: str, **more: object) -> None:

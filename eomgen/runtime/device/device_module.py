@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ...base.targets import TIMED_ON_DEVICE
 from ...base.value_rules import read_count
 from ...errors import cannot, ill_shaped, ill_typed, incomplete, no_choice, no_such
+from ..layout import ModelInfo
 from ..runs.run_arguments import check_method, check_tolerances, declare, find_span, ordered_times, own_step
 from ..trajectory import Span
 from .cuda_device import Array, Device, DeviceArray
@@ -36,14 +37,15 @@ class DeviceFunctions:
 
             device = CudaDevice()
         self.device, self.text, self.facts, self.metadata = device, text, facts, dict(metadata)
+        self.info = info = ModelInfo.of(metadata)
         self.name = str(facts["name"])
         self.q_names, self.v_names, self.u_names, self.p_names, self.y_names, self.body_names = (
-            tuple(metadata[f"{kind}_names"]) for kind in ("q", "v", "u", "p", "y", "body")
+            tuple(getattr(info, f"{kind}_names")) for kind in ("q", "v", "u", "p", "y", "body")
         )
         self.x_names = self.q_names + self.v_names
         self.n_q, self.n_v, self.n_x = len(self.q_names), len(self.v_names), len(self.x_names)
-        self.n_u, self.n_p, self.n_dof = len(self.u_names), len(self.p_names), int(metadata["n_dof"])
-        self.p, self.u = (np.array(metadata[f"{kind}_values"], dtype=float) for kind in ("p", "u"))
+        self.n_u, self.n_p, self.n_dof = len(self.u_names), len(self.p_names), info.sizes.n_dof
+        self.p, self.u = (np.array(values, dtype=float) for values in (info.p_values, info.u_values))
         self.x0 = np.array(facts["x0"], dtype=float)
         for declared in (self.p, self.u, self.x0):
             declared.flags.writeable = False  # the device may hold them already
@@ -237,7 +239,7 @@ def carry_out(
     like = cast("BoundModel", module)  # metadata and n_dof are all that is read
     declared, device, n = declare(like), module.device, module.n_x
     start, end = find_span(span, float(declared["end"]))
-    if module.metadata.get("clocks") and (start != 0.0 or end < 0.0):
+    if module.info.clocks and (start != 0.0 or end < 0.0):
         raise cannot(
             f"runs on a device of a model with sampled states begin at 0 s and go forward, not from {start:.6g} s to "
             f"{end:.6g} s; use simulate_many of the module"
@@ -261,7 +263,7 @@ def carry_out(
         states, count = states.reshaped((n, 1)), 1
     parameters, each_p = module.columns("p", module.p if p is None else p, module.n_p, count)
     inputs, each_u = module.columns("u", module.u if u is None else u, module.n_u, count)
-    events = len(module.metadata.get("events") or ())
+    events = len(module.info.events)
     kept = keep if events else 0
     shapes = {
         "times": (len(times),), "samples": (count, len(times), n), "x": (n, count), "t": (count,),

@@ -180,7 +180,7 @@ class Ensemble(Result):
             initial: Any = cases.states[:, k]
         else:
             initial = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
-        declared = set(self._module.metadata.get("signals", {}))
+        declared = set(self._module.info.signals)
         constants = dict(zip(self._module.u_names, column["u"].tolist(), strict=True))
         rates = self._module.layout.input_rates
         declared |= {rate for name in self._plan.inputs for rate, _ in rates.get(name, ())}
@@ -309,7 +309,7 @@ class Ensemble(Result):
         shared = zip(self._module.p_names, rows, strict=True)
         return {
             "name": self._module.name,
-            "model_method": self._module.metadata.get("method"),
+            "model_method": self._module.info.method,
             "origin": origin(self._module),
             "count": self.count,
             "span": list(plan.span),

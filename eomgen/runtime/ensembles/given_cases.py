@@ -224,7 +224,7 @@ def assemble_states(
     """
     with silent():  # for all runs, when their cases were collected
         x, reasons = _assemble_all(module, cases, t, forcing_of)
-    if module.metadata.get("clocks"):
+    if module.info.clocks:
         for k in set(range(cases.count)) - reasons.keys():
             x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
     if module.layout.switches:
@@ -235,7 +235,7 @@ def assemble_states(
 
 def _refuse_disagreement(module: BoundModel, cases: Cases, t: float, x: Array, reasons: dict[int, str]) -> None:
     """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
-    layout, by_name = module.layout, cases.states is None and bool(module.metadata.get("held_rows"))
+    layout, by_name = module.layout, cases.states is None and bool(module.info.held_rows)
     for k in set(range(cases.count)) - reasons.keys():
         try:
             require_switched(layout, x[layout.n_x - layout.n_states :, k])

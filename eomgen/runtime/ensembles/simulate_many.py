@@ -292,7 +292,7 @@ def _open_store(folder: str | Path, runs: Runs, reduce: Any, parts: list[tuple[i
         return x if isinstance(x, str) else np.asarray(x).tolist()
 
     identity = {
-        "model": module.name, "model_digest": module.metadata.get("model_digest"), "code": code_digest(module),
+        "model": module.name, "model_digest": module.info.model_digest, "code": code_digest(module),
         "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),

@@ -50,7 +50,7 @@ def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
 
 def no_series(module: BoundModel) -> str:
     """Why a module has no Taylor method."""
-    why = module.metadata.get("no_series", "its module was compiled without one, as with target='numpy'")
+    why = module.info.no_series
     return (
         f"{module.name} has no Taylor series: {why}; the method works for open chains of bodies whose equations are "
         "smooth and not too long; use DOP853"

@@ -119,7 +119,7 @@ class Events:
 
     def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
-        self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
+        self.declared = layout.info.events
         self.over = False  #: whether the last reset ended the run
         self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
         self.model: list[RunEvent] = []
@@ -174,7 +174,7 @@ class Events:
             "most": [int(event.terminal) for event in every],
             "action": [event.action for event in every],
             "crowd": crowd_of([event.action for event in every]),
-            "resets": self.layout.metadata.get("resets", []) if self.model else [],
+            "resets": self.layout.info.resets if self.model else [],
         }
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
@@ -193,7 +193,7 @@ class Events:
 
     def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:
         """The state x with the new values that the model gives at an event."""
-        after, resets, self.last = x.copy(), self.layout.metadata["resets"], f" at event {self.names[event]}"
+        after, resets, self.last = x.copy(), self.layout.info.resets, f" at event {self.names[event]}"
         own = [k for k, (index, _) in enumerate(resets) if index == event]
         after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
         return after
@@ -306,7 +306,7 @@ def at_next_samples(
     UsageError
         A period is not positive, a counter not whole, or the `span` of the run goes backwards.
     """
-    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    clocks = module.info.clocks
     if span is not None:
         require_forward(module, *span)
         require_agreement(module, t, x, initial)
@@ -360,7 +360,7 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
 
     What they were before a sample, and the velocities before an impact, are not known.
     """
-    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    clocks = module.info.clocks
     if clocks and end < start:
         raise cannot(
             f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
@@ -387,7 +387,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
     """
     layout = module.layout
     require_switched(layout, x[layout.n_x - layout.n_states :])
-    rows: list[tuple[str, str, str]] = module.metadata.get("held_rows", [])
+    rows = module.info.held_rows
     if (
         not rows
         or not (initial is None or isinstance(initial, Mapping))
@@ -490,7 +490,7 @@ def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:
     """Controllers by the event at which they act, in the order of renewal."""
     require_mapping("controllers", given)
     wanted: Mapping[str, Any] = without_dots(given, layout.instances)
-    clocks: list[dict[str, Any]] = layout.metadata.get("clocks", [])
+    clocks = layout.info.clocks
     taken = [name for clock in clocks for name in clock["open"]]
     if wanted and not taken:
         raise cannot(

@@ -306,7 +306,7 @@ def _listed(names: Any) -> str:
 
 def _is_velocity(layout: Layout, output: str) -> bool:
     """Whether an output is a velocity by how it is written or by its unit, though perhaps no velocity moves it."""
-    return output in layout.metadata.get("velocity_outputs", ()) or layout.unit(output) in RATES
+    return output in layout.info.velocity_outputs or layout.unit(output) in RATES
 
 
 def find_sliding(

@@ -469,9 +469,9 @@ def require_distances(
 ) -> None:
     """Refuse gaps with friction whose derivatives (n, n_v) by velocities are not those of distances."""
     layout = module.layout
-    joints = layout.metadata.get("translations", ())
+    joints = layout.info.translations
     rubs = np.flatnonzero(sliding.coefficients[sliding.owner] > 0.0)
-    depend = layout.n_c or layout.metadata.get("held_rows")  # coordinates, on each other
+    depend = layout.n_c or layout.info.held_rows  # coordinates, on each other
     if not joints or not rubs.size or depend or "poses" not in module.kernels.core.names:
         return
     for gap in sorted({*sliding.owner[rubs].tolist()}):

@@ -203,7 +203,7 @@ class GapEvents(Events):
 
 def _ending(module: BoundModel) -> list[str]:
     """The model's events that end a run."""
-    declared = module.layout.metadata.get("events") or []
+    declared = module.layout.info.events
     for event in declared:
         if int(event.get("terminal") or 0) > 1:
             raise cannot(

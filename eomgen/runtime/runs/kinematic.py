@@ -76,7 +76,7 @@ class MotionColumns(Columns):
 
     def _outputs(self) -> Array:
         module, n_q = self.module, self.module.n_q
-        if not module.metadata.get("output_accelerations", True):
+        if not module.info.output_accelerations:
             kernel = module.kernels.kernel("outputs", nan=True)
             return kernel(self.t, self.x, u=self._varying())
         motion = module.kernels.motion_outputs
@@ -281,7 +281,7 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
         worst = joints[int(np.argmax(gaps[joints]))]
     else:
         worst = int(np.argmax(gaps))
-    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    unit = "m" if layout.info.constraint_kinds[worst] == "length" else "rad"
     return f"beyond it, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
 
 

@@ -310,7 +310,7 @@ class RigidSteps:
     """
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
-        known = module.metadata.get("rigid_contacts")
+        known = module.info.rigid_contacts
         if not known:
             raise cannot(
                 f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
@@ -519,8 +519,8 @@ def step_rigidly(
     solution = Solution(told, found_states, [], [], dense, 0, "The end of the span is reached.", counts, ends)
     asked = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
     run = record(bound, forcing, solution, NAME, asked)
-    about = module.metadata
-    forces = ContactForces(about["rigid_contacts"], about["contact_shapes"], told, times[1:], sums.sums, sums.kept)
+    info = module.info
+    forces = ContactForces(info.rigid_contacts, info.contact_shapes, told, times[1:], sums.sums, sums.kept)
     return RigidRun.beside(run, forces)
 
 
@@ -536,21 +536,21 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
     if module.layout.reaction_laws:
         names = ", ".join(module.layout.reaction_laws)
         raise cannot(f"method moreau has no friction by reactions of joints (here {names}); use another method")
-    for name, of in module.metadata.get("rigid_by_motion", {}).items():
+    for name, of in module.info.rigid_by_motion.items():
         raise cannot(
             f"friction or restitution of contact {name!r} depends on {', '.join(of)}; by method moreau it may "
             "depend on time, coordinates, parameters and inputs"
         )
     if Events(module.layout, None).resets:
         raise cannot(f"{module.name} has events that reset its state, which method moreau does not watch")
-    if ends := [event["name"] for event in module.metadata.get("events", []) if event["terminal"]]:
+    if ends := [event["name"] for event in module.info.events if event["terminal"]]:
         raise cannot(f"method moreau watches no events, and {', '.join(ends)} ends the run; leave it out here")
 
 
 def _require_it(module: BoundModel, method: Any) -> None:
     """Refuse another method for a model with rigid contacts."""
     if not isinstance(method, str) or method != NAME:
-        names = module.metadata["rigid_only"]
+        names = module.info.rigid_only
         told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
         raise cannot(
             f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "

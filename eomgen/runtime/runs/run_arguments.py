@@ -208,7 +208,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
 
 def declare(module: BoundModel) -> dict[str, Any]:
     """What holds for a run where nothing is said: what the model says, or the defaults."""
-    return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+    return {**DEFAULTS, **{k: v for k, v in module.info.simulation.items() if v is not None}}
 
 
 def set_up(
@@ -224,13 +224,13 @@ def set_up(
 
 def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
     """The model's own ``max_step`` (s), which implicit methods do not need; empty without."""
-    own = module.metadata.get("simulation", {}).get("max_step")
+    own = module.info.simulation.get("max_step")
     return {} if own is None or (isinstance(method, str) and method in STIFF) else {"max_step": own}
 
 
 def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
     """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
-    own, named = map(module.metadata.get("simulation", {}).get, ("step", "method"))
+    own, named = map(module.info.simulation.get, ("step", "method"))
     if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
         return method, step
     return named, own if step is None else step
@@ -269,7 +269,7 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
     AssemblyError
         The loops do not close, or the inputs on which they depend change with the state that they give.
     """
-    if module.metadata.get("clocks") or module.layout.switches:
+    if module.info.clocks or module.layout.switches:
         span = None if forcing is None else forcing.span
         return at_next_samples(module, t, _find_state(module, initial, t, forcing), span, initial)
     return _find_state(module, initial, t, forcing)
@@ -311,7 +311,7 @@ def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
     _, depth, thickness, first, second = (float(number) for number in found)
     if depth <= SUNK * thickness:
         return None
-    (name, one), (_, other) = (module.metadata["contact_shapes"][int(k)] for k in (first, second))
+    (name, one), (_, other) = (module.info.contact_shapes[int(k)] for k in (first, second))
     return f"contacts {name!r}: {one} and {other} are {depth:.3g} m deep in each other"
 
 

@@ -247,7 +247,7 @@ def after_impact(
     held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
     balance, _, rate, after = strike.rows(strike.v, change, l, g)
     before = strike.rows(v, change, l, g)[3]
-    what = f"event {layout.metadata['events'][event]['name']}"
+    what = f"event {layout.info.events[event]['name']}"
     gap = held.along(after[event : event + 1], what, names) + e * move.along(before[event : event + 1], what, names)
     pushed, rates = held.along(balance, what, names), held.along(rate, what, names)
     return np.vstack([move.x[:n_q], strike.solve(M, move.x[n_q:], pushed, rates, n, gap)])
@@ -258,8 +258,8 @@ def after_reset(
 ) -> Array:
     """How the state after a reset changes, (n_x, k); arguments as for :func:`after_impact`, u (n_u,) before it."""
     layout = module.layout
-    n_q, names, what = layout.n_q, layout.u, f"event {layout.metadata['events'][event]['name']}"
-    resets = layout.metadata["resets"]
+    n_q, names, what = layout.n_q, layout.u, f"event {layout.info.events[event]['name']}"
+    resets = layout.info.resets
     chosen = [k for k, (owner, _) in enumerate(resets) if owner == event]
     places = [resets[k][1] for k in chosen]
     slopes = module.kernels.rows("event_derivatives", [layout.n_events + k for k in chosen], t, before, u)
@@ -431,7 +431,7 @@ class Saltation:
     # -- the time of an event -------------------------------------------------------------------------------------
     def _is_fixed(self, t: float, x: Array, S: Array, index: int) -> bool:
         """Whether an event is a sampling time that no change moves."""
-        clocks = [clock["event"] for clock in self.module.metadata.get("clocks", [])]
+        clocks = [clock["event"] for clock in self.module.info.clocks]
         if index not in clocks:
             return False
         gradient = self._gradient(t, x, index)
@@ -549,7 +549,7 @@ class Saltation:
         ``x`` and ``d`` are states and their derivatives (n_x, k) before and after it.
         """
         module, layout = self.module, self.module.layout
-        rows = module.metadata.get("held_rows", [])
+        rows = module.info.held_rows
         closed = [k for k, (_, state, _) in enumerate(rows) if x[0][layout.x.index(state)] > 0.5]
         if not closed or "held_errors" not in module.kernels.core.names:
             return

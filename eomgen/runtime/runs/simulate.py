@@ -83,7 +83,7 @@ class Plan(NamedTuple):
     def shared(self) -> bool:
         """Whether runs that bind no values change nothing of the forcing: no rates, no sampled states."""
         layout = self.forcing.layout
-        return not (layout.input_rates or layout.metadata.get("clocks") or layout.switches)
+        return not (layout.input_rates or layout.info.clocks or layout.switches)
 
 
 def plan_run(
@@ -238,7 +238,7 @@ def simulate(
             motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, asked)
             if motion is not None:
                 return motion
-        if (isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata:
+        if (isinstance(method, str) and method == "moreau") or module.info.rigid_only:
             from .moreau import step_rigidly
 
             asked = {**limits, "dense_output": dense_output, "controllers": controllers, **others}
@@ -283,7 +283,7 @@ def simulate(
 
         if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
             warnings.warn(words, stacklevel=calls_within() + 1)
-    if "contact_shapes" in bound.metadata:
+    if bound.info.contact_shapes:
         from .run_arguments import warn_of_depth
 
         warn_of_depth(bound, start, x0, forcing(start, x0) if forcing else None)
