@@ -101,9 +101,9 @@ class Renaming(Visitor):
     attached : mapping of str to Attached
         By attachment, ground among them.
     closed : bool
-        Whether names that the component does not declare are faults.
-    fault : callable
-        Told path, message and remedy of what cannot be said.
+        Whether the component knows no names but its own.
+    fault : callable, optional
+        Told path, message and remedy of names that it does not declare.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Renaming(Visitor):
         values: Mapping[str, str],
         attached: Mapping[str, Attached],
         closed: bool,
-        fault: Callable[[str, str, str, str], None],
+        fault: Fault | None = None,
     ) -> None:
         self.own, self.prefix, self.values, self.attached = own, prefix, values, attached
         self.closed, self.fault = closed, fault
@@ -192,7 +192,7 @@ class Renaming(Visitor):
         return f"{reference['body']}.{name}"
 
     def _foreign(self, name: str, remedy: str) -> None:
-        if self.closed and self.entry is not None:
+        if self.fault is not None and self.entry is not None:
             message = f"{name!r} is not declared in the component, and a component knows only its own names"
             self.fault(f"{self.entry.path}.{self.key}", message, remedy, "EG-NAME-UNKNOWN")
 
@@ -304,8 +304,8 @@ class Instance:
     guess: Mapping[str, Any] = field(default_factory=dict)
 
 
-def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> None:
-    """Add the entries of an instance to a description; what is wrong with it is noted at ``path``."""
+def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> bool:
+    """Add the entries of an instance to a description; False, and faults at ``path``, if it has any."""
 
     def told(place: str, message: str, remedy: str, code: str) -> None:
         """A fault of the component itself."""
@@ -314,15 +314,15 @@ def add_instance(target: Description, component: Component, instance: Instance, 
 
     attached = _attachments(target, component, instance, path, faults.add)
     values = _values(component, instance, path, faults.add, told)
-    if attached is None or values is None:
-        return
+    if attached is None or values is None or not claim(target, instance, path, faults.add):
+        return False
     numbers, texts, units = values
     origins = {
         f"{section}.{entry.name}": f"{section}.{instance.prefix}{entry.name}"
         for section, entries in component.description.sections.items()
         for entry in entries
     }
-    renaming = Renaming(component.names, instance.prefix, texts, attached, component.closed, told)
+    renaming = Renaming(component.names, instance.prefix, texts, attached, component.closed)
     _copy_origins(target, component, instance, origins)
     for section in SECTIONS:
         for entry in component.description.sections[section]:
@@ -341,6 +341,7 @@ def add_instance(target: Description, component: Component, instance: Instance, 
     for name, (body, placed) in renaming.markers.items():
         _add_marker(target, body, name, placed)
     _add_starts(target, component, instance, renaming)
+    return True
 
 
 def _split(place: str) -> tuple[str, str]:
@@ -425,8 +426,7 @@ def _values(
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
                 told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
                 sound = False
-            renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
-            renaming.entry, renaming.key = entry, "value"
+            renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed)
             texts[name] = str(renaming.scalar(value))
     return (numbers, texts, units) if sound else None
 
@@ -685,7 +685,7 @@ class Components:
             return None
         if description is None:
             return None
-        return self._checked(component_of(description, name, "", lambda _, *what: self.fault(f"{path}.file", *what)))
+        return self._checked(component_of(description, name, "", self.faults, f"{path}.file"))
 
     def _checked(self, component: Component) -> Component:
         for name in component.attachments:
@@ -745,9 +745,8 @@ class Components:
             number = str(k + 1) if "for" in keys else ""
             before = f"{prefix.rstrip('_')}{number}_" if number else prefix
             instance = self._instance(component, f"{name}{number}", before, keys, variables, path)
-            if instance is None or not claim(target, instance, path, self.fault):
+            if instance is None or not add_instance(target, component, instance, path, self.faults):
                 return
-            add_instance(target, component, instance, path, self.faults)
 
     def _instance(
         self, component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Any, path: str
@@ -794,16 +793,27 @@ def claim(target: Description, instance: Instance, path: str, fault: Fault) -> b
     return True
 
 
-def component_of(description: Description, name: str, place: str, fault: Fault) -> Component:
-    """A component of the description of a whole model: its bodies, joints and what belongs to them."""
+def component_of(description: Description, name: str, place: str, faults: Faults, path: str) -> Component:
+    """A component of the description of a whole model, which is at ``path``; it knows no names but its own."""
+
+    def told(inside: str, message: str, remedy: str, code: str) -> None:
+        faults.take(Problem(f"{place}{inside}", message, remedy, *description.place(inside), code))
+
     for key in ("lagrangian", "equations"):
         if description.values.get(key) is not None:
             remedy = "a component can contain only bodies, joints and what belongs to them"
-            fault("", f"{name} has {key}", remedy, "EG-UNSUPPORTED")
+            faults.add(path, f"{name} has {key}", remedy, "EG-UNSUPPORTED")
     check = description.values.get("check_inertia")
     for entry in description.sections["bodies"]:
         if check is not None and entry.name != GROUND_NAME:
             entry.values.setdefault("check_inertia", check)
     attachments = description.values.get("attachments") or []
     attachments = [attachments] if isinstance(attachments, str) else attachments
-    return Component(name, place, description, tuple(map(str, attachments)))
+    component = Component(name, place, description, tuple(map(str, attachments)))
+    ground = Attached(GROUND_NAME, GROUND_NAME, {})
+    own = dict.fromkeys((*component.attachments, GROUND_NAME), ground)
+    check = Renaming(component.names, "", {}, own, True, told)
+    for section, entries in description.sections.items():
+        for entry in entries:
+            visit_entry(section, entry, check)
+    return component

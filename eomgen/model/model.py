@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
@@ -15,7 +14,7 @@ from ..elements.joints import JOINTS
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
 from .build_functions import PythonTwin
 from .build_mechanism import build
-from .components import Component, Instance, add_instance, claim, component_of, named_attachments
+from .components import Component, Instance, add_instance, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items
 from .element_methods import ElementMethods
 from .fields import fields_of
@@ -609,29 +608,15 @@ class Builder(ElementMethods):
         if twice := sorted({name for name in given if given.count(name) > 1}):
             raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
         numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
-        description = self._description
-        made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
-        made.values, made.instances = dict(description.values), dict(description.instances)
-        made.sections = {section: list(entries) for section, entries in description.sections.items()}
-        made.sections["bodies"] = [replace(entry, values=dict(entry.values)) for entry in made.sections["bodies"]]
         faults = Faults(Description())
         named = named_attachments(part, self._references(at), "at", faults.add)
         name = prefix.rstrip("_") or part.name
         instance = Instance(name, prefix, named or {}, numbers)
-        if named is not None and claim(made, instance, "prefix", faults.add):
-            add_instance(made, part, instance, "add", faults)
+        if named is not None:
+            add_instance(self._description, part, instance, "add", faults)
         if faults:
             told = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
             raise UsageError(f"add {part.name}: {told}", code=faults.problems[0].code)
-        description.lines, description.origins, description.instances = made.lines, made.origins, made.instances
-        for section, entries in made.sections.items():
-            known = description.sections[section]
-            for old, new in zip(known, entries, strict=False):  # handles hold the entries
-                old.values = new.values
-            known += entries[len(known) :]
-        for key in ("initial", "guess"):
-            if key in made.values and made.values[key] is not description.values.get(key):
-                description.values[key] = made.values[key]
         return InstanceHandle(self, name, prefix)
 
     def _references(self, at: Any) -> Any:
@@ -799,7 +784,7 @@ def _component(given: Any) -> Component:
     else:
         raise ill_typed(f"{given!r} is not a component; give a Model, or the name of a model file")
     name = str(description.values.get("name", "component"))
-    part = component_of(description, name, f"components.{name}.", faults.add)
+    part = component_of(description, name, f"components.{name}.", faults, "")
     for problem in (*description.problems, *faults.problems):
         raise UsageError(f"add {name}: {problem}", code=problem.code)
     return part

@@ -14,6 +14,7 @@ from ..expr.shown import quoted
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64
+LISTED = 20  #: names that a message lists at most
 
 
 def function_words() -> dict[str, tuple[int, int]]:
@@ -111,11 +112,11 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     return fault_of_name(name, symbol=True)
 
 
-def listing(known: Iterable[str], limit: int = 20) -> str:
-    """The names joined by commas, cut after ``limit``; ``"none"`` if there are none."""
+def listing(known: Iterable[str]) -> str:
+    """The first names joined by commas, and how many there are; ``"none"`` if there are none."""
     names = list(known)
-    shown = ", ".join(names[:limit])
-    return (shown + f", ... ({len(names)} in all)" if len(names) > limit else shown) or "none"
+    shown = ", ".join(names[:LISTED])
+    return (shown + f", ... ({len(names)} in all)" if len(names) > LISTED else shown) or "none"
 
 
 def nearest(name: str, known: Iterable[str], what: str = "known") -> str:
