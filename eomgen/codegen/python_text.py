@@ -137,43 +137,23 @@ def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:
     return f"def {name}({arguments}):\n{body}\n"
 
 
-def print_block_of_lists(program: Program, block: Block, prefix: str = "") -> str:
-    """The functions of a block as those of :func:`print_block`, on lists of numbers of any library that has ``np``.
+def print_block(program: Program, block: Block, lists: bool = False) -> str:
+    """The functions of a block, the last of them ``<name>(t, x, u, c)``.
 
-    The last is ``<prefix><name>(t, x, u, c)`` -> list; where there are checks the text calls ``checked(out, good)``.
+    ``lists``: on lists of numbers of any library that has ``np``, the last is ``block_<name>(t, x, u, c)`` -> list;
+    where there are checks the text calls ``checked(out, good)``.
     """
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    printer = _NumpyPrinter(program, references(program, block.inputs), traced=True)
-    start = [f"out = [0.0] * {block.n_out}", *(["good = []"] if block.checks else [])]
-    end = ["return checked(out, good)" if block.checks else "return out"]
-    ports = " ".join(port.name for port in block.ports)
-    doc = f"[{ports}] -> {block.n_out} values"
-    return _print_pieces(printer, prefix + block.name, doc, pieces, start, end, by_entry=True)
-
-
-def print_constants_of_lists(program: Program) -> str:
-    """``constants(p)``: the list c that the blocks of lists read."""
-    graph = program.graph
-    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
-    printer = _NumpyPrinter(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
-    start = ["t = u = c = None", "x = p", f"out = [0.0] * {len(program.hoisted)}"]
-    doc = "Constants c that follow from the parameters p."
-    text = _print_pieces(printer, "constants", doc, pieces, start, ["return [*p, *out]"], by_entry=True)
-    return text.replace("def constants(t, x, u, c):", "def constants(p):")
-
-
-def print_block(program: Program, block: Block) -> str:
-    """The functions of a block, the last of them ``<name>(t, x, u, c)``."""
-    pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    printer = _NumpyPrinter(program, references(program, block.inputs))
-    start = [f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
-    if program.time in symbols_of((*block.outputs, *block.checks)):
+    printer = _NumpyPrinter(program, references(program, block.inputs), traced=lists)
+    start = [f"out = [0.0] * {block.n_out}" if lists else f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
+    if not lists and program.time in symbols_of((*block.outputs, *block.checks)):
         start.append("t = np.asarray(t, dtype=float)[()]")  # never a Python float, whose division by zero raises
-    if block.checks:
-        start.append("lost = []")
-    end = ["return checked(out, lost)" if block.checks else "return out"]
+    noted = "good" if lists else "lost"
+    start += [f"{noted} = []"] if block.checks else []
+    end = [f"return checked(out, {noted})" if block.checks else "return out"]
     ports = " ".join(port.name for port in block.ports)
-    return _print_pieces(printer, block.name, f"[{ports}] -> ({block.n_out}, ...)", pieces, start, end)
+    doc = f"[{ports}] -> {block.n_out} values" if lists else f"[{ports}] -> ({block.n_out}, ...)"
+    return _print_pieces(printer, "block_" * lists + block.name, doc, pieces, start, end, by_entry=lists)
 
 
 def print_table(function: Function, curve: str, surface: str) -> str:
@@ -186,19 +166,18 @@ def print_table(function: Function, curve: str, surface: str) -> str:
     return f"{head} = {surface}({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"
 
 
-def print_precompute(program: Program) -> str:
-    """``precompute(p)``: the constants c that the blocks read."""
-    graph, n = program.graph, len(program.parameters)
+def print_precompute(program: Program, lists: bool = False) -> str:
+    """``precompute(p)``: the constants c that the blocks read; ``constants(p)`` if these are ``lists``."""
+    graph, n = program.graph, len(program.hoisted)
     pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
     printer = _NumpyPrinter(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
-    start = [
-        "t = u = c = None",
-        "x = np.array(p, dtype=float)",
-        f"result = np.concatenate([x, np.empty({len(program.hoisted)})])",
-        f"out = result[{n}:]",
-    ]
-    text = _print_pieces(printer, "precompute", "Constants c from the parameters p.", pieces, start, ["return result"])
-    return text.replace("def precompute(t, x, u, c):", "def precompute(p):")
+    name, end, start = "constants", "return [*p, *out]", ["x = p", f"out = [0.0] * {n}"]
+    if not lists:
+        start = ["x = np.array(p, dtype=float)", f"result = np.concatenate([x, np.empty({n})])"]
+        name, end, start = "precompute", "return result", [*start, f"out = result[{len(program.parameters)}:]"]
+    start, doc = ["t = u = c = None", *start], "Constants c from the parameters p."
+    text = _print_pieces(printer, name, doc, pieces, start, [end], by_entry=lists)
+    return text.replace(f"def {name}(t, x, u, c):", f"def {name}(p):")
 
 
 def _print_pieces(
