@@ -136,21 +136,6 @@ class Atoms:
                 return self.without_squared_signs(join(join(monomial, ((atom, -n),)), powers), kind)
         return monomial
 
-    def over_roots(self, monomial: Monomial, x: Number) -> tuple[Monomial, Number]:
-        """A term with sqrt(b) for b / sqrt(b), where b is one atom with a factor."""
-        powers = dict(monomial)
-        for atom, n in monomial:
-            if n > 0 or n == int(n) or self.table[atom].kind not in SUMS or len(self.table[atom].what) > 1:
-                continue
-            ((inner, factor),) = self.table[atom].what
-            if len(inner) != 1 or inner[0][1] != 1:
-                continue
-            while powers[atom] < 0 and powers.get(inner[0][0], 0) >= 1:
-                powers[inner[0][0]] -= 1
-                powers[atom] += 1
-                x = ratio(x, factor)
-        return tuple(sorted((a, n) for a, n in powers.items() if n)), x
-
     def leaf(self, kind: str, value: Any) -> Poly:
         """The polynomial of a symbol or a number of the graph."""
         if kind == "sym":

@@ -258,10 +258,6 @@ class JoinedAngles:
 # -- polynomials -------------------------------------------------------------------------------------------------------
 
 
-FEW = 3  #: terms up to which a sum of sines and cosines is taken for a product where it is one
-MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
-
-
 Made = TypeVar("Made")
 
 
@@ -333,13 +329,7 @@ class Expansion(OfNodes[Poly]):
 
     def _sum(self, a: Poly, b: Poly, sign: int) -> Poly:
         self.work.spend((len(a) + len(b)) // 4)
-        total = add(a, b, sign)
-        if len(total) > MANY:
-            return self.angles.simplified(total)
-        if 1 < len(total) <= FEW:  # a sum that is one product is multiplied and squared as one
-            short = self.angles.simplified(total)
-            return short if len(short) == 1 else total
-        return total
+        return add(a, b, sign)
 
     def _settled(self, a: Poly) -> Poly:
         """With sums to whole positive powers multiplied out again."""
@@ -348,7 +338,7 @@ class Expansion(OfNodes[Poly]):
         while waiting:
             done: Poly = {}
             for given, x in waiting.pop().items():
-                monomial, x = self.atoms.over_roots(self.atoms.without_squared_signs(given, "sum"), x)
+                monomial = self.atoms.without_squared_signs(given, "sum")
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x

@@ -317,9 +317,7 @@ class Literal(OfNodes[Poly]):
             return scaled(parts[0], -1)
         if kind in ("mul", "absorb"):
             product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
-            return dict(
-                self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()
-            )
+            return {self.atoms.without_squared_signs(m, "factor"): x for m, x in product.items()}
         if kind == "div" and parts[1]:
             ((below, x),) = self._one_term(parts[1]).items()
             return multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
