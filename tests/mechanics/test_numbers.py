@@ -43,16 +43,10 @@ def by_hand(I2: float, x: np.ndarray) -> np.ndarray:
     return np.linalg.solve(M, -h - g)
 
 
-def undamped(I2: float) -> eg.Model:
-    return double_pendulum(I2, drag=False, check_inertia="off")
-
-
-PAIRS = [*((method, "numpy") for method in ("embedding", "recursive", "lagrange", "augmented", "newton_euler"))]
-
-
-@pytest.mark.parametrize(("method", "target"), [*PAIRS])
-def test_accelerations_are_those_of_the_indefinite_matrix(method: str, target: str) -> None:
-    module = undamped(-0.2).compile(method=method, target=target, kernels=["rhs", "mass_matrix"])
+@pytest.mark.parametrize("method", ["embedding", "recursive", "lagrange", "augmented", "newton_euler"])
+def test_accelerations_are_those_of_the_indefinite_matrix(method: str) -> None:
+    model = double_pendulum(-0.2, drag=False, check_inertia="off")
+    module = model.compile(method=method, target="numpy", kernels=["rhs", "mass_matrix"])
     random = np.random.default_rng(0)
     signs = set()
     for _ in range(20):
