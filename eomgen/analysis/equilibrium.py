@@ -183,7 +183,7 @@ def equilibrium(
 ) -> Equilibrium:
     """Find a position at rest in which all forces are in balance (by virtual work) and no first-order state changes.
 
-    Newton's iteration is tried first, then the motion in a viscous fluid, then the method of Levenberg and Marquardt.
+    Newton's iteration is tried first, then the motion in a viscous fluid, then damped Gauss-Newton steps.
 
     Parameters
     ----------

@@ -395,7 +395,10 @@ class BalanceRows:
         """The place a step away."""
         self.steps += 1
         there = self.search.step(place[0], place[1].moved @ change, place[1].changed @ change)
-        return None if there is None else (there, self.search.linearize(there))
+        try:
+            return None if there is None else (there, self.search.linearize(there))
+        except (AssemblyError, EvaluationError, PartitionError, UsageError):
+            return None
 
     def rounding(self, _: Any, J: Array) -> Array:
         """None of its own: Newton's iteration, which comes last, judges it."""

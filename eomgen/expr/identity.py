@@ -111,18 +111,22 @@ def with_likely_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> 
     return found, np.minimum(bounds, CHANCE * likely)
 
 
-def vanishes(outputs: Sequence[Expr], within: float | None = None, pieces: bool = False) -> list[bool]:
+def vanishes(
+    outputs: Sequence[Expr], within: float | None = None, pieces: bool = False, unknown: bool = False
+) -> list[bool]:
     """Which expressions are zero at all values of their symbols; the module's page says how surely.
 
     Parameters
     ----------
     outputs : sequence of Expr
     within : float, optional
-        What counts as zero of numbers that a user wrote in so many digits; rounding by default.  The derivatives have
+        What counts as zero of numbers that a user wrote in so many digits.  Rounding by default; the derivatives have
         to be rounding then too: beside large numbers that cancel, a term of size 1 may be lost in the value.
     pieces : bool
         Whether expressions that are not analytic are judged by such points too, so that ``max(x, 0)``, which is zero
         in a part of its domain, may count as zero; they never do otherwise.
+    unknown : bool
+        What is returned of an expression that is zero wherever it has a value, but has one at fewer points.
     """
     graph = common_graph(outputs)
     if graph is None:
@@ -145,7 +149,7 @@ def vanishes(outputs: Sequence[Expr], within: float | None = None, pieces: bool 
                 is_rounding(*with_likely_bounds([outputs[k]], values)) and _is_flat(outputs[k], values)
             ):
                 found.add(k)
-    return [k in found for k in range(len(outputs))]
+    return [k in found or (unknown and k in left) for k in range(len(outputs))]
 
 
 def random_point(outputs: Sequence[Expr], random: np.random.Generator, signs: bool = False) -> dict[str, float]:

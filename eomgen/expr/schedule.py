@@ -100,22 +100,6 @@ def _with_pairs(graph: Graph, found: Counter[str]) -> Counter[str]:
     return rest
 
 
-def critical_path(outputs: Sequence[Expr]) -> int:
-    """Operations on the longest chain from a leaf to an output; every operation counts 1, negation 0."""
-    graph = common_graph(outputs)
-    if graph is None:
-        return 0
-    nodes = graph.nodes
-    depth: dict[int, int] = {}
-    for i in reachable(graph, (y.id for y in outputs)):
-        node = nodes[i]
-        if node[0] in LEAVES:
-            depth[i] = 0
-        else:
-            depth[i] = max(depth[k] for k in node[1:]) + (node[0] != "neg")
-    return max(depth[y.id] for y in outputs)
-
-
 # -- order of evaluation -----------------------------------------------------------------------------------------------
 
 

@@ -200,7 +200,7 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
         marker = Marker(k, Frame.identity(graph), body.name)
         spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
         across += vec.cross(spin, body.plane or spin)
-    zero = vanishes(across, ACROSS, pieces=True)
+    zero = vanishes(across, ACROSS, pieces=True, unknown=True)
     return [body.name for k, (_, body) in enumerate(bodies) if not all(zero[3 * k : 3 * k + 3])]
 
 

@@ -16,7 +16,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
 from ..expr.differentiate import gradient
 from ..expr.evaluate import evaluate
-from ..expr.identity import random_point, settled_rotation, settled_vector, size_of, vanishes
+from ..expr.identity import DRAWS, random_point, settled_rotation, settled_vector, size_of, vanishes
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
 from ..expr.vectors import Mat3, Vec3
@@ -43,7 +43,12 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | Non
     held = (graph.symbol(name).id for name in symbols_of([angle]))
     turning = sorted(places[i] for i in held if i in places)
     slopes = gradient(angle, [q[j] for j in turning])
-    steps = np.round(evaluate(slopes, random_point(slopes, np.random.default_rng(7)))) if slopes else ()
+    random = np.random.default_rng(7)
+    points = (random_point(slopes, random) for _ in range(DRAWS if slopes else 1))
+    drawn = (np.round(evaluate(slopes, point)) if slopes else np.zeros(0) for point in points)
+    steps = next((steps for steps in drawn if np.isfinite(steps).all()), None)  # a root may have no value at a point
+    if steps is None:
+        return None
     off = [rotation[2][2] - 1.0, *(x - float(step) for x, step in zip(slopes, steps, strict=True))]
     if not all(vanishes(off, PLANE, pieces=True)):
         return None

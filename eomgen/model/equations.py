@@ -287,7 +287,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
                 reader.faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
-        return tuple(result.values())
+        return tuple(result[name] for name in names)
     listed = items(given)
     if listed is None:
         reader.wrong(path, given, kinds.CoordinateForces)
@@ -297,7 +297,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
         )
     elif listed:
         return tuple(reader.expression(f"{path}[{k}]", value, MOTION) for k, value in enumerate(listed))
-    return tuple(result.values())
+    return tuple(result[name] for name in names)
 
 
 def momenta_and_rates(bare: Lagrangian, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:

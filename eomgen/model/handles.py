@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ..base import texts
+from ..base.records import dataclass
 from ..elements.joints import JOINTS
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.shown import shown
@@ -210,14 +211,16 @@ class Motion:
         return self._triple("w", "_dot")
 
 
+@dataclass(frozen=True)
 class SeenMotion(Motion):
     """The motion of a marker as seen from another, in the axes of a third, as SymPy symbols (SI units).
 
     ``origin`` and ``axes`` are labels of markers, empty for ground.
     """
 
-    def __init__(self, marker: str, origin: str = "", axes: str = "") -> None:
-        self.marker, self.origin, self.axes = marker, origin, axes
+    marker: str
+    origin: str = ""
+    axes: str = ""
 
     def _ends(self) -> tuple[str, ...]:
         return (self.marker, self.origin, self.axes)

@@ -43,7 +43,7 @@ def jumps_in_time(expressions: Sequence[Expr]) -> bool:
         before, after = (substitute(list(expressions), {Expr(graph, i): x}) for x in (graph.zero, graph.one))
         changes = [a - b for a, b in zip(after, before, strict=True)]
         there = substitute(changes, {t: substitute([when], {t: graph.zero})[0]})
-        if not all(vanishes(there, pieces=True)):
+        if not all(vanishes(there, pieces=True, unknown=True)):
             return True
     return False
 

@@ -132,13 +132,27 @@ cdef class Kernel:
             self.last_failure = value
 
     def __repr__(self):
-        return f"<kernel {self.name} of {self.model.table.name.decode()}: ({', '.join(self.order)}) -> {self.shape}>"
+        return f"<kernel {self.name} of {self.model.table.name.decode()}: {self.__signature__} -> {self.shape}>"
+
+    @property
+    def __signature__(self):
+        """Names of the arguments as users know them, as Python's functions have it."""
+        from inspect import Parameter, Signature
+
+        defaults = [Parameter.empty] * self.required + [0.0 if x == "t" else None for x in self.order[self.required:]]
+        return Signature([Parameter(self.argument(name), Parameter.POSITIONAL_OR_KEYWORD, default=default)
+                          for name, default in zip(self.order, defaults)])
+
+    cdef object argument(self, name):
+        """What users call an argument."""
+        return self.label if self.n_states == 1 and name == self.order[self.at_states[0]] else name
 
     def __call__(self, *args, **given):
         """Evaluate at states, (n,) or (n, k) for k states as columns, and times t, a float or (k,).
 
         p (n_p,) and u, (n_u,) or (n_u, k), replace the context's, a mapping those that it names; they are called
         parameters and inputs as well. out is a float64 array of the result's shape, ``shape`` or ``(*shape, k)``.
+        wrt of a Jacobian is 'x', 'u' or 'p'; rows of constraints are 'independent' or 'all'.
         """
         return self.plainly(args, given)
 
@@ -147,10 +161,14 @@ cdef class Kernel:
         cdef PyObject *sorted[MOST]
         cdef dict named = dict(zip(self.order, args))
         cdef int i
-        what = f"{self.name}({', '.join([self.label if name == 'x' else name for name in self.order[:self.required]])})"
+        if self.call == NULL and self.find is None:
+            self.make()
+        what = f"{self.name}({', '.join([self.argument(name) for name in self.order[:self.required]])})"
         if len(args) > self.n_order:
             raise TypeError(f"{what} takes at most {self.n_order} positional arguments ({len(args)} given)")
         for name, value in given.items():
+            if self.n_states == 1 and name == self.label:
+                name = self.order[self.at_states[0]]
             if name in named:
                 raise TypeError(f"{what} got multiple values for keyword argument '{name}'")
             if name in self.order:

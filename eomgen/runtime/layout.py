@@ -28,6 +28,7 @@ from .tapes import play_arrays
 
 
 ABI = 1  #: version of the generated functions' signatures and of the metadata that describe them
+ALWAYS = ("events", "resets")  #: entries that every model has, also where they are empty
 
 
 @dataclass(frozen=True)
@@ -139,12 +140,15 @@ class ModelInfo:
         Raises
         ------
         UsageError
-            It is one of another layout.
+            It is one of another layout, or lacks entries.
         """
         if data.get("abi") != ABI:
             raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
-        sizes = Sizes(**{name: data[name] for name in Sizes._fields if name in data})
-        return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data}, sizes=sizes)
+        try:
+            sizes = Sizes(**{name: data[name] for name in Sizes._fields if name in data})
+            return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data}, sizes=sizes)
+        except TypeError as error:
+            raise bad_data(f"the model's metadata lacks entries: {error}") from None
 
     def to_dict(self) -> dict[str, Any]:
         """What model.json holds."""
@@ -155,7 +159,7 @@ class ModelInfo:
                 usual = one.default_factory()
             if one.name == "sizes":
                 found |= value._asdict()
-            elif usual is MISSING or (value != usual and (value or usual)):
+            elif usual is MISSING or one.name in ALWAYS or (value != usual and (value or usual)):
                 found[one.name] = value
         return found
 

@@ -56,7 +56,9 @@ class Fault:
                 yield text[: body.start() + here.start()] + self.new + text[body.start() + here.end() :]
 
     def _in_python(self, text: str, names: list[str]) -> Iterator[str]:
-        if not any(text.find(form.format(names[-1])) >= 0 for form in ("def {}(", "class {}", "{} =", "{}:")):
+        if names[-1] not in text or not re.search(
+            rf"^ *((async )?def|class) {names[-1]}\b|^ *{names[-1]} ?[:=]", text, re.M
+        ):
             return  # nothing of this name is here: spare the time to parse it
         tree = ast.parse(text)
         homes: list[Any] = [tree]

@@ -13,7 +13,7 @@ from ...errors import AssemblyError
 from .. import algebra
 from ..algebra import Array, Indices
 from ..limits.analyses import BESIDE, NULL
-from ..limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, TIKHONOV
+from ..limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, STATE, TIKHONOV
 from .projection import largest
 from .ranks import rank
 from .scales import Position, Scales, settle
@@ -119,7 +119,8 @@ def close(
             break
         K = J if metric is None else J @ metric
         steepness = np.sqrt((K * K).sum(axis=1))
-        weights = 1.0 / np.where(steepness > (STEEP if metric is None else 0.0), steepness, 1.0)
+        least = STEEP if metric is None else STATE * largest(steepness)  # a row below it is rounding
+        weights = 1.0 / np.where(steepness > least, steepness, 1.0)
         # far from closed, lengths are measured by the distance: angles would turn in circles over it
         far = remoteness(e, steepness)
         unit = np.where(long, 4.0 * far, 1.0) if long is not None and far > FAR and metric is None else 1.0

@@ -180,7 +180,7 @@ class Continuation:
             if (k := next(away, None)) is not None:
                 gap = here.s - self.points[k].s
                 found = self.forward(k, 2.0 * gap, here.s + gap)
-                if found is not None and self._moved(k) > 0.0:
+                if found is not None and largest(self.points[k].tangent.rate / self.scales.q) > 0.0:
                     return found
         return None
 

@@ -16,25 +16,8 @@ from ...expr.evaluate import evaluate
 from .. import Kinematics
 from ..mobility import Mobility
 from ..motion import dot
-from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
-
-
-def reduce_to_independent(
-    kinematics: Kinematics, mobility: Mobility, equations: TreeEquations, values: Mapping[str, float]
-) -> tuple[Rows, tuple[Expr, ...]]:
-    """The mass matrix (n_dof, n_dof) and force (n_dof,) of the independent accelerations.
-
-    Parameters
-    ----------
-    values : mapping
-        Numbers of the parameters, inputs and t, by which pivots are judged.
-    """
-    if mobility.n_dof == len(kinematics.v):
-        return equations.mass_matrix, tuple(-h for h in equations.bias)
-    found = transform_velocities(kinematics, mobility, values)
-    return found.mass_matrix(equations.mass_matrix), found.force(equations.mass_matrix, [-h for h in equations.bias])
 
 
 class VelocityTransformation(NamedTuple):

@@ -452,9 +452,10 @@ def find_stop(path: DrivenPath, last: Point) -> Point:
     for h in LEAPS:
         if (end := rate(h)) < 0.0 < direction[-1]:
             found = ahead(find_root(rate, 0.0, h, float(direction[-1]), end))
-            if found is not None and abs(found[0] - last.s) < UNJUDGED:
+            length = max(abs(path.t1), largest(path.y1 / path.driven.led_scales))  # scaled, of a step of 1 in s
+            if found is not None and abs(found[0] - last.s) * length < UNJUDGED:
                 s, q, _ = found
-                return Point(s, q, path.driven.tangent(path.at(s)[0], q, 0.0, path.y1))
+                return Point(s, q, path.tangent(s, q))
     return last
 
 

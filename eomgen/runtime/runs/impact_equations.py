@@ -247,7 +247,11 @@ def _angles(W: Array, c: Array, mu: float) -> Array:
     waves = (np.fft.fft(u[0] * y[1] - u[1] * y[0]) / SAMPLES)[ORDERS]
     orders = ORDERS if abs(waves[0]) > EPS * np.abs(waves).max() else ORDERS[1:-1]
     waves = waves[2 - orders]
-    angles = np.angle(np.roots(waves))
+    if not abs(waves[0]) > 0.0:  # NaN included
+        return np.zeros(0)
+    companion = np.eye(len(waves) - 1, k=-1, dtype=complex)
+    companion[0] = -waves[1:] / waves[0]
+    angles = np.angle(algebra.eigvals(companion))
     for _ in range(POLISHED):
         each = waves * np.exp(1j * np.outer(angles, orders))
         value, slope = each.sum(axis=1).real, (1j * orders * each).sum(axis=1).real
