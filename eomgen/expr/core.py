@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 
 from ..base.limits.numbers import NORMAL, TINY
-from ..base.operations import ODD, OPERATIONS
+from ..base.operations import CONDITION, ODD, OPERATIONS
 
 if TYPE_CHECKING:
     from ..base.operations import Operation
@@ -456,6 +456,12 @@ def atan2(y: Expr, x: Expr) -> Expr:
 LEAVES = frozenset({"const", "sym"})
 MANY = 100  #: so many roots are those of a big model: what they are made of is asked for again and again
 KEPT = 12  #: answers kept
+
+
+def is_comparison(x: Expr) -> bool:
+    """Whether an expression is true or false: a comparison, or what joins them."""
+    row = OPERATIONS.get(x.node[0])
+    return row is not None and row.kind == CONDITION
 
 
 def operands(node: Node) -> tuple[int, ...]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..base.operations import CONDITION, operations_with
 from ..base.value_rules import POSITIVE
 from ..elements import kinds
 from ..elements.constraints import Constraint
 from ..elements.constraints.switching import event_of, is_switched, state_of
 from ..elements.kinds import LAW, OUTPUT
-from ..expr.core import Expr, substitute, symbols_of
+from ..expr.core import Expr, is_comparison, substitute, symbols_of
 from ..expr.shown import quoted, shown
 from .build_quantities import in_si, read_described
 from .checks import check_keys
@@ -36,7 +35,7 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
     expression = reader.stand_in
     if "expression" in values:
         expression = instant(reader, f"{path}.expression", values["expression"])
-        if expression.node[0] in operations_with(lambda row: row.kind == CONDITION):
+        if is_comparison(expression):
             message, remedy = "is a comparison, which has no zero", "give the difference of its sides: a - b for a > b"
             reader.faults.add(f"{path}.expression", message, remedy, "EG-EVENT")
     direction = values.get("direction", 0)
@@ -391,7 +390,7 @@ def _falling(reader: Reader, path: str, value: object) -> Expr:
     if len(reader.faults.problems) > before:
         return found
     remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
-    if found.node[0] in ("lt", "le", "eq", "not", "and", "or"):
+    if is_comparison(found):
         reader.faults.add(
             path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy, "EG-EXPRESSION"
         )

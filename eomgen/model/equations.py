@@ -9,8 +9,9 @@ from typing import Any
 from ..base.limits.numbers import TENSOR
 from ..base.notation import split_rate
 from ..elements import kinds
+from ..elements.constraints.couplings import NO_EQUATION
 from ..elements.kinds import MOTION, Fields
-from ..expr.core import Expr, Graph, substitute, symbols_of
+from ..expr.core import Expr, Graph, is_comparison, substitute, symbols_of
 from ..expr.differentiate import gradient, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import vanishes
@@ -229,8 +230,15 @@ def _names(reader: Reader, path: str, values: Mapping[str, Any], key: str, defau
     return [str(name_of(item)) for item in listed]
 
 
+def _check_constraint(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
+    """Note a comparison, or an expression of velocities that is not linear in them."""
+    if is_comparison(expression):
+        reader.faults.add(path, *NO_EQUATION)
+    else:
+        _check_linear(reader, path, expression, v)
+
+
 def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
-    """Note an expression of velocities that is not linear in them."""
     if symbols_of([expression]).isdisjoint(v):
         return
     slopes = jacobian([expression], [reader.graph.symbol(name) for name in v])
@@ -273,7 +281,7 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
     forces = _forces(reader, f"{path}.forces", values.get("forces", ()), names)
     rows = [reader.expression(f"{path}.constraints[{k}]", row, MOTION) for k, row in enumerate(constraints)]
     for k, row in enumerate(rows):
-        _check_linear(reader, f"{path}.constraints[{k}]", row, [f"{name}_dot" for name in names])
+        _check_constraint(reader, f"{path}.constraints[{k}]", row, [f"{name}_dot" for name in names])
     return Lagrangian(tuple(names), expression, forces, dissipation, tuple(rows))
 
 
@@ -439,7 +447,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         _check_mass_matrix(reader, rows, v)
     constraints = listed("constraints", None)
     for k, constraint in enumerate(constraints):
-        _check_linear(reader, f"{PATH}.constraints[{k}]", constraint, v)
+        _check_constraint(reader, f"{PATH}.constraints[{k}]", constraint, v)
         if constraint.is_zero:
             faults.add(
                 f"{PATH}.constraints[{k}]",

@@ -195,6 +195,7 @@ REFUSED = [
     ("power(D) - 1", "EG-EXPRESSION power(D)"),
     ("wx(a) - 1", "EG-CONTRADICTION c.equation -1"),
     ("vy(a) - u", "EG-CONTRADICTION c.equation u"),
+    ("x == 2*y", "EG-EXPRESSION comparison"),
 ]
 
 

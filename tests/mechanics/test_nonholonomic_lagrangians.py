@@ -76,7 +76,12 @@ def test_dependent_velocities_given_too_are_an_error() -> None:
 
 @pytest.mark.parametrize(
     ("text", "fault"),
-    [("x_dot**2 - y_dot", "EG-EXPRESSION"), ("sin(x_dot)", "EG-EXPRESSION"), ("x_ddot", "EG-REFERENCE 'x_ddot'")],
+    [
+        ("x_dot**2 - y_dot", "EG-EXPRESSION"),
+        ("sin(x_dot)", "EG-EXPRESSION"),
+        ("x_ddot", "EG-REFERENCE 'x_ddot'"),
+        ("x == y", "EG-EXPRESSION comparison"),
+    ],
 )
 def test_other_constraints_are_refused_by_name(text: str, fault: str) -> None:
     model = eg.Model.from_lagrangian("s", "x_dot**2 + y_dot**2", ["x", "y"], constraints=[text])

@@ -262,3 +262,6 @@ def test_a_comparison_has_no_zero(text: str) -> None:
     model = ball()
     model.event("passes", text)
     refuses("EG-EVENT comparison", model.check)
+    run = ball().compile(target="numpy").simulate
+    refuses("EG-EVENT comparison", run, 0.1, events=[text])
+    refuses("EG-EVENT comparison", run, 0.1, events={"low": {"expression": text, "terminal": True}})

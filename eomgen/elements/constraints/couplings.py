@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ...base.records import dataclass
-from ...expr.core import Expr, symbols_of
+from ...expr.core import Expr, is_comparison, symbols_of
 from ...expr.differentiate import gradient
 from ..element_type import ElementType, Entry, table
 from ..kinds import OUTPUT, Factors, Scalar
 from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
 
+#: Of what is true or false: message, remedy and code.
+NO_EQUATION = (
+    "is a comparison, not an expression that is to be 0", "give the difference of its sides: a - b for a = b",
+    "EG-EXPRESSION",
+)  # fmt: skip
 #: What can stand in an equation, as a remedy.
 ALLOWED = "a constraint can contain t, inputs, coordinates and velocities"
 #: Kinds of names that cannot, with what is added to that.
@@ -70,6 +75,8 @@ def _coupling(e: Entry) -> Linear | Equation | None:
 
 def _equation(e: Entry) -> Equation | None:
     expression = e["equation"]
+    if is_comparison(expression):
+        e.fault("equation", *NO_EQUATION)
     used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
     for name, meant in used.items():
         if meant.level == 2:

@@ -8,6 +8,7 @@ A clock is an event, t - offset - k period, and the state that holds k, the numb
 
 from __future__ import annotations
 
+import ast
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ import numpy as np
 from ...base.algebra import Array
 from ...base.limits.constraints import MEASURED
 from ...base.limits.runs import CROWD, EARLIEST, INSTANT, MOST_STEPS, WHOLE
+from ...base.syntax_trees import parse_module
 from ...base.texts import shown
 from ...base.value_rules import as_count
 from ...errors import (
@@ -238,7 +240,11 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Ex
     if direction not in (-1, 0, 1):
         raise no_choice(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = RunEvent(None, name or text, options.get("terminal"), direction)
-    return event, read_text(layout, text, f"event {name or text!r}")
+    formula = read_text(layout, text, f"event {name or text!r}")
+    if isinstance(getattr(parse_module(text.strip()).body[0], "value", None), (ast.Compare, ast.BoolOp)):
+        remedy = "give the difference of its sides: a - b for a > b"
+        raise UsageError(f"event {name or text!r} is a comparison, which has no zero; {remedy}", code="EG-EVENT")
+    return event, formula
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
