@@ -35,3 +35,17 @@ def test_angular_velocity_of_bodies_without_mass() -> None:
     m.output("alpha", "wz_dot(arm)")
     mod = m.compile(target="numpy")
     np.testing.assert_allclose(mod.outputs(0.0, mod.x0()), [2.0, 2.0], rtol=1e-14)
+
+
+def test_a_turn_may_have_no_value_at_some_parameters() -> None:
+    """asin(10 h/l) is a number at the declared values, not at all values that a random point may have."""
+    m = eg.Model("links", gravity=(0, -9.81, 0))
+    m.parameter("h", 0.01)
+    l = m.parameter("l", 0.5)
+    links = [m.body(f"b{k}", mass=1.0, com=(l / 2, 0, 0), inertia={"zz": 0.02}) for k in range(3)]
+    turn = (0, 0, "asin(10*h/l)")
+    m.revolute("A", m.ground, links[0])
+    m.revolute("B", links[0].at(l, 0, 0, rpy=turn), links[1])
+    m.revolute("C", links[1].at(l, 0, 0, rpy=turn), links[2])
+    m.revolute("D", links[2].at(l, 0, 0), m.ground.at(0.6, 0, 0))
+    assert m.derive().report.degrees_of_freedom == 1

@@ -222,3 +222,15 @@ def test_what_jumps_in_time_by_a_condition_is_refused(factor: str, jumps: bool) 
         refuses("EG-JUMP constraints.led", m.check)
     else:
         assert m.check().degrees_of_freedom == 0
+
+
+def test_a_law_without_a_value_at_some_parameters_is_no_jump() -> None:
+    """sqrt(l^2 - 10 r^2) is a number at the declared values, not at all that a random point may have."""
+    x, y = dynamicsymbols("x y")
+    t, r, l, T = dynamicsymbols._t, *sympy.symbols("r l T")
+    c = sympy.sqrt(l**2 - 10 * r**2)
+    law = sympy.Piecewise((c * t**3 / T**3, t < T), (c * (3 * t - 2 * T) / T, True))
+    L = (x.diff(t) ** 2 + y.diff(t) ** 2) / 2
+    given = {r: 0.1, l: 0.35, T: 1.0}
+    model = eg.Model.from_lagrangian("led", L, [x, y], constraints=[x - y - law], parameters=given)
+    assert model.check().degrees_of_freedom == 1
