@@ -30,8 +30,6 @@ ROOMS = {
     "core": "base expr pipeline verify",
     "attack": "base importers model",
 }
-#: Scripts that made reference numbers with other programs, which need not be installed.
-collect_ignore_glob = ["reference/*.py"]
 #: What some tests need beside the programs of outside_programs: a mark ``needs(name)`` leaves a test out where there is
 #: none, and the end of the run says so.  Libraries of Python: name -> its module, and how it is installed.
 LIBRARIES = {

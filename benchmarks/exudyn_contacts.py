@@ -1,4 +1,4 @@
-"""Scenes of exudyn_contacts.json by Exudyn -> their answers: ``pip install exudyn==1.13.6; python exudyn_contacts.py``.
+"""Scenes of tests/reference/exudyn_contacts.json by Exudyn (``pip install exudyn==1.13.6``) -> their answers.
 
 Exudyn takes absolute coordinates and Euler parameters; its connector of spheres has the force k d^1.5 without damping,
 and a friction force that is proportional to the sliding velocity below a small speed.
@@ -21,7 +21,7 @@ from exudyn.utilities import (
     ObjectGround,
 )
 
-PATH = Path(__file__).with_suffix(".json")
+PATH = Path(__file__).parents[1] / "tests" / "reference" / "exudyn_contacts.json"
 SCENES = json.loads(PATH.read_text(encoding="utf-8"))
 
 
