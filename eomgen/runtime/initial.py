@@ -455,6 +455,8 @@ class Initial:
                 names = ", ".join(n for n in layout.v if not n.endswith("_dot"))
                 what = "angular velocity" if layout.quaternion_slots else "velocities"
                 raise UnknownNameError(f"{name!r} follows from the {what}; give one of {names} instead")
+            if name in layout.y:
+                raise UnknownNameError(f"{name!r} is an output, which cannot be given here; give coordinates or rates")
             raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         fast = {n: x for n, x in given.items() if (wanted[n].of_velocities if n in wanted else n in rates)}
         return Given(self.system.settle({n: x for n, x in given.items() if n not in fast}), fast)

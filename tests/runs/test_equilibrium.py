@@ -117,6 +117,7 @@ def test_what_equilibria_refuse() -> None:
         ({"hold": {"phi": 2.0, "psi": 2.0}, "unknowns": ["L0"]}, "EG-SHAPE unknowns 2"),
     ):
         refuses(message, mod.equilibrium, **options)
+    refuses("EG-NAME-UNKNOWN 'pin_x' output", compiled("slider_crank").equilibrium, hold={"pin_x": 0.1})
 
 
 def test_rotations_and_rolling() -> None:
