@@ -196,7 +196,7 @@ def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float])
 
 
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """Whether each value is not told from zero by what is known of its rounding."""
+    """Whether each value cannot be distinguished from zero by what is known of its rounding."""
     return np.asarray(np.isfinite(bounds) & (np.abs(values) <= ROUNDED * bounds))
 
 

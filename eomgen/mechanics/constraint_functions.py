@@ -110,7 +110,7 @@ def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
 # many links have the typical length of their columns as their size, or all others would be lost beside them. A relation
 # written by a user may be multiplied by anything, areas in m^2 or numbers of teeth; its size is the length of its
 # scaled gradient, so that a factor does not matter (row equilibration: A. van der Sluis, Numerische Mathematik 14,
-# 1969). A gradient that is not told from rounding of the terms that were added in it (:mod:`~..expr.identity`)
+# 1969). A gradient that may be rounding of the terms that were added in it (:mod:`~..expr.identity`)
 # is no size: such a row counts as nothing beside those terms. Factors that are parameters stay symbols.
 
 
