@@ -52,6 +52,7 @@ class BlockPrinter:
         self._variables: dict[int, str] = {}
         self._uses: Counter[int] = Counter()  #: by statements of this piece; two by one that takes names alone
         self._waiting: dict[int, tuple[str, int]] = {}  #: expressions without a name, in order, and how they bind
+        self.named: frozenset[int] = frozenset()  #: statements that have a name in any case
         self.labels: Mapping[object, str] = {}  #: what results are, by place
 
     def _name(self, i: int) -> str:
@@ -134,7 +135,7 @@ class BlockPrinter:
         for i in piece.statements:
             nests = self._nodes[i][0] in BINDING and i not in by_name
             uses.update(k for k in self._nodes[i][1:] for _ in range(1 if nests else 2))
-        uses.update(k for i in (*piece.results, *piece.stores, *piece.checks, *paired) for k in (i, i))
+        uses.update(k for i in (*piece.results, *piece.stores, *piece.checks, *paired, *self.named) for k in (i, i))
         return uses
 
     def _nested(self, i: int) -> str:
