@@ -13,9 +13,9 @@ from ..errors import UnavailableError
 from ..expr.core import Expr
 from ..expr.differentiate import gradient
 from ..reading import Quantities
+from ..reading.document import Piece, Section, Sentence
 from ..reading.quantities import needed
 from .author import Author, Shown
-from .document import Piece, Section, Sentence
 
 
 def energies(author: Author) -> Section | None:

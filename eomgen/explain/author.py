@@ -15,9 +15,9 @@ from ..expr.printing import Formulas, number
 from ..expr.printing.formula import ROUNDED, Formula, Letter
 from ..mechanics.report import plane_axis
 from ..reading import Quantities, ReadingView
+from ..reading.document import Folded, FormulaLine, Piece, Sentence
 from ..reading.printed import order_of
 from ..reading.quantities import Written, needed
-from .document import Folded, FormulaLine, Piece, Sentence
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
 FOLD = 900  #: nodes of a quantity from which a page shows it only on request

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +14,7 @@ from ..base.files import write_whole
 from ..base.notation import Notation
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..expr.pairs import opaque_names
-from .document import DrawnPicture, Folded, Piece, Section
-from .writers import write_html, write_markdown, write_tex
+from ..reading.document import DrawnPicture, Folded, Piece, Section, write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:
     from .author import Author
@@ -174,7 +172,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 
 def _folded(section: Section | None) -> Section | None:
     """A section that a page shows when it is asked to."""
-    return replace(section, folded=True) if section is not None and section.level == 1 else section
+    return section._replace(folded=True) if section is not None and section.level == 1 else section
 
 
 def _module(author: Author) -> tuple[Any, str]:

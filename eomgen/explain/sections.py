@@ -16,9 +16,9 @@ from ..errors import EomgenError, UnavailableError
 from ..expr.core import Expr
 from ..model.mechanism import JointSpec, Switched
 from ..model.placement import axis_word
+from ..reading.document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 from .author import Author, nodes
 from .comparison import Difference, is_rounding, known_values, value_of
-from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 
 # -- mechanism, bodies, coordinates ------------------------------------------------------------------------------------
 

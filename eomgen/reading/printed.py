@@ -34,6 +34,7 @@ from ..expr.printing.formula import (
     Words,
 )
 from ..expr.printing.writers import TIGHT
+from .document import Folded, FormulaLine, Piece, Row, Sentence
 from .named_parts import PartMeaning, find_blocks, grouped
 from .readable import BODIES, LOOPS, PARTS, Readable
 from .tree_system import MANY
@@ -152,11 +153,10 @@ class PrintedEquations:
         told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
         return [(letter, what) for letter, usual, what in told if letter != usual]
 
-    def told_letters(self) -> Iterator[PrintedSentence]:
+    def told_letters(self) -> Iterator[Sentence]:
         """A sentence of them."""
-        if told := [(Letter(letter), f" is {what}") for letter, what in self.letters_told]:
-            pieces = [x for k, pair in enumerate(told) for x in ((", ", *pair) if k else pair)]
-            yield PrintedSentence((*pieces, "; the usual letters are names of the model."))
+        if told := ", ".join(f"${letter}$ is {what}" for letter, what in self.letters_told):
+            yield Sentence(f"{told}; the usual letters are names of the model.")
 
     @cached_property
     def mass_matrix(self) -> list[list[Formula]]:
@@ -230,50 +230,48 @@ class PrintedEquations:
         """How names are printed on a page."""
         return self.parts.names if self.parts is not None else self.names
 
-    def items(self) -> Iterator[PrintedLine | PrintedRow | PrintedSentence | PrintedGroup]:
+    def items(self) -> Iterator[Piece]:
         """The equations of motion, what stands in them, states, and what is left to say."""
         if self.equations.mobility.n_dof == 0:
-            yield PrintedSentence((f"{STILL.capitalize()}.",))
+            yield Sentence(f"{STILL.capitalize()}.")
         else:
             yield from self._motion() if self.parts is None else self.parts.items()
         for told, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
             if pairs:
-                yield PrintedSentence((told,))
-                yield from (PrintedLine(*pair) for pair in pairs)
+                yield Sentence(told)
+                yield from map(FormulaLine, pairs)
         if self.told:
-            yield PrintedSentence((self.told,))
+            yield Sentence(self.told)
 
-    def _motion(self) -> Iterator[PrintedLine | PrintedSentence | PrintedGroup]:
+    def _motion(self) -> Iterator[Piece]:
         """M v' = f written out where it fits on a page, else in letters, and their entries."""
         M, f = MatrixOf(tuple(map(tuple, self.mass_matrix))), MatrixOf(tuple((x,) for x in self.force))
         if self.is_one_equation and self.fits:
             factor = M.rows[0][0]
-            yield PrintedLine(
-                self.column if factor == NumberPart("1") else Product((factor, self.column)), self.force[0]
-            )
+            left = self.column if factor == NumberPart("1") else Product((factor, self.column))
+            yield FormulaLine((left, self.force[0]))
         elif len(self.accelerations) > 1 and self.fits:
-            yield PrintedLine(Product((M, self.column)), f)
+            yield FormulaLine((Product((M, self.column)), f))
         else:
             mass, _, force = map(Letter, self.letters)
-            yield PrintedLine(Product((mass, self.column)), force)
+            yield FormulaLine((Product((mass, self.column)), force))
             yield from self.told_letters()
             several = len(self.accelerations) > 1
             whole = several and self.mass_matrix_fits
             if whole:
-                yield PrintedLine(mass, M)
+                yield FormulaLine((mass, M))
             elif several:
                 zeros = "; entries that are not shown are 0" if self.vanishing else ""
-                yield PrintedSentence((f"The mass matrix is symmetric{zeros}.",))
-            lines = [
-                PrintedLine(Letter(self.label(entry)), entry.formula)
+                yield Sentence(f"The mass matrix is symmetric{zeros}.")
+            lines = tuple(
+                FormulaLine((Letter(self.label(entry)), entry.formula))
                 for entry in self.entries()
                 if not (whole and entry.letter == self.letters.mass)
-            ]
-            title = PrintedSentence((f"the {len(lines)} entries of M and f",))
-            yield from lines if len(lines) <= FOLDED else [PrintedGroup(title, lines)]
+            )
+            yield from lines if len(lines) <= FOLDED else [Folded(f"the {len(lines)} entries of M and f", lines)]
         if self.named:
-            yield PrintedSentence(("where",))
-            yield from (PrintedLine(Name(name), x) for name, x in self.intermediates)
+            yield Sentence("where")
+            yield from (FormulaLine((Name(name), x)) for name, x in self.intermediates)
 
     def label(self, entry: PrintedEntry) -> str:
         """LaTeX of the place of an entry."""
@@ -386,33 +384,6 @@ TITLES = {
 }
 ZERO = NumberPart("0")
 NUMBERED = re.compile(r"z\d+")  #: names that say nothing
-Piece = str | Formula
-
-
-class PrintedLine(NamedTuple):
-    """A formula and its left side."""
-
-    left: Formula
-    right: Formula
-
-
-class PrintedRow(NamedTuple):
-    """Lines that stand side by side where there is room."""
-
-    lines: tuple[PrintedLine, ...]
-
-
-class PrintedSentence(NamedTuple):
-    """Words, and formulas between them."""
-
-    pieces: tuple[Piece, ...]
-
-
-class PrintedGroup(NamedTuple):
-    """Lines of one meaning, shown on request."""
-
-    title: PrintedSentence
-    lines: list[PrintedLine]
 
 
 class _Matrix(NamedTuple):
@@ -455,24 +426,26 @@ class PrintedParts:
         self._kinematics = self.equations.kinematics
         self._free = {*self.equations.independent}
 
-    def items(self) -> Iterator[PrintedRow | PrintedSentence | PrintedGroup]:
+    def items(self) -> Iterator[Piece]:
         """All of it."""
-        M, v, f = map(Letter, self.printed.letters)
-        yield PrintedRow((PrintedLine(Product((M, self.printed.column)), f),))
+        M, v, f = self.printed.letters
+        yield _row((Product((Letter(M), self.printed.column)), Letter(f)))
         yield from self.printed.told_letters()
         if self.printed.of_loops:
-            yield from self._embedding(M, v, f)
+            yield from self._embedding(*map(Letter, (M, v, f)))
+        large: list[_Matrix] = []
         for matrix in self._matrices:
             if not matrix.is_column and not matrix.is_large:
-                yield PrintedRow((PrintedLine(Letter(matrix.letter), self._pattern(matrix)),))
+                yield _row((Letter(matrix.letter), self._pattern(matrix)))
+            large += [matrix] if matrix.is_large and not matrix.is_column else []
         yield from self._rows_of_constraints()
         yield from self._blocks()
         if zeros := self._zeros:
-            names = _listed([Name(name) for name in zeros])
-            yield PrintedSentence((M, " and ", f, " do not depend on ", *names, "; below, 0 stands for them."))
-        if large := [m for m in self._matrices if m.is_large and not m.is_column]:
-            title = PrintedSentence(("matrices ", *_listed([Letter(m.letter) for m in large])))
-            yield PrintedGroup(title, [PrintedLine(Letter(m.letter), self._pattern(m)) for m in large])
+            names = listed([Name(name) for name in zeros])
+            yield Sentence((f"${M}$ and ${f}$ do not depend on ", *names, "; below, 0 stands for them."))
+        if large:
+            title = f"matrices {', '.join(f'${m.letter}$' for m in large)}"
+            yield Folded(title, tuple(FormulaLine((Letter(m.letter), self._pattern(m))) for m in large))
         yield from self._groups()
 
     @cached_property
@@ -481,41 +454,34 @@ class PrintedParts:
         return self.printed.names.with_latex({name: x.latex for name, x in self._entry_letters.items()})
 
     # -- mechanisms with loops ----------------------------------------------------------------------------------------
-    def _embedding(self, M: Letter, v: Letter, f: Letter) -> Iterator[PrintedRow | PrintedSentence]:
+    def _embedding(self, M: Letter, v: Letter, f: Letter) -> Iterator[Piece]:
         """How M and f follow from the equations of the tree and the constraints."""
         k = self._kinematics
         mass, force, C, gamma = (Letter(matrix.letter) for matrix in self._matrices)
         B, a, w = self._letter("B", "P"), self._letter("a", "b"), self._letter("v_t", "w_t")
         transposed, rates = Letter(raised(B, "T")), Letter(dotted(w, 1))
         rest = SumOf(((False, force), (True, Product((mass, Letter(a))))))
-        of_mass, of_force = Product((transposed, mass, Letter(B))), Product((transposed, rest))
-        yield PrintedRow((PrintedLine(M, of_mass), PrintedLine(f, of_force)))
+        yield _row((M, Product((transposed, mass, Letter(B)))), (f, Product((transposed, rest))))
         every = [Name(acceleration_name(name)) for name in k.velocity_names]
         free = [x for x, label in zip(every, k.velocity_labels, strict=True) if label in self._free]
         constrained = SumOf(((False, Product((C, rates))), (False, gamma)))
-        yield PrintedSentence(
-            (
-                *(mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every)),
-                *("). With the constraints ", constrained, " = 0,"),
-            )
-        )
-        C_d, C_i, B_d, a_d = (Letter(f"{x}_{part}") for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
-        inverse, moved = (
-            Letter(raised(C_d.latex, "{-1}")),
-            SumOf(((False, Product((Letter(B), v))), (False, Letter(a)))),
-        )
-        solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, C_i), (a_d, gamma)))
-        yield PrintedRow((PrintedLine(rates, moved), *solved))
-        of_free = ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d)
-        of_others = (" the others. ", B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v)
-        yield PrintedSentence((*of_free, *of_others, ", ", Letter(B), " is the identity and ", Letter(a), " is 0."))
+        of_all = f"${mass.latex}$ and ${force.latex}$ are of all accelerations of the tree, ${rates.latex}$ = ("
+        yield Sentence((of_all, *listed(every), "). With the constraints ", constrained, " = 0,"))
+        C_d, C_i, B_d, a_d = (f"{x}_{part}" for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
+        moved = SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
+        inverse = Letter(raised(C_d, "{-1}"))
+        solved = ((Letter(x), SumOf(((True, Product((inverse, y))),))) for x, y in ((B_d, Letter(C_i)), (a_d, gamma)))
+        yield _row((rates, moved), *solved)
+        of_others = f"${B_d}$ and ${a_d}$ are the rows of the other accelerations; in the rows of ${v.latex}$, ${B}$ is"
+        of_free = f"where ${C_i}$ holds the columns of ${C.latex}$ that belong to "
+        yield Sentence((of_free, *listed(free), f", and ${C_d}$ the others. {of_others} the identity and ${a}$ is 0."))
 
-    def _rows_of_constraints(self) -> Iterator[PrintedSentence]:
+    def _rows_of_constraints(self) -> Iterator[Sentence]:
         """Of which equations the rows of C are."""
         labels = self.equations.constraint_names
         if self.printed.of_loops and len(labels) <= LARGE:
             C = next(m for m in self._matrices if m.meaning == PartMeaning.CONSTRAINT)
-            yield PrintedSentence(("The rows of ", Letter(C.letter), f" are those of {', '.join(labels)}."))
+            yield Sentence(f"The rows of ${C.letter}$ are those of {', '.join(labels)}.")
 
     @property
     def _branches(self) -> list[int]:
@@ -527,7 +493,7 @@ class PrintedParts:
             found |= {link.first + c: root[k] for c in range(len(link.columns))}
         return [found[j] for j in range(len(self._kinematics.velocity_labels))]
 
-    def _blocks(self) -> Iterator[PrintedRow | PrintedSentence]:
+    def _blocks(self) -> Iterator[Piece]:
         """Large matrices in blocks, where many of these vanish."""
         of = {matrix.meaning: matrix for matrix in self._matrices}
         C, M = of.get(PartMeaning.CONSTRAINT), of[PartMeaning.INERTIA]
@@ -538,14 +504,13 @@ class PrintedParts:
             return
         names = [Name(name) for name in self._kinematics.velocity_labels]
         columns = [[names[j] for j in places] for places in blocks.coordinates]
-        groups = [x for k, part in enumerate(columns) for x in ("; " if k else "", *_listed(part))]
+        groups = [x for k, part in enumerate(columns) for x in ("; " if k else "", *listed(part))]
         joints = dict.fromkeys(label.partition(".")[0] for label in self.equations.constraint_names)
-        yield PrintedSentence(("In blocks, of the coordinates ", *groups, f", and of the joints {', '.join(joints)}:"))
+        yield Sentence(("In blocks, of the coordinates ", *groups, f", and of the joints {', '.join(joints)}:"))
         stem = M.letter.removesuffix("_t")
-        rows: list[list[Formula]] = [[ZERO] * len(columns) for _ in columns]
-        for k in range(len(columns)):
-            rows[k][k] = Letter(rf"\mathbf{{{stem}}}_{{{k + 1}}}")
-        yield PrintedRow((PrintedLine(Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))),))
+        diagonal = (Letter(rf"\mathbf{{{stem}}}_{{{k + 1}}}") for k in range(len(columns)))
+        rows = [[x if i == k else ZERO for i in range(len(columns))] for k, x in enumerate(diagonal)]
+        yield _row((Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))))
         rows = [
             [
                 Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
@@ -553,7 +518,7 @@ class PrintedParts:
             ]
             for a, r in enumerate(blocks.equations)
         ]
-        yield PrintedRow((PrintedLine(Letter(C.letter), MatrixOf(tuple(map(tuple, rows)))),))
+        yield _row((Letter(C.letter), MatrixOf(tuple(map(tuple, rows)))))
 
     @property
     def _zeros(self) -> tuple[str, ...]:
@@ -608,14 +573,14 @@ class PrintedParts:
             rows[-1][0] = Words("sym.", r"\text{sym.}")
         return MatrixOf(tuple(map(tuple, rows)))
 
-    def _entries(self, matrix: _Matrix) -> Iterator[tuple[Any, PrintedLine]]:
+    def _entries(self, matrix: _Matrix) -> Iterator[tuple[Any, FormulaLine]]:
         """What the letters of a matrix stand for, in SymPy and as it is printed, those of named parts left out."""
         for (i, j), place in self._first_places(matrix).items():
             x = matrix.entries[i][j]
             letter = self._place(matrix, i, j)
             is_part = isinstance(x, Name) and self._entry_letters.get(x.name) == letter
             if not is_part and not self._stands(matrix, x) and place == (i, j):
-                yield matrix.values[i, j], PrintedLine(letter, x)
+                yield matrix.values[i, j], FormulaLine((letter, x))
 
     @staticmethod
     def _first_places(matrix: _Matrix) -> dict[tuple[int, int], tuple[int, int]]:
@@ -659,22 +624,21 @@ class PrintedParts:
         """What each named part is."""
         return {str(name): meaning for meaning, parts in self._found.items() for name, _ in parts}
 
-    def _groups(self) -> Iterator[PrintedGroup]:
+    def _groups(self) -> Iterator[Folded]:
         matrices = {matrix.meaning: matrix for matrix in self._matrices}
         for meaning, title in TITLES.items():
             parts = self._found.get(meaning, ())
-            lines = [PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in parts]
+            lines = [FormulaLine((Name(str(name)), self.printed.formula(x))) for name, x in parts]
             operations = sum(operations_of(x) for _, x in parts)
-            words: tuple[Piece, ...] = (title,)
             if matrix := matrices.get(meaning):
                 entries = [*self._entries(matrix)]
                 operations += sum(operations_of(x) for x, _ in entries)
                 lines += [line for _, line in entries]
-                words = (f"{title} ", Letter(matrix.letter))
+                title = f"{title} ${matrix.letter}$"
             if lines:
                 many = f"{len(lines)} formula{'s' * (len(lines) > 1)}"
                 counted = f", {operations} operation{'s' * (operations > 1)}" if operations else ""
-                yield PrintedGroup(PrintedSentence((*words, f" ({many}{counted})")), lines)
+                yield Folded(f"{title} ({many}{counted})", tuple(lines))
 
 
 def operations_of(x: Any) -> int:
@@ -682,8 +646,14 @@ def operations_of(x: Any) -> int:
     return int(sympy.count_ops(x))
 
 
-def _listed(formulas: Sequence[Formula]) -> Iterator[Piece]:
+def listed(formulas: Sequence[Formula]) -> Iterator[str | Formula]:
+    """Formulas with commas between them."""
     for k, x in enumerate(formulas):
         if k:
             yield ", "
         yield x
+
+
+def _row(*sides: tuple[Formula, Formula]) -> Row:
+    """Equations side by side."""
+    return Row(tuple(map(FormulaLine, sides)))

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 from ..base.latex import SUPERSCRIPTS, read_latex, text_form
 from ..base.notation import Notation
 from ..base.texts import fold, html_text, visible
-from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
+from ..expr.printing import latex, text
 from ..expr.printing.formula import DIGITS, ROUNDED, MatrixOf, times
-from ..expr.printing.writers import TIGHT, row
+from ..expr.printing.writers import TIGHT
+from .document import Folded, FormulaLine, Look, Piece, Row, Sentence, Table, Text, html, tex_formula, written
 from .printed import (
     FOLDED,
     SAMPLED,
@@ -18,11 +19,8 @@ from .printed import (
     STILL,
     PrintedEntry,
     PrintedEquations,
-    PrintedGroup,
-    PrintedLine,
     PrintedParts,
-    PrintedRow,
-    PrintedSentence,
+    listed,
     plain,
 )
 from .readable import Readable
@@ -143,22 +141,23 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
     for short in ENTRIES:
         parts = PrintedParts(printed, short)
         items = list(parts.items())
-        rows = [each for item in items if isinstance(item, PrintedRow) for x in item.lines for each in _rows(parts, x)]
+        rows = [each for item in items if isinstance(item, Row) for x in item.lines for each in _rows(parts, x)]
         if max(map(len, rows), default=0) <= columns:
             break
 
-    def words(sentence: PrintedSentence) -> str:
-        return "".join(x if isinstance(x, str) else text(x, parts.names) for x in sentence.pieces)
+    def words(said: Text) -> str:
+        return written(said, lambda x: text(x, parts.names), str, str)
 
-    def equation(line: PrintedLine) -> Iterator[str]:
+    def equation(line: FormulaLine) -> Iterator[str]:
+        left, right = line.sides
         rows = _rows(parts, line)
-        if not isinstance(line.right, MatrixOf):
-            yield from _wrapped(f"{text(line.left, parts.names)} = ", text(line.right, parts.names), columns)
+        if not isinstance(right, MatrixOf):
+            yield from _wrapped(f"{text(left, parts.names)} = ", text(right, parts.names), columns)
         elif max(map(len, rows)) <= columns:
             yield from ("", *map(plain, rows))
         else:
-            size = f"{len(line.right.rows)} rows and {len(line.right.rows[0])} columns"
-            yield f"  {text(line.left, parts.names)} has {size}: eqs.tree_system"
+            size = f"{len(right.rows)} rows and {len(right.rows[0])} columns"
+            yield f"  {text(left, parts.names)} has {size}: eqs.tree_system"
 
     mass, v, right = (letter_text(letter) for letter in printed.letters)
     rates = ", ".join(map(printed.text, printed.accelerations))
@@ -168,11 +167,11 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
     )
     for item in items[1:]:
         match item:
-            case PrintedRow():
+            case Row():
                 yield from (line for one in item.lines for line in equation(one))
-            case PrintedSentence():
-                yield from fold(words(item), columns, "", "  ")
-    groups = [item for item in items if isinstance(item, PrintedGroup)]
+            case Sentence():
+                yield from fold(words(item.text), columns, "", "  ")
+    groups = [item for item in items if isinstance(item, Folded)]
     yield from (
         "",
         "In groups:",
@@ -180,15 +179,16 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
     )
     for group in groups:
         yield from ("", *fold(words(group.title), columns, "", "  "))
-        yield from (line for one in group.lines for line in equation(one))
+        yield from (line for one in group.pieces if isinstance(one, FormulaLine) for line in equation(one))
 
 
-def _rows(parts: PrintedParts, line: PrintedLine) -> list[str]:
+def _rows(parts: PrintedParts, line: FormulaLine) -> list[str]:
     """A matrix in rows; none of what is no matrix."""
-    if not isinstance(line.right, MatrixOf):
+    left, right = line.sides
+    if not isinstance(right, MatrixOf):
         return []
-    before = f"  {text(line.left, parts.names)} = "
-    return _matrix([[text(x, parts.names) for x in entries] for entries in line.right.rows], before)
+    before = f"  {text(left, parts.names)} = "
+    return _matrix([[text(x, parts.names) for x in entries] for entries in right.rows], before)
 
 
 def letter_text(latex: str) -> str:
@@ -290,39 +290,25 @@ def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
 
 # -- HTML --------------------------------------------------------------------------------------------------------------
 
-# MathML needs neither a script nor a network: a saved notebook shows the formulas too.
 
-
-MOST = 1_000  #: intermediates that are shown
-LEFT = "style='text-align:left'"
-CELL = "style='text-align:left;padding:0.15em 1.2em 0.15em 0'"  #: of tables, on pages that do not space cells
-_STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
-_FLOW = "display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em"  #: short formulas side by side
 #: Fonts with brackets that grow, of the usual systems.
 _FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Termes Math,DejaVu Math TeX Gyre,math"
+#: A notebook has no style sheet of ours: cells of its tables are not spaced, and formulas are set small.
+NOTEBOOK = Look(
+    text=" style='text-align:left'",
+    math=f" style='{_FONT}'",
+    formula=" style='margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em'",
+    first=" style='text-align:right;padding:0.2em 0'",
+    others=" style='text-align:left;padding:0.2em 0'",
+    cell=" style='text-align:left;padding:0.15em 1.2em 0.15em 0'",
+    folded=" style='display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em'",
+)
 
 
 def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations, ROUNDED)
-    return "".join(_html(item, printed.page_names) for item in printed.items())
-
-
-def _html(item: PrintedLine | PrintedRow | PrintedSentence | PrintedGroup, names: Notation) -> str:
-    def words(sentence: PrintedSentence) -> str:
-        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, names)) for x in sentence.pieces)
-
-    match item:
-        case PrintedLine():
-            return _line(names, item)
-        case PrintedRow():
-            sides = (row(mathml(x.left, names), "<mo>=</mo>", mathml(x.right, names)) for x in item.lines)
-            return _block("<mspace width='2em'></mspace>".join(sides))
-        case PrintedSentence():
-            return f"<p {LEFT}>{words(item)}</p>"
-        case PrintedGroup():
-            lines = "".join(_line(names, line) for line in item.lines[:MOST])
-            return f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"
+    return "".join(html(item, printed.page_names, NOTEBOOK) for item in printed.items())
 
 
 def facts_html(equations: Readable) -> str:
@@ -330,59 +316,20 @@ def facts_html(equations: Readable) -> str:
     printed = PrintedEquations(equations)
     name = html_text(equations.kinematics.mechanism.name)
     head = f"<p style='margin:0 0 0.6em 0'><b>{name}</b>: equations of motion, {html_text(printed.title)}</p>"
-    attributes = ", ".join(f"<code>eqs.{name}</code>" for name in printed.attributes)
-    further = f"<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
-    return f"{head}{_html_values(printed)}{_html_coordinates(printed)}{further}"
+    return head + "".join(html(piece, printed.names, NOTEBOOK) for piece in _facts(printed))
 
 
-def _html_values(printed: PrintedEquations) -> str:
-    """What was put in."""
-    shown = [_math(mathml(x, printed.names)) for x in printed.values]
-    whole = f"with {', '.join(shown)}"
-    if not shown:
-        return ""
-    if len(shown) <= FOLDED:
-        return f"<p {LEFT}>{whole}</p>"
-    return f"<details><summary>with {len(shown)} values</summary><p {LEFT}>{whole}</p></details>"
-
-
-def _html_coordinates(printed: PrintedEquations) -> str:
-    shown = printed.coordinates
-    if not shown:
-        return ""
-    dependent = any(c.role for c in shown)
-    heads = ["coordinate", "name", "joint", "unit", *([""] if dependent else [])]
-    rows = "".join(
-        f"<tr><td {CELL}>{_math(printed.names.mathml(c.name))}</td><td {CELL}><code>{html_text(c.name)}</code></td>"
-        f"<td {CELL}>{html_text(c.joint)}</td><td {CELL}>{html_text(c.unit)}</td>"
-        + (f"<td {CELL}>{c.role}</td>" if dependent else "")
-        + "</tr>"
-        for c in shown
-    )
-    whole = f"<table><tr>{''.join(f'<th {CELL}>{head}</th>' for head in heads)}</tr>{rows}</table>"
-    return whole if len(shown) <= FOLDED else f"<details><summary>{len(shown)} coordinates</summary>{whole}</details>"
-
-
-def _math(inside: str) -> str:
-    return f"<math style='{_FONT}'>{inside}</math>"
-
-
-def _block(inside: str) -> str:
-    return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
-
-
-def _line(names: Notation, line: PrintedLine) -> str:
-    """A formula; a long sum in lines of its terms, below each other."""
-    label = mathml(line.left, names)
-    lines = mathml_lines(line.right, names)
-    if len(lines) == 1:
-        return _block(row(label, "<mo>=</mo>", lines[0]))
-    cells = [
-        f"<mtr><mtd style='text-align:right;padding:0.2em 0'>{row(label, '<mo>=</mo>') if k == 0 else ''}</mtd>"
-        f"<mtd style='text-align:left;padding:0.2em 0 0.2em {0 if k == 0 else 1.5}em'>{row(line)}</mtd></mtr>"
-        for k, line in enumerate(lines)
-    ]
-    return _block(f"<mtable displaystyle='true'>{''.join(cells)}</mtable>")
+def _facts(printed: PrintedEquations) -> Iterator[Piece]:
+    if values := printed.values:
+        whole = Sentence(("with ", *listed(values)))
+        yield whole if len(values) <= FOLDED else Folded(f"with {len(values)} values", (whole,))
+    if coordinates := printed.coordinates:
+        roles = any(c.role for c in coordinates)
+        rows = ((f"${printed.names.latex(c.name)}$", f"`{c.name}`", c.joint, c.unit, c.role) for c in coordinates)
+        heads = ("coordinate", "name", "joint", "unit", "")
+        table = Table(heads[: 4 + roles], tuple(one[: 4 + roles] for one in rows))
+        yield table if len(coordinates) <= FOLDED else Folded(f"{len(coordinates)} coordinates", (table,))
+    yield Folded("read next", (Sentence(", ".join(f"`eqs.{name}`" for name in printed.attributes)),))
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
@@ -408,23 +355,11 @@ def _text(words: str) -> str:
     return rf"\text{{{words.replace('_', chr(92) + '_')}}}"
 
 
-def _broken(names: Notation, line: PrintedLine) -> str:
-    """A formula; a long sum in lines of its terms."""
-    label, lines = latex(line.left, names), latex_lines(line.right, names)
-    if len(lines) == 1:
-        return f"{label} = {lines[0]}"
-    body = r" \\ & \quad ".join(lines)
-    return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
-
-
-def _latex(item: PrintedLine | PrintedRow | PrintedSentence | PrintedGroup, names: Notation) -> Iterator[str]:
+def _latex(item: Piece, names: Notation) -> Iterator[str]:
     match item:
-        case PrintedLine():
-            yield _broken(names, item)
-        case PrintedRow():
-            yield r" \qquad ".join(f"{latex(x.left, names)} = {latex(x.right, names)}" for x in item.lines)
-        case PrintedSentence():
-            yield "".join(_text(x) if isinstance(x, str) else latex(x, names) for x in item.pieces)
-        case PrintedGroup():
-            yield from _latex(item.title, names)
-            yield from (_broken(names, line) for line in item.lines)
+        case FormulaLine() | Row():
+            yield tex_formula(item, names)
+        case Sentence():
+            yield written(item.text, lambda x: latex(x, names), _text, _text)
+        case Folded():
+            yield from (line for one in (Sentence(item.title), *item.pieces) for line in _latex(one, names))

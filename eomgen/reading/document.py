@@ -1,25 +1,107 @@
-"""Sections -> a page of HTML, Markdown or LaTeX."""
+"""Headings, sentences, formulas, tables and pictures: one model of a document, written as HTML, Markdown or LaTeX."""
 
 from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from ..base.inline_pictures import image_html
 from ..base.notation import Notation
-from ..base.texts import html_text
-from ..expr.printing import given_mathml, latex, latex_lines, mathml, mathml_lines, text
-from ..expr.printing.formula import Letter, MatrixOf
-from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, written
+from ..base.texts import html_text, visible
+from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
+from ..expr.printing.formula import Formula, Letter, MatrixOf
+from ..expr.printing.writers import row
+
+# -- parts of a document -----------------------------------------------------------------------------------------------
+
+# Texts hold names of the model between backquotes and short formulas between dollars, ``the angle $\theta$ of `rod` ``,
+# or are pieces of text and trees of formulas side by side.
+
+
+Text = str | tuple[str | Formula, ...]
+_PARTS = re.compile(r"(\$[^$]+\$|`[^`]+`)")
+
+
+def written(text: Text, math: Callable[[Formula], str], name: Callable[[str], str], plain: Callable[[str], str]) -> str:
+    """A text whose formulas, names and other pieces are written so."""
+    found = ""
+    for piece in (text,) if isinstance(text, str) else text:
+        for part in _PARTS.split(visible(piece)) if isinstance(piece, str) else (piece,):
+            if not isinstance(part, str):
+                found += math(part)
+            elif part[:1] == "$" and len(part) > 2:
+                found += math(Letter(part[1:-1]))
+            elif part[:1] == "`" and len(part) > 2:
+                found += name(part[1:-1])
+            elif part:
+                found += plain(part)
+    return found
+
+
+class Sentence(NamedTuple):
+    """A paragraph."""
+
+    text: Text
+
+
+class FormulaLine(NamedTuple):
+    """Sides with signs of equality between them."""
+
+    sides: tuple[Formula, ...]
+
+
+class Row(NamedTuple):
+    """Short formulas that stand side by side where there is room."""
+
+    lines: tuple[FormulaLine, ...]
+
+
+class Table(NamedTuple):
+    """Rows of texts under a head."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+class DrawnPicture(NamedTuple):
+    """A picture in the bytes of a PNG file, ``width`` in dots of a page."""
+
+    png: bytes
+    width: int
+    words: str
+
+
+class Folded(NamedTuple):
+    """Pieces that a page shows when it is asked to; ``title`` is always seen."""
+
+    title: Text
+    pieces: tuple[Piece, ...]
+
+
+Piece = Sentence | FormulaLine | Row | Table | DrawnPicture | Folded
+
+
+class Section(NamedTuple):
+    """A heading and what stands below it; sections of ``level`` 2 belong to the one of level 1 before.
+
+    A page shows what is ``folded``, with what belongs to it, when it is asked to.
+    """
+
+    title: str
+    pieces: tuple[Piece, ...]
+    level: int = 1
+    folded: bool = False
+
 
 SHORT = 32  #: characters of a side that leaves room for another one in its line
 
 
-def _is_short(formula: FormulaLine, names: Notation) -> bool:
-    """Whether all sides go into one line."""
+def _in_one_line(formula: FormulaLine, rows: Sequence[str], names: Notation) -> bool:
+    """Whether all sides go into one line: there is one right side that is no long sum, or all are short."""
     trees = [side for side in formula.sides if not isinstance(side, Letter)]
-    return all(not isinstance(x, MatrixOf) and len(text(x, names)) <= SHORT for x in trees)
+    return len(rows) < 2 or all(not isinstance(x, MatrixOf) and len(text(x, names)) <= SHORT for x in trees)
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
@@ -50,23 +132,25 @@ _TEX_SPECIAL = re.compile(r"[\\{}$&#%_^~<>]")
 
 def write_tex(title: str, sections: Sequence[Section], names: Notation, picture: str | None = PICTURE) -> str:
     """A LaTeX document; its pictures are the file ``picture`` beside it, left out where None."""
-    found = [_HEAD, rf"\title{{{_tex_text(title)}}}\date{{}}", r"\begin{document}", r"\maketitle"]
+    found = [_HEAD, rf"\title{{{_tex_text(title, names)}}}\date{{}}", r"\begin{document}", r"\maketitle"]
     for section in sections:
         command = "section" if section.level == 1 else "subsection"
-        found.append(rf"\{command}*{{{_tex_text(section.title)}}}")
+        found.append(rf"\{command}*{{{_tex_text(section.title, names)}}}")
         found += [_tex_piece(piece, names, picture) for piece in section.pieces]
     return "\n".join([*found, r"\end{document}", ""])
 
 
-def formula_body(formula: FormulaLine, names: Notation) -> str:
-    """LaTeX of a formula, in lines where a side is a long sum or a third one follows."""
+def tex_formula(formula: FormulaLine | Row, names: Notation) -> str:
+    """LaTeX of a formula, in lines where a side is a long sum or a third one follows; of several side by side."""
+    if isinstance(formula, Row):
+        return r" \qquad ".join(tex_formula(line, names) for line in formula.lines)
     first, *others = formula.sides
     rows: list[str] = []
     for side in others:
         lines = latex_lines(side, names)
         rows += [f"= {lines[0]}", *(rf"\quad {line}" for line in lines[1:])]
     left = latex(first, names)
-    if len(rows) < 2 or _is_short(formula, names):
+    if _in_one_line(formula, rows, names):
         return " ".join([left, *rows])
     inner = " \\\\\n".join(f"{left if k == 0 else ''} & {row}" for k, row in enumerate(rows))
     return f"\\begin{{aligned}}\n{inner}\n\\end{{aligned}}"
@@ -78,21 +162,22 @@ def escaped(text: str) -> str:
     return plain.encode("ascii", "replace").decode()
 
 
-def _tex_text(text: str) -> str:
-    return written(text, "${}$".format, lambda name: rf"\texttt{{{escaped(name)}}}", escaped)
+def _tex_text(text: Text, names: Notation) -> str:
+    return written(text, lambda x: f"${latex(x, names)}$", lambda name: rf"\texttt{{{escaped(name)}}}", escaped)
 
 
 def _tex_piece(piece: Piece, names: Notation, picture: str | None) -> str:
     match piece:
         case Sentence():
-            return _tex_text(piece.text) + "\n"
-        case FormulaLine():
-            return rf"\fitted{{{formula_body(piece, names)}}}"
+            return _tex_text(piece.text, names) + "\n"
+        case FormulaLine() | Row():
+            return rf"\fitted{{{tex_formula(piece, names)}}}"
         case Table():
-            columns = _columns(piece)
-            rows = [" & ".join(map(_tex_text, row)) + r" \\" for row in piece.rows]
-            head = " & ".join(map(_tex_text, piece.head)) + r" \\ \hline"
-            return "\n".join([rf"\begin{{longtable}}{{{columns}}}", head, *rows, r"\end{longtable}"])
+            head, *rows = (" & ".join(_tex_text(cell, names) for cell in one) for one in (piece.head, *piece.rows))
+            lines = (rf"{one} \\" for one in rows)
+            return "\n".join(
+                [rf"\begin{{longtable}}{{{_columns(piece)}}}", rf"{head} \\ \hline", *lines, r"\end{longtable}"]
+            )
         case DrawnPicture():
             if picture is None:
                 return ""
@@ -100,7 +185,7 @@ def _tex_piece(piece: Piece, names: Notation, picture: str | None) -> str:
             return rf"\includegraphics[width={width:.2f}\linewidth]{{{picture}}}" + "\n"
         case Folded():
             inner = [_tex_piece(part, names, picture) for part in piece.pieces]
-            return "\n".join([rf"\textit{{{_tex_text(piece.title)}}}" + "\n", *inner])
+            return "\n".join([rf"\textit{{{_tex_text(piece.title, names)}}}" + "\n", *inner])
 
 
 def _columns(table: Table) -> str:
@@ -153,20 +238,34 @@ nav{columns:2;font-size:.95em}
 """
 
 
+class Look(NamedTuple):
+    """Attributes of elements of HTML: none on a page with a style sheet, styles where a notebook has its own."""
+
+    text: str = ""
+    math: str = ""
+    formula: str = " class='formula'"
+    first: str = ""  #: cell of a left side
+    others: str = ""  #: cell of what stands right of it
+    cell: str = ""
+    folded: str = ""
+
+
 def write_html(title: str, sections: Sequence[Section], names: Notation) -> str:
     """A page that stands alone."""
-    body = [f"<h1>{_html(title)}</h1>"]
-    links = [f"<li><a href='#s{k}'>{_html(s.title)}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1]
+    look = Look()
+    body = [f"<h1>{_html_text(title, names, look)}</h1>"]
+    heads = [_html_text(section.title, names, look) for section in sections]
+    links = (f"<li><a href='#s{k}'>{heads[k - 1]}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1)
     body.append(f"<nav><ol>{''.join(links)}</ol></nav>")
     opened = False
     for k, section in enumerate(sections, 1):
         tag = f"h{section.level + 1}"
-        heading = f"<{tag} id='s{k}'>{_html(section.title)}</{tag}>"
+        heading = f"<{tag} id='s{k}'>{heads[k - 1]}</{tag}>"
         if section.level == 1:
             body += ["</details>"] * opened
             opened = section.folded
         body.append(f"<details class='section'><summary>{heading}</summary>" if section.folded else heading)
-        body += [_html_piece(piece, names) for piece in section.pieces]
+        body += [html(piece, names, look) for piece in section.pieces]
     body += ["</details>"] * opened
     plain = html_text(title.replace("`", "").replace("$", ""))
     head = (
@@ -176,43 +275,55 @@ def write_html(title: str, sections: Sequence[Section], names: Notation) -> str:
     return "\n".join([head, *body, "</body></html>", ""])
 
 
-def _html(text: str) -> str:
+def _html_text(text: Text, names: Notation, look: Look) -> str:
     return written(
-        text, lambda x: f"<math>{given_mathml(x)}</math>", lambda x: f"<code>{html_text(x)}</code>", html_text
+        text,
+        lambda x: f"<math{look.math}>{mathml(x, names)}</math>",
+        lambda x: f"<code>{html_text(x)}</code>",
+        html_text,
     )
 
 
-def _html_piece(piece: Piece, names: Notation) -> str:
+def html(piece: Piece, names: Notation, look: Look) -> str:
+    """Elements of HTML with formulas in MathML, which needs neither a script nor a network."""
     match piece:
         case Sentence():
-            return f"<p>{_html(piece.text)}</p>"
-        case FormulaLine():
-            return f"<div class='formula'><math displaystyle='true'>{_formula(piece, names)}</math></div>"
+            return f"<p{look.text}>{_html_text(piece.text, names, look)}</p>"
+        case FormulaLine() | Row():
+            shown = _formula(piece, names, look)
+            return f"<div{look.formula}><math displaystyle='true'{look.math}>{shown}</math></div>"
         case Table():
-            head = "".join(f"<th>{_html(cell)}</th>" for cell in piece.head)
-            rows = "".join("<tr>" + "".join(f"<td>{_html(cell)}</td>" for cell in row) + "</tr>" for row in piece.rows)
+            head = "".join(f"<th{look.cell}>{_html_text(cell, names, look)}</th>" for cell in piece.head)
+            rows = "".join(
+                f"<tr>{''.join(f'<td{look.cell}>{_html_text(cell, names, look)}</td>' for cell in one)}</tr>"
+                for one in piece.rows
+            )
             return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
         case DrawnPicture():
             return f"<p>{image_html(piece.png, 'png', piece.width, piece.words)}</p>"
         case Folded():
-            inner = "\n".join(_html_piece(part, names) for part in piece.pieces)
-            return f"<details><summary>{_html(piece.title)}</summary>\n{inner}\n</details>"
+            inner = "\n".join(html(part, names, look) for part in piece.pieces)
+            title = _html_text(piece.title, names, look)
+            return f"<details><summary>{title}</summary>\n<div{look.folded}>{inner}</div>\n</details>"
 
 
-def _formula(formula: FormulaLine, names: Notation) -> str:
+def _formula(formula: FormulaLine | Row, names: Notation, look: Look) -> str:
     """One row of sides, or several lines where a side is a long sum or a third one follows."""
+    if isinstance(formula, Row):
+        return "<mspace width='2em'></mspace>".join(_formula(line, names, look) for line in formula.lines)
     first, *others = formula.sides
-    left = f"<mrow>{mathml(first, names)}</mrow>"
+    left = row(mathml(first, names))
     rows: list[str] = []
     for side in others:
         lines = mathml_lines(side, names)
-        rows.append(f"<mo>=</mo><mrow>{lines[0]}</mrow>")
-        rows += [f"<mspace width='1.2em'/><mrow>{line}</mrow>" for line in lines[1:]]
-    if len(rows) == 0:
-        return left
-    if len(rows) == 1 or _is_short(formula, names):
-        return f"<mrow>{left}{''.join(rows)}</mrow>"
-    cells = [f"<mtr><mtd>{left if k == 0 else ''}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows)]
+        rows.append(f"<mo>=</mo>{row(lines[0])}")
+        rows += [f"<mspace width='1.2em'/>{row(line)}" for line in lines[1:]]
+    if _in_one_line(formula, rows, names):
+        return row(left, *rows)
+    cells = (
+        f"<mtr><mtd{look.first}>{left if k == 0 else ''}</mtd><mtd{look.others}>{one}</mtd></mtr>"
+        for k, one in enumerate(rows)
+    )
     return f"<mtable class='lines' displaystyle='true'>{''.join(cells)}</mtable>"
 
 
@@ -224,34 +335,33 @@ _MARKDOWN_SPECIAL = re.compile(r"([\\*_#<>|\[\]$])")
 
 def write_markdown(title: str, sections: Sequence[Section], names: Notation) -> str:
     """A Markdown document; pictures are in it."""
-    found = [f"# {_markdown_text(title)}"]
+    found = [f"# {_markdown_text(title, names)}"]
     for section in sections:
-        found.append(f"{'#' * (section.level + 1)} {_markdown_text(section.title)}")
+        found.append(f"{'#' * (section.level + 1)} {_markdown_text(section.title, names)}")
         found += [_markdown_piece(piece, names) for piece in section.pieces]
     return "\n\n".join(found) + "\n"
 
 
-def _markdown_text(text: str) -> str:
-    return written(text, "${}$".format, "`{}`".format, lambda x: _MARKDOWN_SPECIAL.sub(r"\\\1", x))
+def _markdown_text(text: Text, names: Notation) -> str:
+    return written(text, lambda x: f"${latex(x, names)}$", "`{}`".format, lambda x: _MARKDOWN_SPECIAL.sub(r"\\\1", x))
 
 
 def _markdown_piece(piece: Piece, names: Notation) -> str:
     match piece:
         case Sentence():
-            return _markdown_text(piece.text)
-        case FormulaLine():
-            return f"$$\n{formula_body(piece, names)}\n$$"
+            return _markdown_text(piece.text, names)
+        case FormulaLine() | Row():
+            return f"$$\n{tex_formula(piece, names)}\n$$"
         case Table():
-            rows = [piece.head, tuple("---" for _ in piece.head), *piece.rows]
-            return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
+            cells = [
+                [_markdown_text(cell, names).replace("\n", " ") for cell in one] for one in (piece.head, *piece.rows)
+            ]
+            cells.insert(1, ["---"] * len(piece.head))
+            return "\n".join(f"| {' | '.join(one)} |" for one in cells)
         case DrawnPicture():
             data = b64encode(piece.png).decode()
-            return f"![{_markdown_text(piece.words)}](data:image/png;base64,{data})"
+            return f"![{_markdown_text(piece.words, names)}](data:image/png;base64,{data})"
         case Folded():
             inner = "\n\n".join(_markdown_piece(part, names) for part in piece.pieces)
-            plain = html_text(piece.title.replace("`", "").replace("$", ""))
-            return f"<details><summary>{plain}</summary>\n\n{inner}\n\n</details>"
-
-
-def _cell(text: str) -> str:
-    return text if text == "---" else _markdown_text(text).replace("\n", " ")
+            title = written(piece.title, lambda x: html_text(latex(x, names)), html_text, html_text)
+            return f"<details><summary>{title}</summary>\n\n{inner}\n\n</details>"
