@@ -18,6 +18,7 @@ from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate as of_graph
 from ..expr.identity import with_bounds
 from ..verify.cases import Case, random_cases
+from ..verify.finding import Comparison
 from .author import Author
 
 # -- formulas at numbers -----------------------------------------------------------------------------------------------
@@ -153,7 +154,7 @@ def compare(author: Author, module: Any) -> Difference:
 
     What the state does not know, such as reactions, variations and momenta, gets numbers at random.
     """
-    found: dict[str, float] = {}
+    found: dict[str, Comparison] = {}
     equations = author.equations
     shown = {(s.name, s.part) for s in author.shown if s.name} | {("mass_matrix", None), ("force", None)}
     each = {row.name for row in equations.rows() if row.by_name}
@@ -175,7 +176,7 @@ def compare(author: Author, module: Any) -> Difference:
             _compare_formed(found, what, formed, given, (one.named, one.flat), values)
         for what, expressions, own in author.formed:
             _compare_formed(found, what, expressions, (), own, values)
-    return Difference(found, STATES)
+    return Difference({name: one.finding().worst for name, one in found.items()}, STATES)
 
 
 class Wanted(NamedTuple):
@@ -229,7 +230,7 @@ def _number(equations: Any, name: str, part: str | None, values: Mapping[str, fl
 
 
 def _compare_formed(
-    found: dict[str, float],
+    found: dict[str, Comparison],
     what: str,
     formed: Sequence[Expr],
     given: Sequence[tuple[str, Expr]],
@@ -247,6 +248,6 @@ def _compare_formed(
     _note(found, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))
 
 
-def _note(found: dict[str, float], name: str, shown: Any, wanted: Any, size: float) -> None:
+def _note(found: dict[str, Comparison], name: str, shown: Any, wanted: Any, size: float) -> None:
     largest = max(float(np.abs(wanted).max(initial=0.0)), size, SMALLEST)
-    found[name] = max(found.get(name, 0.0), float(np.abs(shown - wanted).max(initial=0.0)) / largest)
+    found.setdefault(name, Comparison(name)).add(0, shown - wanted, largest, largest)

@@ -534,6 +534,12 @@ def jacobian(outputs: Sequence[Expr], wrt: Sequence[Expr]) -> dict[tuple[int, in
     return {key: Expr(g, entries[key]) for key in sorted(entries)}
 
 
+def hessian(slopes: Sequence[Expr], wrt: Sequence[Expr]) -> tuple[tuple[Expr, ...], ...]:
+    """``d slopes / d wrt`` of the slopes of one function by the same symbols, from its lower triangle."""
+    entries, n = jacobian(slopes, wrt), range(len(wrt))
+    return tuple(tuple(entries.get((max(i, j), min(i, j)), wrt[0].graph.zero) for j in n) for i in n)
+
+
 def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> bool:
     """Estimate the products and sums that each direction makes, by edges times the columns or rows that cross them."""
     if len(wrt) <= 1:

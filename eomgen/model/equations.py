@@ -12,7 +12,7 @@ from ..elements import kinds
 from ..elements.constraints.couplings import NO_EQUATION
 from ..elements.kinds import MOTION, Fields
 from ..expr.core import Expr, Graph, is_comparison, substitute, symbols_of
-from ..expr.differentiate import gradient, jacobian, jvp
+from ..expr.differentiate import gradient, hessian, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import vanishes
 from ..expr.shown import quoted, shown
@@ -330,8 +330,7 @@ def differentiate(graph: Graph, bare: Lagrangian, clock: Mapping[Expr, Expr]) ->
     q, v = ([graph.symbol(name) for name in names] for names in (bare.coordinates, velocities))
     momenta, rates = momenta_and_rates(bare, q, v)
     drift = jvp(momenta, {**dict(zip(q, v, strict=True)), **clock})
-    entries, n = jacobian(momenta, v), range(len(v))
-    mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in n) for i in n)
+    mass = hessian(momenta, v)
     kinetic = potential = graph.zero
     if symbols_of([x for row in mass for x in row]).isdisjoint(velocities):  # else it is refused
         at_rest, *first_degree = substitute([L, *momenta], dict.fromkeys(v, graph.zero))

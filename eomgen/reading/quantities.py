@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -135,7 +135,7 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
 
 # -- expressions in SymPy ----------------------------------------------------------------------------------------------
 
-# Everything that a user reads as SymPy comes through :func:`write`.
+# Everything that a user reads as SymPy comes through ``Readable.in_sympy``.
 
 
 READABLE = 400  #: operations an expression, on average, up to which expressions are written out
@@ -175,53 +175,7 @@ def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]
     return found[::-1]
 
 
-def write(
-    expressions: Sequence[Expr],
-    symbols: Callable[[str], Any] | None = None,
-    prefix: str = "z",
-    given: Sequence[tuple[str, Expr]] = (),
-    rates: Collection[str] = (),
-    parameters: Collection[str] = (),
-    unit: Sequence[Sequence[str]] = (),
-    roots: bool = False,
-) -> Written:
-    """Expressions of one graph in SymPy.
-
-    Parameters
-    ----------
-    expressions : sequence of Expr
-    symbols : callable, optional
-        Name -> the SymPy symbol, or function of time, that stands for it; plain symbols by default.
-    prefix : str, optional
-        Named parts are called ``z0``, ``z1``, ...
-    given : sequence of (str, Expr), optional
-        Names that stand in the expressions already, and what they stand for, in order.
-    rates : collection of str, optional
-        Names of velocities and accelerations.
-    parameters : collection of str, optional
-        Names of parameters.
-    unit : sequence of sequence of str, optional
-        Names of Euler parameters, four by four: the sum of their squares is 1.
-    roots : bool, optional
-        Whether long roots and denominators that are written several times get names in any case.
-
-    Returns
-    -------
-    Written
-    """
-    if not expressions:
-        return Written([], [])
-    from ..expr.simplify import WHOLE, joined_nodes, simplify
-
-    expressions, given = joined_nodes(expressions, given, unit)
-    form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
-    if form is None:
-        return Written([], [])
-    named, found = form.sympy(symbols, parameters, prefix, roots)
-    return Written([(name, _with_derivatives(x)) for name, x in named], [_with_derivatives(x) for x in found])
-
-
-def _with_derivatives(expression: Any) -> Any:
+def with_derivatives(expression: Any) -> Any:
     """With sqrt(x^2) for |x|: SymPy takes names for complex numbers, of which |x| has no derivative."""
     import sympy
 

@@ -34,7 +34,7 @@ from .methods import (
     read_values,
 )
 from .near_state import SymbolicLinearization, linearize, over_one_denominator, told
-from .quantities import Quantities, SpatialMotion, Written, needed, require_bodies, write
+from .quantities import Quantities, SpatialMotion, Written, is_short, needed, require_bodies, with_derivatives
 from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
 if TYPE_CHECKING:
@@ -714,13 +714,7 @@ class Readable(ABC):
         """Without what gives quantities as they were formed, which are functions here."""
         return {name: value for name, value in vars(self).items() if name != "_all"}
 
-    def _write(
-        self,
-        name: str,
-        choose: Choose,
-        prefix: str = "",
-        given: ChooseNames | None = None,
-    ) -> list[Any]:
+    def _write(self, name: str, choose: Choose, prefix: str = "", given: ChooseNames | None = None) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
@@ -736,12 +730,28 @@ class Readable(ABC):
         return written.expressions
 
     def in_sympy(
-        self, formed: Sequence[Expr], prefix: str, names: Sequence[tuple[str, Expr]] = (), of_motion: bool = False
+        self,
+        formed: Sequence[Expr],
+        prefix: str = "z",
+        names: Sequence[tuple[str, Expr]] = (),
+        of_motion: bool = False,
     ) -> Written:
-        """Expressions in SymPy as they are read, with their named parts; ``names`` are those that stand in them."""
+        """Expressions of one graph in SymPy as they are read, with their named parts ``z0``, ...
+
+        ``names`` stand in them already, in order.  Of M and f (``of_motion``) long roots and denominators that are
+        written several times get names in any case.
+        """
+        from ..expr.simplify import WHOLE, joined_nodes, simplify
+
         k = self.kinematics
         rates = frozenset((*k.velocity_names, *map(acceleration_name, k.velocity_names)))
-        return write(formed, self._symbol, prefix, names, rates, k.parameter_names, k.euler_parameters, of_motion)
+        expressions, given = joined_nodes(formed, names, k.euler_parameters)
+        sizes = [WHOLE] if not given and is_short(expressions) else []
+        form = simplify(expressions, given, rates, prefix, *sizes)
+        if form is None:
+            return Written([], [])
+        named, found = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
+        return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, found)))
 
     def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
         """Expressions of the quantities with values put in, and what names in them stand for."""
@@ -887,12 +897,12 @@ class Readable(ABC):
     def _as_given(self, value: Any) -> Any:
         if isinstance(value, float | int):
             return value
-        return write([read_value(Graph(), "", value)], self._symbol).expressions[0]
+        return self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
 
     def symbols_put_in(self, names: Sequence[str]) -> list[Any]:
         """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
         graph = Graph()
-        return write(self.with_values([graph.symbol(name) for name in names]), self._symbol).expressions
+        return self.in_sympy(self.with_values([graph.symbol(name) for name in names])).expressions
 
 
 class ReadingView(Readable):

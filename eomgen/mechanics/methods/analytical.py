@@ -1,4 +1,4 @@
-"""Kinematics -> T, V and the forces without a potential, what analytical mechanics starts from."""
+"""Kinematics -> T, V and the forces without a potential; the equations of momenta p = dL/dv that follow from them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from ...elements.forces import CoordinateLoad, MarkerLoad
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr
+from ...expr.differentiate import gradient, hessian, jvp, vjp
 from ...expr.schedule import count
 from ...expr.vectors import Vec3
 from .. import Kinematics
 from ..wrenches import virtual_power
+from .tree_equations import TreeEquations
 
 
 def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
@@ -53,3 +55,29 @@ def generalized_forces(kinematics: Kinematics) -> list[Expr]:
         loads += terms.marker_loads if terms.force.by_power else terms.marker_remainder
         loads += terms.coordinate_remainder
     return virtual_power(kinematics, loads)
+
+
+def momentum_equations(kinematics: Kinematics, method: str, kinetic: Expr, potential: Expr) -> TreeEquations:
+    """dp/dt = p' with p = dL/dv and p' = dL/dq + Q, which are its canonical part, as M v' + h = 0.
+
+    Where q' = N v, for Euler parameters: p' = N^T dL/dq - w x p + Q of angular velocities w in turned axes.
+    """
+    q, v = kinematics.q, kinematics.v
+    L = kinetic - form_energies(kinematics, differentiated=True)[1]
+    momenta, slopes = gradient(L, v), gradient(L, q)
+    if kinematics.quaternion_slots:
+        slopes = vjp(kinematics.rates, slopes, v)
+    for _, j in kinematics.quaternion_slots:
+        w, p, slope = (vec.three(x, j) for x in (v, momenta, slopes))
+        slopes[j : j + 3] = vec.sub(slope, vec.cross(w, p))
+    rates = [s + f for s, f in zip(slopes, generalized_forces(kinematics), strict=True)]
+    drift, total = jvp(momenta, kinematics.flow | kinematics.clock), kinematics.total_derivative(momenta)
+    return TreeEquations(
+        method=method,
+        mass_matrix=hessian(momenta, v),
+        bias=tuple(d - r for d, r in zip(drift, rates, strict=True)),
+        inverse_dynamics=tuple(d - r for d, r in zip(total, rates, strict=True)),
+        kinetic_energy=kinetic,
+        potential_energy=potential,
+        canonical=(*momenta, *rates),
+    )

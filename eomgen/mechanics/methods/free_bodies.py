@@ -12,7 +12,7 @@ from ...base.records import dataclass
 from ...elements.frames import GROUND, Frame
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
-from ...expr.differentiate import jacobian, jvp
+from ...expr.differentiate import hessian, jacobian, jvp
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
 from ...model.mechanism import JointSpec
 from .. import Kinematics
@@ -242,14 +242,12 @@ def _differentiate(
 
 def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
     """What a method offers beside its linear system: M, h and energies from the balances of the bodies."""
-    graph, n = kinematics.graph, len(kinematics.v)
     bodies = FreeBodies(kinematics)
     inverse = _inverse_dynamics(bodies)
-    entries = jacobian(inverse, list(kinematics.a))
     return TreeEquations(
         method=method,
-        mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
-        bias=tuple(substitute(inverse, dict.fromkeys(kinematics.a, graph.zero))),
+        mass_matrix=hessian(inverse, kinematics.a),
+        bias=tuple(substitute(inverse, dict.fromkeys(kinematics.a, bodies.graph.zero))),
         inverse_dynamics=tuple(inverse),
         kinetic_energy=kinetic_energy(kinematics),
         potential_energy=potential_energy(kinematics),

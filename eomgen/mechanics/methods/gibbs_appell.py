@@ -13,7 +13,7 @@ from ...elements.forces import CoordinateLoad, MarkerLoad
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
-from ...expr.differentiate import gradient, jacobian
+from ...expr.differentiate import gradient, hessian
 from ...expr.vectors import Vec3
 from .. import Kinematics
 from ..wrenches import potential_energy, virtual_power
@@ -22,17 +22,15 @@ from .tree_equations import TreeEquations
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Gibbs-Appell equations of the spanning tree."""
-    graph, n = kinematics.graph, len(kinematics.v)
     slopes = gradient(energy_of_acceleration(kinematics), list(kinematics.a))
     loads: list[MarkerLoad | CoordinateLoad] = []
     for terms in kinematics.forces:
         loads += [*terms.marker_loads, *terms.coordinate_loads]
     inverse = [s - f for s, f in zip(slopes, virtual_power(kinematics, loads), strict=True)]
-    entries = jacobian(slopes, list(kinematics.a))
-    rest = dict.fromkeys(kinematics.a, graph.zero)
+    rest = dict.fromkeys(kinematics.a, kinematics.graph.zero)
     return TreeEquations(
         method="gibbs_appell",
-        mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
+        mass_matrix=hessian(slopes, kinematics.a),
         bias=tuple(substitute(inverse, rest)),
         inverse_dynamics=tuple(inverse),
         kinetic_energy=_kinetic(kinematics),

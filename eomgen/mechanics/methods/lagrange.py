@@ -9,10 +9,8 @@ d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Ana
 
 from __future__ import annotations
 
-from ...expr import vectors as vec
-from ...expr.differentiate import gradient, jacobian, jvp, vjp
 from .. import Kinematics
-from .analytical import form_energies, generalized_forces
+from .analytical import form_energies, momentum_equations
 from .tree_equations import TreeEquations, take_given
 
 
@@ -20,27 +18,6 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     """Lagrange's equations of the spanning tree; those of a bare Lagrangian are given."""
     if kinematics.mechanism.bare:
         return take_given(kinematics, "lagrange")
-    graph = kinematics.graph
-    q, v = list(kinematics.q), list(kinematics.v)
-    kinetic, potential = form_energies(kinematics)
-    L = kinetic - form_energies(kinematics, differentiated=True)[1]
-    momentum = gradient(L, v)
-    drift = jvp(momentum, kinematics.flow | kinematics.clock)
-    total = kinematics.total_derivative(momentum)
-    slope = gradient(L, q)
-    if kinematics.quaternion_slots:
-        slope = vjp(list(kinematics.rates), slope, v)
-    for _, j in kinematics.quaternion_slots:
-        w, p = (vec.vector(graph, x[j : j + 3]) for x in (v, momentum))
-        slope[j : j + 3] = vec.sub(vec.vector(graph, slope[j : j + 3]), vec.cross(w, p))
-    applied = generalized_forces(kinematics)
-    entries = jacobian(momentum, v)
-    n = len(v)
-    return TreeEquations(
-        method="lagrange",
-        mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
-        bias=tuple(d - s - f for d, s, f in zip(drift, slope, applied, strict=True)),
-        inverse_dynamics=tuple(d - s - f for d, s, f in zip(total, slope, applied, strict=True)),
-        kinetic_energy=kinetic,
-        potential_energy=potential,
-    )
+    tree = momentum_equations(kinematics, "lagrange", *form_energies(kinematics))
+    tree.canonical = ()
+    return tree
