@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.evaluate import Evaluator
 from ..expr.identity import is_rounding, terms_of, with_bounds, with_likely_bounds
 from .kinematics import Kinematics
-
-if TYPE_CHECKING:
-    from .kinematics import Kinematics
 
 # -- typical sizes -----------------------------------------------------------------------------------------------------
 

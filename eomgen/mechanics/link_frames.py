@@ -60,7 +60,7 @@ def joint_rates(kinematics: Kinematics) -> list[JointRates]:
     return result
 
 
-def slide_accelerations(kinematics: Kinematics, rates: list[JointRates], a: tuple[Expr, ...]) -> list[Vec3]:
+def slide_accelerations(kinematics: Kinematics, rates: Sequence[JointRates], a: Sequence[Expr]) -> list[Vec3]:
     """What accelerations ``a`` add to ``slide_rate``: the slide is linear in the velocities."""
     slides = [x for r in rates for x in r.slide]
     pushes = jvp(slides, dict(zip(kinematics.v, a, strict=True)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,6 @@ from ..expr.identity import vanishes
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .loops import place_of
-
-if TYPE_CHECKING:
-    from .constraint_functions import ConstraintFunctions
 
 # -- constraints that hold nothing -------------------------------------------------------------------------------------
 

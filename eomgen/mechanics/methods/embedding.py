@@ -10,7 +10,7 @@ operations and minimum parameters of the dynamic models of tree structure robots
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -119,25 +119,25 @@ def _moment(inertia: Mat3, omega: Vec3, alpha: Vec3, turning: Mat3) -> Vec3:
     return result[0], result[1], result[2]
 
 
-def _sweep(
+def _outwards(
     kinematics: Kinematics,
     resolved: Resolved,
-    inertias: list[SpatialInertia],
-    a: tuple[Expr, ...],
-    blocks: Sequence[SlidingTriple] = (),
-) -> tuple[Expr, ...]:
-    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
-    graph, links, twists = kinematics.graph, resolved.links, resolved.twists
-    still = vec.zero(graph)
+    inertias: Sequence[SpatialInertia],
+    a: Sequence[Expr],
+    afloat: Collection[int] = (),
+) -> tuple[list[tuple[Vec3, Mat3, Vec3]], list[Wrench]]:
+    """Angular acceleration, U, acceleration of the origin less gravity of each link; its wrench less what is applied.
+
+    Gravity is left out of links that are ``afloat``.
+    """
+    graph, links, twists, applied = kinematics.graph, resolved.links, resolved.twists, resolved.applied
+    still, two = vec.zero(graph), graph.constant(2.0)
     lifted = vec.neg(kinematics.mechanism.gravity)  # gravity as an acceleration of ground
-    two = graph.constant(2.0)
-    motions: list[tuple[Vec3, Mat3, Vec3]] = []  # alpha, U, A of each link
+    motions: list[tuple[Vec3, Mat3, Vec3]] = []
     wrenches: list[Wrench] = []
-    applied = resolved.applied
     slides = slide_accelerations(kinematics, resolved.rates, a)
-    afloat = falling(blocks)
     for k, link in enumerate(links):
-        rate, omega = resolved.rates[k], twists[k][0]
+        rate, omega, inertia = resolved.rates[k], twists[k][0], inertias[k]
         above, base = still, (still, (still, still, still), still if k in afloat else lifted)
         if link.parent != GROUND:
             above, base = twists[link.parent][0], motions[link.parent]
@@ -149,11 +149,22 @@ def _sweep(
             alpha = vec.add(alpha, vec.scale(a[link.first + c], angular))
         turning = _turning(omega, alpha)
         motions.append((alpha, turning, linear))
-        inertia = inertias[k]
         push = vec.add(vec.scale(inertia.mass, linear), vec.times(turning, inertia.moment))
         turn = vec.add(_moment(inertia.inertia, omega, alpha, turning), vec.cross(inertia.moment, linear))
         wrenches.append((vec.sub(turn, applied[k][0]), vec.sub(push, applied[k][1])))
-    return tuple(along_joints(links, wrenches, turn_forces(blocks, coordinate_forces(kinematics))))
+    return motions, wrenches
+
+
+def _sweep(
+    kinematics: Kinematics,
+    resolved: Resolved,
+    inertias: Sequence[SpatialInertia],
+    a: Sequence[Expr],
+    blocks: Sequence[SlidingTriple] = (),
+) -> tuple[Expr, ...]:
+    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
+    _, wrenches = _outwards(kinematics, resolved, inertias, a, falling(blocks))
+    return tuple(along_joints(resolved.links, wrenches, turn_forces(blocks, coordinate_forces(kinematics))))
 
 
 # -- tree slopes -------------------------------------------------------------------------------------------------------
@@ -267,13 +278,16 @@ class ForceSlopes:
         self._kinematics = kinematics
         self._inertias = regroup(kinematics.graph, kinematics.links)
         self._rates = joint_rates(kinematics)
+        still = (vec.zero(kinematics.graph), vec.zero(kinematics.graph))
+        unloaded = [still] * len(kinematics.links)
+        self._resolved = Resolved.in_own_axes(kinematics.links, kinematics.twists, self._rates, unloaded)
         two = kinematics.graph.constant(2.0)
         self._omegas = [twist[0] for twist in kinematics.twists]
         self._twice = [vec.scale(two, omega) for omega in self._omegas]
         self._places = coordinate_places(kinematics)
         self._fields = [
             [self._field(k, *column, link.first + c) for c, column in enumerate(link.columns)]
-            for k, link in self._numbered
+            for k, link in enumerate(kinematics.links)
         ]
         self._lifted: dict[tuple[int, int], Lifted] = {}  # by index of the velocity and link
         n_q, n, zero = len(kinematics.q), len(kinematics.v), kinematics.graph.zero
@@ -293,10 +307,6 @@ class ForceSlopes:
         for index, inertia in drive_inertias(kinematics).items():
             mass[index, index] = mass[index, index] + inertia
         self.mass_matrix = tuple(tuple(mass.get((max(i, j), min(i, j)), zero) for j in range(n)) for i in range(n))
-
-    @property
-    def _numbered(self) -> Iterator[tuple[int, Link]]:
-        return enumerate(self._kinematics.links)
 
     def _above(self, k: int) -> Vec3:
         """Angular velocity of the parent, link axes."""
@@ -387,44 +397,15 @@ class ForceSlopes:
                         whirl = vec.add(links[at].up(whirl), vec.cross(self._step(at), links[at].up(force[1])))
                         force, rate = links[at].lift(force), links[at].lift(rate)
             if (p := links[k].parent) != GROUND:
-                part = self._carried(k, body)
-                own = bodies[p]
-                bodies[p] = Composite(
-                    own.inertia.plus(part.inertia), add_matrices(own.V, part.V), vec.add(own.P, part.P)
-                )
+                bodies[p] = bodies[p].plus(self._carried(k, body))
         return bodies, slopes, mass, gravity
-
-    def _outwards(self, a: Sequence[Expr]) -> tuple[list[tuple[Vec3, Mat3, Vec3]], list[Wrench]]:
-        """Angular acceleration, U, acceleration of the origin less gravity of each link; the wrench of its body."""
-        kinematics, graph = self._kinematics, self._kinematics.graph
-        still, two = vec.zero(graph), graph.constant(2.0)
-        lifted = vec.neg(kinematics.mechanism.gravity)
-        slides = slide_accelerations(kinematics, self._rates, tuple(a))
-        motions: list[tuple[Vec3, Mat3, Vec3]] = []
-        wrenches: list[Wrench] = []
-        for k, link in self._numbered:
-            rate, inertia = self._rates[k], self._inertias[k]
-            above, base = still, (still, (still, still, still), lifted)
-            if link.parent != GROUND:
-                above, base = self._omegas[link.parent], motions[link.parent]
-            relative = vec.add(vec.add(rate.slide_rate, slides[k]), vec.scale(two, vec.cross(above, rate.slide)))
-            linear = link.down(vec.add(vec.add(base[2], vec.times(base[1], link.position)), relative))
-            alpha = vec.add(link.down(base[0]), vec.add(rate.spin_rate, vec.cross(link.down(above), rate.spin)))
-            for c, (angular, _) in enumerate(link.columns):
-                alpha = vec.add(alpha, vec.scale(a[link.first + c], angular))
-            turning = _turning(self._omegas[k], alpha)
-            motions.append((alpha, turning, linear))
-            push = vec.add(vec.scale(inertia.mass, linear), vec.times(turning, inertia.moment))
-            turn = _moment(inertia.inertia, self._omegas[k], alpha, turning)
-            wrenches.append((vec.add(turn, vec.cross(inertia.moment, linear)), push))
-        return motions, wrenches
 
     def _swept(self, a: Sequence[Expr], motions: list[tuple[Vec3, Mat3, Vec3]]) -> list[list[Twist]]:
         """Per column the second derivative of its field as seen from ground, less s x (acceleration of the origin)."""
         kinematics, two = self._kinematics, self._kinematics.graph.constant(2.0)
         along = kinematics.flow | dict(zip(kinematics.v, a, strict=True))
         found: list[list[Twist]] = []
-        for k, link in self._numbered:
+        for k, link in enumerate(kinematics.links):
             _, turning, linear = motions[k]
             found.append([])
             for c, (s, l) in enumerate(link.columns):
@@ -444,7 +425,7 @@ class ForceSlopes:
     def by_position(self, a: Sequence[Expr]) -> Entries:
         """(row, column) -> d(M a + h)/dq at fixed accelerations a (n,)."""
         links = self._kinematics.links
-        motions, wrenches = self._outwards(a)
+        motions, wrenches = _outwards(self._kinematics, self._resolved, self._inertias, a)
         swept = self._swept(a, motions)
         slopes: Entries = {}
         for k in reversed(range(len(links))):
@@ -501,14 +482,7 @@ class ForceSlopes:
 
 def applied_forces(kinematics: Kinematics) -> list[Expr]:
     """Generalized forces (n,) of all force elements, gravity apart."""
-    links, wrenches = kinematics.links, applied_wrenches(kinematics)
-    result = coordinate_forces(kinematics)
-    for k in reversed(range(len(links))):
-        for c, column in enumerate(links[k].columns):
-            result[links[k].first + c] = result[links[k].first + c] + dot(column, wrenches[k])
-        if links[k].parent != GROUND:
-            wrenches[links[k].parent] = add(wrenches[links[k].parent], links[k].lift(wrenches[k]))
-    return result
+    return along_joints(kinematics.links, applied_wrenches(kinematics), [-f for f in coordinate_forces(kinematics)])
 
 
 def _subtract(entries: Entries, others: Entries) -> None:
