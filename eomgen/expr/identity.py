@@ -152,6 +152,31 @@ def vanishes(
     return [k in found or (unknown and k in left) for k in range(len(outputs))]
 
 
+def dependence(
+    outputs: Sequence[Expr],
+    at: dict[str, np.ndarray],
+    moved: Mapping[str, np.ndarray],
+    given: Sequence[tuple[str, Expr]] = (),
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values and bounds (n, k) at k points, and (n, names) whether each output stays the same as a symbol moves alone.
+
+    ``moved`` has other values of symbols at the first points; names ``given`` stand for expressions and join ``at``.
+    """
+    k, m = (len(next(iter(values.values()))) for values in (at, moved))
+    wide = {name: np.concatenate([x, np.tile(x[:m], len(moved))]) for name, x in at.items()}
+    for j, (name, x) in enumerate(moved.items()):
+        wide[name][k + m * j : k + m * (j + 1)] = x
+    for name, expression in given:
+        wide[name] = with_bounds([expression], wide)[0][0]
+        at[name] = wide[name][:k]
+    values, bounds = with_bounds(outputs, wide)
+    v, e = (x[:, k:].reshape(-1, len(moved), m) for x in (values, bounds))
+    before, known = (x[:, None, :m] for x in (values, bounds))
+    with np.errstate(all="ignore"):
+        same = is_rounding(v - before, np.maximum(known + e, np.abs(before))).all(axis=2)
+    return values[:, :k], bounds[:, :k], same
+
+
 def random_point(outputs: Sequence[Expr], random: np.random.Generator, signs: bool = False) -> dict[str, float]:
     """Values of all symbols of expressions, from 0.2 to 1.4, on request of either sign."""
     names = sorted(symbols_of(outputs))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.operations import operations_with
 from ..expr.core import LEAVES, Expr, reachable, substitute, symbols_of
-from ..expr.identity import is_rounding, with_bounds
+from ..expr.identity import dependence, with_bounds
 from ..expr.schedule import count
 from .quantities import Quantities, Rows
 
@@ -100,22 +100,18 @@ def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
     whole = [*_flat(quantities.mass_matrix), *quantities.force]
     whole += _deciding(whole)
     random = np.random.default_rng(11)
-    width = POINTS * (1 + len(k.names))
-    at: dict[str, np.ndarray] = {name: np.full(width, x) for name, x in quantities.numbers.items()}
+    at: dict[str, np.ndarray] = {name: np.full(POINTS, x) for name, x in quantities.numbers.items()}
     for name in sorted(symbols_of([*whole, *parts]).difference(at, k.names)):
-        at[name] = np.tile(random.uniform(-1.0, 1.0, POINTS), width // POINTS)
-    for j, (name, x) in enumerate(zip(k.names, mobility.q_reference, strict=True)):
-        at[name] = np.tile(x + random.uniform(-0.3, 0.3, POINTS), width // POINTS)
-        at[name][POINTS * (j + 1) : POINTS * (j + 2)] += random.uniform(0.1, 0.5, POINTS)
-    values, bounds = with_bounds(whole, at)
-    v, e = (x.reshape(len(whole), 1 + len(k.names), POINTS) for x in (values, bounds))
-    known = np.maximum(e[:, :1] + e[:, 1:], np.abs(v[:, :1]))
-    with np.errstate(all="ignore"):
-        same = np.all(is_rounding(v[:, 1:] - v[:, :1], known), axis=(0, 2))
+        at[name] = random.uniform(-1.0, 1.0, POINTS)
+    moved: dict[str, np.ndarray] = {}
+    for name, x in zip(k.names, mobility.q_reference, strict=True):
+        at[name] = x + random.uniform(-0.3, 0.3, POINTS)
+        moved[name] = at[name] + random.uniform(0.1, 0.5, POINTS)
+    same = dependence(whole, at, moved)[2].all(axis=0)
     idle = tuple(name for name, alike in zip(k.names, same, strict=True) if alike)
     if not idle:
         return ()
-    at |= dict.fromkeys(idle, np.zeros(width))
+    at |= dict.fromkeys(idle, np.zeros(POINTS))
     return idle if np.isfinite(with_bounds(list(parts), at)[0]).all() else ()
 
 

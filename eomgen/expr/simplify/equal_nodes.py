@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.limits.numbers import ALIKE
 from ..core import LEAVES, Expr, Graph, operands, reachable, substitute
-from ..identity import is_rounding, with_bounds
+from ..identity import dependence, is_rounding, with_bounds
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone
@@ -147,29 +147,14 @@ class Values:
     ) -> None:
         self.graph, self.order, self.names = graph, order, names
         random = np.random.default_rng(5)
-        width = POINTS + MOVED * len(names)
-        at = {name: np.tile(random.uniform(-3.0, 3.0, POINTS), width // POINTS + 1)[:width] for name in names}
+        at = {name: random.uniform(-3.0, 3.0, POINTS) for name in names}
         for four in unit:
             part = random.standard_normal((len(four), POINTS))
-            for name, x in zip(four, part / np.linalg.norm(part, axis=0), strict=True):
-                at[name] = np.tile(x, width // POINTS + 1)[:width]
-        # after the points themselves, for each symbol the first of them with that symbol changed
-        for k, name in enumerate(names):
-            start = POINTS + MOVED * k
-            for other in names:
-                at[other][start : start + MOVED] = at[other][:MOVED]
-            at[name][start : start + MOVED] = random.uniform(-3.0, 3.0, MOVED)
-        for name, x in given:
-            at[name] = with_bounds([x], at)[0][0]
-        values, bounds = with_bounds([Expr(graph, i) for i in order], at)
-        self.values = dict(zip(order, values[:, :POINTS], strict=True))
-        self.bounds = dict(zip(order, bounds[:, :POINTS], strict=True))
-        self.at = {name: x[:POINTS] for name, x in at.items()}
-        base = values[:, None, :MOVED]
-        moved = values[:, POINTS:].reshape(len(order), len(names), MOVED)
-        known = bounds[:, None, :MOVED] + bounds[:, POINTS:].reshape(len(order), len(names), MOVED)
-        with np.errstate(all="ignore"):
-            same: np.ndarray = np.all(is_rounding(moved - base, np.maximum(known, np.abs(base))), axis=2)
+            at |= dict(zip(four, part / np.linalg.norm(part, axis=0), strict=True))
+        moved = {name: random.uniform(-3.0, 3.0, MOVED) for name in names}
+        values, bounds, same = dependence([Expr(graph, i) for i in order], at, moved, given)
+        self.values, self.bounds = dict(zip(order, values, strict=True)), dict(zip(order, bounds, strict=True))
+        self.at = at
         bits = {i: np.flatnonzero(~same[k]).tolist() for k, i in enumerate(order)}
         self.depends = {i: sum(1 << bit for bit in row) for i, row in bits.items()}
 
