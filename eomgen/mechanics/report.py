@@ -262,27 +262,12 @@ def place(report: MechanismReport) -> Places:
     return Places(found, max(columns, 1), layers)
 
 
-def draw(report: MechanismReport, file: str | Path | None = None, ax: Any = None) -> Any:
-    """Draw it; see :meth:`.report.MechanismReport.draw`."""
-    if ax is None and file is None:  # one that a notebook or a window shows
-        ax = _part("pyplot").figure(figsize=_size(place(report)), layout="constrained").add_subplot()
-    elif ax is None:
-        ax = _part("figure").Figure(figsize=_size(place(report)), layout="constrained").add_subplot()
-    if file is not None:
-        known = ax.figure.canvas.get_supported_filetypes()
-        if as_path("file", file).suffix[1:].lower() not in known:
-            raise bad_file(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
-    _fill(report, ax)
-    if file is not None:
-        save_figure(ax.figure, file)
-    return ax
-
-
-def new_figure(report: MechanismReport) -> Any:
-    """A figure of it without a window."""
-    figure = _part("figure").Figure(figsize=_size(place(report)), layout="constrained")
-    _fill(report, figure.add_subplot())
-    return figure
+def _axes(report: MechanismReport, shown: bool = False) -> Any:
+    """Axes of a new figure, which a notebook or a window shows if asked to."""
+    make = _part("pyplot").figure if shown else _part("figure").Figure
+    places = place(report)
+    size = min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0)
+    return make(figsize=size, layout="constrained").add_subplot()
 
 
 def _part(name: str) -> Any:
@@ -290,10 +275,6 @@ def _part(name: str) -> Any:
         return import_module(f"matplotlib.{name}")
     except ImportError as error:
         raise MissingDependencyError("the picture needs matplotlib: pip install matplotlib") from error
-
-
-def _size(places: Places) -> tuple[float, float]:
-    return min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0)
 
 
 def _fill(report: MechanismReport, ax: Any) -> None:
@@ -478,7 +459,15 @@ class MechanismReport:
         UsageError
             A file name whose ending is no kind of picture.
         """
-        drawn: Axes = draw(self, file, ax)
+        axes: Any = _axes(self, shown=file is None) if ax is None else ax
+        if file is not None:
+            known = axes.figure.canvas.get_supported_filetypes()
+            if as_path("file", file).suffix[1:].lower() not in known:
+                raise bad_file(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
+        _fill(self, axes)
+        if file is not None:
+            save_figure(axes.figure, file)
+        drawn: Axes = axes
         return drawn
 
     def to_dict(self) -> dict[str, Any]:
@@ -550,7 +539,7 @@ class MechanismReport:
 
     def _repr_html_(self) -> str:
         text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
-        return side_by_side(picture_html(lambda: new_figure(self)), text) if self.bodies else text
+        return side_by_side(picture_html(lambda: self.draw(ax=_axes(self)).figure), text) if self.bodies else text
 
 
 def _values(values: dict[str, float]) -> str:
