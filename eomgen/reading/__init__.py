@@ -3,7 +3,8 @@
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """
 
+from .displayed import Displayed, ReadingView
 from .quantities import Quantities
-from .readable import Readable, ReadingView
+from .readable import Readable
 
-__all__ = ["Quantities", "Readable", "ReadingView"]
+__all__ = ["Displayed", "Quantities", "Readable", "ReadingView"]

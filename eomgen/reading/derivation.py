@@ -25,7 +25,7 @@ from ..mechanics.report import MechanismReport, report
 from ..model.sympy_face import names_of
 from ..model.visit import Undotted
 from ..runtime.argument_checks import unknown
-from . import Readable
+from . import Displayed
 
 if TYPE_CHECKING:
     from ..codegen.choice import Choice
@@ -35,7 +35,7 @@ OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a b
 
 
 @dataclass(frozen=True)
-class Derivation(Readable):
+class Derivation(Displayed):
     """What a derivation gives; :class:`~..api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)
@@ -93,7 +93,7 @@ class Derivation(Readable):
         return None if system is None else (len(system.unknowns), len(system.places))
 
     # -- display
-    __repr__ = Readable.__repr__
+    __repr__ = Displayed.__repr__
 
     @cached_property
     def _shown_text(self) -> str:

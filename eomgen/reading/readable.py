@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.names import acceleration_name, hint
 from ..base.notation import Notation, split_rate
-from ..errors import NonFiniteError, UnavailableError, at_odds, incomplete
+from ..errors import NonFiniteError, at_odds, incomplete
 from ..expr.core import Expr, Graph, copied, symbols_of
 from ..expr.evaluate import evaluate
 from ..mechanics import Kinematics
 from ..mechanics.methods import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..model.visit import Undotted
-from ..runtime.argument_checks import UnknownNameError, find_lacking
+from ..runtime.argument_checks import UnknownNameError
 from .methods import (
     BlockSystem,
     BodiesApart,
@@ -185,13 +185,12 @@ class FreeBody(NamedTuple):
 # -- the table ---------------------------------------------------------------------------------------------------------
 
 # A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and
-# what values are put in; :class:`ReadingView` is the same derivation with other answers.
+# what values are put in; :class:`~.displayed.ReadingView` is the same derivation with other answers.
 
 
 class Readable(ABC):
     """The quantities of derived equations as SymPy expressions and matrices, each made when it is first asked for.
 
-    They show themselves, and give the same quantities with values put in or in functions of time.
     Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
     the tree to all velocities ``v``.  In open chains both are the same.
     """
@@ -202,6 +201,10 @@ class Readable(ABC):
     @abstractmethod
     def fresh(self) -> Derived:
         """A copy of what was derived, in a graph of its own."""
+
+    @abstractmethod
+    def again(self) -> Readable:
+        """The same with nothing made yet."""
 
     @property
     def name(self) -> str:
@@ -564,110 +567,11 @@ class Readable(ABC):
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])
         return SymbolicLinearization(A, B, names, inputs, self._named.pop("linearize"))
 
-    # -- display ------------------------------------------------------------------------------------------------------
-    def __str__(self) -> str:
-        return self._shown_text
-
-    def __repr__(self) -> str:
-        return self._shown_text
-
-    def _repr_html_(self) -> str:
-        return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
-
-    def _repr_latex_(self) -> str:
-        from .writers import equations_latex
-
-        return equations_latex(self)
-
-    @cached_property
-    def _shown_text(self) -> str:
-        from .writers import equations_text
-
-        return equations_text(self)
-
-    def _picture_and_facts(self, facts: str) -> str:
-        """What stands above the formulas; equations that can be compiled add a picture."""
-        return facts
-
-    @cached_property
-    def _facts_html(self) -> str:
-        from .writers import facts_html
-
-        return facts_html(self)
-
-    @cached_property
-    def _equations_html(self) -> str:
-        from .writers import equations_html
-
-        return equations_html(self)
-
-    # -- the same with other symbols or values ------------------------------------------------------------------------
-    def with_dynamicsymbols(self) -> ReadingView:
-        """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.
-
-        ``theta`` becomes theta(t) and ``theta_dot`` its derivative; velocities that are no rates of coordinates, inputs
-        and multipliers are functions of time too; parameters stay symbols.
-
-        Returns
-        -------
-        ReadingView
-        """
-        return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
-
-    def subs(self, values: Mapping[Any, Any]) -> ReadingView:
-        """The same quantities with values put in, all at once, after derivatives have been taken.
-
-        Parameters
-        ----------
-        values : mapping
-            Name, symbol or function of time of a coordinate, velocity, acceleration, parameter or input, or ``"t"`` ->
-            number, text or SymPy expression.
-
-        Returns
-        -------
-        ReadingView
-
-        Raises
-        ------
-        UsageError
-            An unknown name, or a value that is no expression.
-        """
-        return ReadingView(self, self._symbol, (*self._put_in, self._read(values)))
-
-    def with_parameters(self, values: Mapping[Any, Any] | None = None, /, **named: Any) -> ReadingView:
-        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`.
-
-        Parameters
-        ----------
-        values : mapping, optional
-            Values by name, where names are no words of Python: ``with_parameters({"left.l": 0.5})``.
-        **named
-            Values by name.
-
-        Returns
-        -------
-        ReadingView
-
-        Raises
-        ------
-        UsageError
-            An unknown name, one that is given twice, or a value that is no expression.
-        """
-        read = {} if values is None else self._read(values, "parameter")
-        more = self._read(named, "parameter")
-        if both := sorted({*read} & {*more}):
-            raise at_odds(f"parameter {both[0]!r} is given twice; give it one value")
-        return ReadingView(self, self._symbol, (*self._put_in, read | more))
-
     # -- how quantities are formed and written -------------------------------------------------------------------------
     @classmethod
     def rows(cls) -> Iterator[Quantity]:
         """The rows of the table."""
         return (row for row in vars(Readable).values() if isinstance(row, Quantity))
-
-    def again(self) -> ReadingView:
-        """The same quantities, none of them made yet."""
-        return ReadingView(self, self._symbol, self._put_in)
 
     def in_plain_symbols(self) -> Readable:
         """The same quantities in plain symbols; these equations, where they are in no functions of time."""
@@ -903,75 +807,3 @@ class Readable(ABC):
         """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
         graph = Graph()
         return self.in_sympy(self.with_values([graph.symbol(name) for name in names])).expressions
-
-
-class ReadingView(Readable):
-    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
-
-    Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
-
-    Attributes
-    ----------
-    source : Readable
-        The equations of which this is a view.
-    """
-
-    if not TYPE_CHECKING:  # type checkers know all attributes
-
-        def __getattr__(self, name: str) -> Any:
-            lacks = not name.startswith("_") and not hasattr(type(self), name)
-            if lacks and hasattr(type(self.source), name):
-                raise UnavailableError(
-                    f"a view of equations has no {name!r}: values are put into what is read, not into what is "
-                    f"compiled and counted; take it of the equations themselves, which are .source of the view",
-                )
-            return find_lacking(self, "a view of equations", name)
-
-    def __init__(self, source: Readable, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
-        self.source: Readable = source.source if isinstance(source, ReadingView) else source
-        self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbol, self._put_in = symbols, tuple(given for given in values if given)
-
-    def fresh(self) -> Derived:
-        return self.source.fresh()
-
-    @property
-    def method(self) -> str:
-        return self.source.method
-
-    def explain(self, level: str = "full") -> Any:
-        """The worked solution with the values of parameters and inputs that were put in; see ``explain`` of equations.
-
-        The formulas are compared with the compiled module at these values.
-
-        Raises
-        ------
-        UnavailableError
-            A value was put in for a coordinate, a velocity, an acceleration or the time: the steps of a solution
-            differentiate by them.  Or a value holds a name that is no parameter or input of the model.
-        """
-        if not self._put_in:
-            return self.source.explain(level)  # type: ignore[attr-defined]
-        k = self.kinematics
-        known = {*k.parameter_names, *k.input_names}
-        moving = sorted({name for given in self._put_in for name in given}.difference(known))
-        strange = sorted({*self.names_put_in}.difference(known))
-        if moving:
-            raise UnavailableError(
-                f"explain has no view with {self._told}: the steps of a solution differentiate by {', '.join(moving)}; "
-                "put in values of parameters and inputs alone, and give those of coordinates and velocities by "
-                "model.initial, which the calculation line by line begins with"
-            )
-        if strange:
-            raise UnavailableError(
-                f"explain has no view with {self._told}: the model has no parameter or input {', '.join(strange)}, so "
-                "that the compiled module cannot be compared with it; put in numbers or parameters of the model"
-            )
-        return self.source.explained(self.in_plain_symbols(), level)  # type: ignore[attr-defined]
-
-    def _picture_and_facts(self, facts: str) -> str:
-        return facts if self._put_in else self.source._picture_and_facts(facts)
-
-    def in_plain_symbols(self) -> Readable:
-        plain = self.source._symbol
-        return self if self._symbol is plain else ReadingView(self.source, plain, self._put_in)
