@@ -173,7 +173,7 @@ def dependence(
     v, e = (x[:, k:].reshape(-1, len(moved), m) for x in (values, bounds))
     before, known = (x[:, None, :m] for x in (values, bounds))
     with np.errstate(all="ignore"):
-        same = is_rounding(v - before, np.maximum(known + e, np.abs(before))).all(axis=2)
+        same: np.ndarray = np.all(is_rounding(v - before, np.maximum(known + e, np.abs(before))), axis=2)
     return values[:, :k], bounds[:, :k], same
 
 
