@@ -202,13 +202,14 @@ def _columns(table: Table) -> str:
 
 
 _STYLE = """
+:root{color-scheme:light dark}
 body{font:17px/1.5 "Source Serif 4",Georgia,"DejaVu Serif",serif;max-width:52em;margin:2em auto;padding:0 1.2em;
-color:#1b1b1b;background:#fff}
+color:CanvasText;background:Canvas}
 h1,h2,h3{font-family:"Source Sans 3","Helvetica Neue",Arial,"DejaVu Sans",sans-serif;line-height:1.25}
 h1{font-size:1.7em}
-h2{font-size:1.3em;margin:1.8em 0 .5em;border-bottom:1px solid #c8c8c8}
+h2{font-size:1.3em;margin:1.8em 0 .5em;border-bottom:1px solid #8886}
 h3{font-size:1.05em;margin:1.3em 0 .3em}
-code{font-size:.88em;background:#f2f2f2;padding:0 .2em;border-radius:2px}
+code{font-size:.88em;background:#8882;padding:0 .2em;border-radius:2px}
 .formula{overflow-x:auto;overflow-y:hidden;margin:.55em 0;padding:.25em 0 .25em 1.5em}
 math{font-family:"STIX Two Math","Cambria Math","Latin Modern Math","Libertinus Math",math,serif}
 .formula math{font-size:1.1em}
@@ -227,10 +228,10 @@ mtable.lines>mtr>mtd:first-child{text-align:right}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;margin:.6em 0;font-size:.95em}
 th,td{padding:.2em .8em .2em 0;text-align:left;vertical-align:top}
-thead th{border-bottom:1px solid #666}
-tbody tr+tr td{border-top:1px solid #e4e4e4}
-details{margin:.6em 0;border-left:3px solid #d5d5d5;padding-left:.8em}
-summary{cursor:pointer;color:#24527a}
+thead th{border-bottom:1px solid #888}
+tbody tr+tr td{border-top:1px solid #8883}
+details{margin:.6em 0;border-left:3px solid #8885;padding-left:.8em}
+summary{cursor:pointer;color:LinkText}
 .section{margin:0;border:0;padding:0}
 .section>summary>h2{display:inline-block;margin:.3em 0;font-size:1.15em}
 nav{columns:2;font-size:.95em}

@@ -107,7 +107,7 @@ def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
     for name, x in zip(k.names, mobility.q_reference, strict=True):
         at[name] = x + random.uniform(-0.3, 0.3, POINTS)
         moved[name] = at[name] + random.uniform(0.1, 0.5, POINTS)
-    same = dependence(whole, at, moved)[2].all(axis=0)
+    same: np.ndarray = np.all(dependence(whole, at, moved)[2], axis=0)
     idle = tuple(name for name, alike in zip(k.names, same, strict=True) if alike)
     if not idle:
         return ()
