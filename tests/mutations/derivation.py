@@ -6,7 +6,7 @@ from mutations.fault import Fault
 
 FAULTS = (
     Fault(
-        "embedding-coriolis", "_sweep",
+        "embedding-coriolis", "_outwards",
         "vec.scale(two, vec.cross(above, rate.slide))",
         "vec.cross(above, rate.slide)",
         "Coriolis acceleration of sliding joints: the factor 2 is lost",
@@ -27,7 +27,7 @@ FAULTS = (
         "tests/mechanics/test_random_trees.py::test_tree_equals_pinocchio[1-False-embedding]",
     ),
     Fault(
-        "embedding-gravity-sign", "_sweep",
+        "embedding-gravity-sign", "_outwards",
         "vec.neg(kinematics.mechanism.gravity)",
         "kinematics.mechanism.gravity",
         "gravity pulls upwards",
