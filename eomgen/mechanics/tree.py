@@ -198,7 +198,8 @@ class AxisTurns:
             return None
         self._open.add(branch.body)
         seen = _Seen([], [], [])
-        self._look(branch, np.eye(3), seen)
+        if not self._look(branch, np.eye(3), seen):
+            return None
         angles = {0.0}
         for x, y in (tuple(v[:2].tolist()) for v in (*seen.lengths, *seen.centres, *seen.axes, *H)):
             if math.hypot(x, y) > ROUNDED:
@@ -211,12 +212,15 @@ class AxisTurns:
         c, s = graph.constant(math.cos(best)), graph.constant(math.sin(best))
         return ((c, -s, graph.zero), (s, c, graph.zero), (graph.zero, graph.zero, graph.one))
 
-    def _look(self, branch: Branch, axes: np.ndarray, seen: _Seen) -> None:
-        """Note the arms and axes of a link, and those of links on hinges parallel to its own, in common axes."""
+    def _look(self, branch: Branch, axes: np.ndarray, seen: _Seen) -> bool:
+        """Note the arms and axes of a link, and those of links on hinges parallel to its own, in common axes.
+
+        Not where a place is no number: a symbol along one axis would stand in two.
+        """
         _, inner = self._ends(branch)
         F, p = numbers(inner.frame.rotation), numbers([inner.frame.position])
         if F is None or p is None:
-            return
+            return False
         points = [(seen.centres, self.mechanism.bodies[branch.body].com)]
         for marker in self._others[branch.body]:
             if marker is not inner:
@@ -224,14 +228,19 @@ class AxisTurns:
                 if (R := numbers(marker.frame.rotation)) is not None:
                     seen.axes.append(axes @ F.T @ R[:, 2])
         for arms, point in points:
-            if (x := numbers([point])) is not None and (size := np.abs(x).max() + np.abs(p).max()):
+            if (x := numbers([point])) is None:
+                return False
+            if size := np.abs(x).max() + np.abs(p).max():
                 arm = axes @ F.T @ (x - p)[0]
                 arms.append(np.where(np.abs(arm) <= ROUNDED * size, 0.0, arm / size))
         for child in self._children.get(branch.body, ()):
             outer, _ = self._ends(child)
             R = numbers(outer.frame.rotation)
-            if R is not None and abs((F.T @ R)[2, 2] - 1.0) <= ROUNDED and self._symmetric(child):
-                self._look(child, axes @ F.T @ R, seen)
+            if R is None or abs((F.T @ R)[2, 2] - 1.0) > ROUNDED or not self._symmetric(child):
+                continue
+            if not self._look(child, axes @ F.T @ R, seen):
+                return False
+        return True
 
     def _ends(self, branch: Branch) -> tuple[Marker, Marker]:
         spec = self.mechanism.joints[branch.joint]
