@@ -274,6 +274,11 @@ class _Attempt:
         return mixed if mixed is not None and self.factoring.costs.of_terms(mixed) < cost else shortest
 
     def _simplified(self, poly: Poly) -> Poly:
-        """With fractions that can be divided divided, and sines and cosines joined."""
-        atoms = self.expansion.atoms
-        return self.expansion.angles.simplified(with_signs(without_exact_quotients(poly, atoms), atoms))
+        """With fractions divided that can be, and sines and cosines joined; with signs where that is shorter."""
+        simplified, factoring = self.expansion.angles.simplified, self.factoring
+        plain = without_exact_quotients(poly, self.expansion.atoms)
+        signed = with_signs(plain, self.expansion.atoms)
+        if signed is plain:
+            return simplified(plain)
+        forms = (simplified(signed), simplified(plain))
+        return min(forms, key=lambda form: factoring.costs.of_terms(factoring.factored(form)))
