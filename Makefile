@@ -3,7 +3,7 @@
 # make test   make lint, then the tests of all that users see, on all processors; fails if anything was skipped;
 #             PROGRAMS=all fails too where a program that some tests need is missing, as continuous integration does
 # make thorough  make test with everything that is marked thorough: long sweeps, C of all examples, sanitizers, packages
-# make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
+# make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results.md
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff, mypy and tools/lint.py alone
 # make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error

@@ -1,134 +1,249 @@
-"""The same models in SymPy, as its users would write them: reference frames, points and KanesMethod."""
+"""The same robots in eomgen, Pinocchio, MuJoCo and CasADi, at one state; heyoka over our right-hand sides."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-import sympy as sm
-from sympy.physics import mechanics as me
+import numpy as np
 
-from .models import arm_joints
+import eomgen as eg
+from eomgen.expr.core import reachable
+
+from .harness import Timed, timed
+from .kernels import Kernel, compile_text
+
+#: MuJoCo behind the interface of a kernel: mj_forward of a model without contacts.
+MUJOCO = """
+#include <mujoco/mujoco.h>
+#include <string.h>
+static mjModel *model;
+static mjData *data;
+int prepare(const char *path)
+{
+    char error[500] = "";
+    model = mj_loadXML(path, NULL, error, sizeof error);
+    data = model == NULL ? NULL : mj_makeData(model);
+    return data == NULL;
+}
+int kernel(double t, const double *x, const double *u, const double *c, double *out, double *w)
+{
+    (void)t, (void)c, (void)w;
+    memcpy(data->qpos, x, (size_t)model->nq * sizeof(double));
+    memcpy(data->qvel, x + model->nq, (size_t)model->nv * sizeof(double));
+    memcpy(data->qfrc_applied, u, (size_t)model->nv * sizeof(double));
+    mj_forward(model, data);
+    memcpy(out + model->nq, data->qacc, (size_t)model->nv * sizeof(double));
+    return 0;
+}
+"""
 
 
+def installed(package: str) -> bool:
+    """Whether a peer can be imported."""
+    return find_spec(package) is not None
+
+
+# -- robots ------------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Kane:
-    """Kane's equations ``mass_matrix * u' = forcing`` with what they depend on."""
+class Robot:
+    """A file of the package example-robot-data, or a path; ``locked`` joints are welds."""
 
-    q: list[Any]
-    u: list[Any]
-    parameters: list[Any]
-    mass_matrix: Any
-    forcing: Any
+    name: str
+    file: str
+    floating: bool = False
+    locked: tuple[str, ...] = ()
 
     @property
-    def entries(self) -> list[Any]:
-        """Lower triangle of the mass matrix, then the forcing: what has to be evaluated."""
-        n = len(self.u)
-        return [self.mass_matrix[i, j] for i in range(n) for j in range(i + 1)] + list(self.forcing)
+    def path(self) -> Path:
+        """Where it is."""
+        from shipped_robots import EXAMPLES
 
-    def operations(self) -> int:
-        """Operations of mass matrix and forcing after common subexpressions are taken out."""
-        named, entries = sm.cse(self.entries, symbols=sm.numbered_symbols("z_"))
-        return int(sum(sm.count_ops(e) for _, e in named) + sum(sm.count_ops(e) for e in entries))
+        return EXAMPLES / self.file
 
+    def model(self, **options: Any) -> eg.Model:
+        """With a torque on every joint, inertias as numbers unless ``symbolic``."""
+        settings = {"actuate": True, "lock": self.locked, "floating": self.floating, "rotation": "euler_parameters"}
+        return eg.load(self.path, **settings | options)
 
-class _System:
-    """Collects bodies that turn about joints, from the ground outwards."""
-
-    def __init__(self, n: int) -> None:
-        self.q, self.u = list(me.dynamicsymbols(f"q1:{n + 1}")), list(me.dynamicsymbols(f"u1:{n + 1}"))
-        self.ground, self.origin = me.ReferenceFrame("ground"), me.Point("origin")
-        self.origin.set_vel(self.ground, 0)
-        self.bodies: list[Any] = []
-        self.loads: list[Any] = []
-
-    def add(self, body: Any, weight: Any) -> None:
-        """Take a body with a force at its centre of mass."""
-        self.bodies.append(body)
-        self.loads.append((body.point if isinstance(body, me.Particle) else body.masscenter, weight))
-
-    def derive(self, parameters: list[Any]) -> Kane:
-        """Form Kane's equations, with u = q'."""
-        rates = [u - q.diff(me.dynamicsymbols._t) for q, u in zip(self.q, self.u, strict=True)]
-        method = me.KanesMethod(self.ground, self.q, self.u, kd_eqs=rates)
-        method.kanes_equations(self.bodies, self.loads)
-        return Kane(self.q, self.u, parameters, method.mass_matrix, method.forcing)
+    def pinocchio(self) -> Any:
+        """The same in Pinocchio."""
+        pin = import_module("pinocchio")
+        model = pin.buildModelFromUrdf(str(self.path), *((pin.JointModelFreeFlyer(),) if self.floating else ()))
+        locked = [model.getJointId(name) for name in self.locked]
+        return pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
 
 
-def chain(n: int, absolute: bool = True) -> Kane:
-    """The planar chain; ``absolute`` measures every angle from the vertical, else from the link before."""
-    s = _System(n)
-    g = sm.Symbol("g")
-    parameters = [g]
-    before, pin = s.ground, s.origin
-    for k, (q, u) in enumerate(zip(s.q, s.u, strict=True), start=1):
-        mass, length, distance, inertia = sm.symbols(f"m{k} l{k} d{k} I{k}")
-        parameters += [mass, length, distance, inertia]
-        reference = s.ground if absolute else before
-        frame = reference.orientnew(f"frame{k}", "Axis", (q, s.ground.z))
-        frame.set_ang_vel(reference, u * s.ground.z)
-        center, end = pin.locatenew(f"center{k}", -distance * frame.y), pin.locatenew(f"end{k}", -length * frame.y)
-        for point in (center, end):
-            point.v2pt_theory(pin, s.ground, frame)
-        body = me.RigidBody(f"link{k}", center, frame, mass, (me.inertia(frame, 0, 0, inertia), center))
-        s.add(body, -mass * g * s.ground.y)
-        before, pin = frame, end
-    return s.derive(parameters)
+ROBOTS = (
+    Robot("Panda", "panda_description/urdf/panda.urdf", locked=("panda_finger_joint1", "panda_finger_joint2")),
+    Robot("UR5", "ur_description/urdf/ur5_robot.urdf"),
+    Robot("Talos", "talos_data/robots/talos_reduced.urdf"),
+    Robot("ANYmal", "anymal_b_simple_description/robots/anymal.urdf", floating=True),
+)
 
 
-def panda() -> Kane:
-    """The Panda arm, all parameters numbers."""
-    joints = arm_joints("panda")
-    s = _System(len(joints))
-    frames, pins = [s.ground], [s.origin]
-    for k, joint in enumerate(joints):
-        before, pin = frames[joint["parent"] + 1], pins[joint["parent"] + 1]
-        placed, frame = me.ReferenceFrame(f"placed{k}"), me.ReferenceFrame(f"frame{k}")
-        placed.orient_explicit(before, sm.Matrix(joint["rotation"]).applyfunc(sm.nsimplify))
-        frame.orient_axis(placed, s.q[k], placed.z)
-        frame.set_ang_vel(before, s.u[k] * placed.z)
-        hinge = pin.locatenew(f"hinge{k}", _along(before, joint["position"]))
-        hinge.v2pt_theory(pin, s.ground, before)
-        center = hinge.locatenew(f"center{k}", _along(frame, joint["com"]))
-        center.v2pt_theory(hinge, s.ground, frame)
-        (xx, xy, zx), (_, yy, yz), (_, _, zz) = joint["inertia_com"]
-        inertia = me.inertia(frame, xx, yy, zz, xy, yz, zx)
-        body = me.RigidBody(f"body{k}", center, frame, joint["mass"], (inertia, center))
-        s.add(body, -joint["mass"] * 9.81 * s.ground.z)
-        frames.append(frame)
-        pins.append(hinge)
-    return s.derive([])
+def state(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, v, tau of a Pinocchio model: all joints turned and moving."""
+    q, free = import_module("pinocchio").neutral(model), model.nq - model.nv
+    first = 7 if free else 0
+    q[first:] = 0.1 + 0.05 * np.arange(model.nq - first)
+    if free:
+        q[3:7] = np.array([0.2, -0.1, 0.3, 0.927]) / np.linalg.norm([0.2, -0.1, 0.3, 0.927])
+    tau = np.full(model.nv, 0.1)
+    tau[: 6 if free else 0] = 0.0
+    return q, np.full(model.nv, 0.3), tau
 
 
-def _along(frame: Any, components: list[float]) -> Any:
-    return sum((c * axis for c, axis in zip(components, (frame.x, frame.y, frame.z), strict=True)), me.Vector(0))
+class InOurOrder:
+    """A state of a Pinocchio model as a module of the same robot has it, and accelerations of joints back again.
+
+    The base's velocity is along ground axes here, along its own axes in Pinocchio.
+    """
+
+    def __init__(self, module: Any, model: Any) -> None:
+        self.q, self.v, self.tau = q, v, tau = state(model)
+        pin, joints = import_module("pinocchio"), dict(zip(model.names, model.joints, strict=True))
+        names = [name for name in model.names if name in module.q_names]
+        values = {name: q[joints[name].idx_q] for name in names}
+        values |= {f"{name}_dot": v[joints[name].idx_v] for name in names}
+        if model.nq > model.nv:
+            R = pin.Quaternion(*q[[6, 3, 4, 5]]).toRotationMatrix()
+            base = ("x", "y", "z", "e0", "e1", "e2", "e3", "x_dot", "y_dot", "z_dot", "wx", "wy", "wz")
+            there = np.concatenate([q[:3], q[[6, 3, 4, 5]], R @ v[:3], v[3:6]])
+            values |= {f"base_{name}": x for name, x in zip(base, there, strict=True)}
+        self.x = np.array([values[name] for name in module.x_names])
+        self.u = np.array([tau[joints[name.removeprefix("tau_")].idx_v] for name in module.u_names])
+        self.own = [module.n_q + module.v_names.index(f"{name}_dot") for name in names]
+        self.places = [joints[name].idx_v for name in names]
+        damped = tau - np.asarray(model.damping) * v
+        self.reference = np.array(pin.aba(model, model.createData(), q, v, damped))
+
+    def difference(self, x_dot: np.ndarray) -> float:
+        """Of accelerations of joints from Pinocchio's, relative to the largest."""
+        gap = np.abs(x_dot[self.own] - self.reference[self.places]).max()
+        return float(gap / np.abs(self.reference).max())
 
 
-def double_pendulum() -> Kane:
-    """``examples/double_pendulum.yaml``: two point masses, the second angle measured from the first rod."""
-    s = _System(2)
-    m1, m2, l1, l2, g = parameters = list(sm.symbols("m1 m2 l1 l2 g"))
-    before, pin = s.ground, s.origin
-    for k, (mass, length) in enumerate(((m1, l1), (m2, l2))):
-        frame = me.ReferenceFrame(f"rod{k}")
-        frame.orient_axis(before, s.q[k], s.ground.z)
-        frame.set_ang_vel(before, s.u[k] * s.ground.z)
-        bob = pin.locatenew(f"bob{k}", -length * frame.y)
-        bob.v2pt_theory(pin, s.ground, frame)
-        s.add(me.Particle(f"mass{k}", bob, mass), -mass * g * s.ground.y)
-        before, pin = frame, bob
-    return s.derive(parameters)
+def pinocchio_calls(model: Any, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, Callable[[], Any]]:
+    """Its algorithms by the names of our kernels; ``a`` are torques where these are what is given."""
+    pin, data = import_module("pinocchio"), model.createData()
+    return {
+        "mass_matrix": lambda: pin.crba(model, data, q),
+        "inverse_dynamics": lambda: pin.rnea(model, data, q, v, a),
+        "rhs": lambda: pin.aba(model, data, q, v, a),
+        "inverse_dynamics_derivatives": lambda: pin.computeRNEADerivatives(model, data, q, v, a),
+        "jacobian": lambda: pin.computeABADerivatives(model, data, q, v, a),
+    }
 
 
-def pendulum_rhs(values: dict[str, float]) -> Callable[[float, Any], list[float]]:
-    """x' of the double pendulum as lambdify makes it at its fastest: solved symbolically, cse, plain ``math``."""
-    kane = double_pendulum()
-    a = kane.mass_matrix.LUsolve(kane.forcing)
-    fixed = {p: values[p.name] for p in kane.parameters}
-    flat = [sm.Symbol(str(x.func)) for x in (*kane.q, *kane.u)]
-    named = dict(zip((*kane.q, *kane.u), flat, strict=True))
-    right = [*flat[2:], *(entry.xreplace(named).xreplace(fixed) for entry in a)]
-    function = sm.lambdify(flat, right, modules="math", cse=True)
-    return lambda t, x: function(*x)
+def pinocchio_timed(model: Any, q: np.ndarray, v: np.ndarray, a: np.ndarray, kernel: str) -> dict[str, Timed]:
+    """An algorithm called from Python, and the same of a model without joints, which is what the call costs."""
+    nothing, empty = np.zeros(0), import_module("pinocchio").Model()
+    return {
+        "Pinocchio": timed(pinocchio_calls(model, q, v, a)[kernel]),
+        "a call": timed(pinocchio_calls(empty, nothing, nothing, nothing)[kernel]),
+    }
+
+
+def mujoco_kernel(model: Any, x: np.ndarray, tau: np.ndarray) -> Kernel:
+    """Forward dynamics of a Pinocchio model by MuJoCo from C."""
+    package = Path(str(import_module("mujoco").__file__)).parent
+    library = next(package.glob("libmujoco.so*"))
+    link = [f"-I{package / 'include'}", str(library), f"-Wl,-rpath,{package}"]
+    code = compile_text(MUJOCO, ["-O2"], link)
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "robot.xml")
+        path.write_text(as_mjcf(model), encoding="utf-8")
+        if code.prepare(str(path).encode()):
+            raise RuntimeError("MuJoCo refuses the robot")
+    x = x.copy()
+    if model.nq > model.nv:
+        x[3:7] = np.roll(x[3:7], 1)
+    return Kernel(code.kernel, x, len(x), tau)
+
+
+def as_mjcf(model: Any) -> str:
+    """A Pinocchio model as MJCF text, without contacts."""
+    pin = import_module("pinocchio")
+
+    def numbers(*values: float) -> str:
+        return " ".join(repr(float(x)) for x in values)
+
+    def body(k: int) -> str:
+        place, inertia, joint = model.jointPlacements[k], model.inertias[k], model.joints[k]
+        x, y, z, w = pin.Quaternion(place.rotation).coeffs()
+        J, kind = np.asarray(inertia.inertia), joint.shortname()
+        if kind == "JointModelFreeFlyer":
+            text = "<freejoint/>"
+        else:
+            axis = numbers(*np.eye(3)["XYZ".index(kind[-1])])
+            text = f'<joint type="hinge" axis="{axis}" damping="{float(model.damping[joint.idx_v])!r}"/>'
+        full = numbers(J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+        below = "".join(body(other) for other in range(k + 1, model.njoints) if model.parents[other] == k)
+        return (
+            f'<body pos="{numbers(*place.translation)}" quat="{numbers(w, x, y, z)}">{text}'
+            f'<inertial pos="{numbers(*inertia.lever)}" mass="{float(inertia.mass)!r}" fullinertia="{full}"/>'
+            f"{below}</body>"
+        )
+
+    roots = "".join(body(k) for k in range(1, model.njoints) if model.parents[k] == 0)
+    return (
+        '<mujoco><compiler autolimits="true" balanceinertia="false" boundmass="0"/>'
+        '<option gravity="0 0 -9.81"><flag contact="disable" constraint="disable"/></option>'
+        f"<worldbody>{roots}</worldbody></mujoco>"
+    )
+
+
+# -- heyoka ------------------------------------------------------------------------------------------------------------
+def heyoka_system(program: Any, values: Mapping[str, float]) -> list[tuple[Any, Any]]:
+    """The straight-line right-hand side of a program, node by node, as heyoka's pairs; values of its parameters."""
+    hk = import_module("heyoka")
+    block = next(b for b in program.blocks if b.name == "rhs")
+    names = [*program.coordinates, *program.velocities]
+    variables = dict(zip(names, hk.make_vars(*(f"x{k}" for k in range(len(names)))), strict=True))
+    operations = {
+        "add": lambda a, b: a + b,
+        "sub": lambda a, b: a - b,
+        "mul": lambda a, b: a * b,
+        "div": lambda a, b: a / b,
+        "neg": lambda a: -a,
+        "sin": hk.sin,
+        "cos": hk.cos,
+    }
+    made: dict[int, Any] = {}
+    for i in reachable(program.graph, [y.id for y in block.outputs]):
+        kind, *given = program.graph.nodes[i]
+        if kind == "const":
+            made[i] = hk.expression(float(given[0]))
+        elif kind == "sym":
+            made[i] = variables.get(given[0]) if given[0] in variables else hk.expression(float(values[given[0]]))
+        else:
+            made[i] = operations[kind](*(made[k] for k in given))
+    return [(variables[name], made[y.id]) for name, y in zip(names, block.outputs, strict=True)]
+
+
+class Heyoka:
+    """heyoka's Taylor method over a system, ready to be run again and again."""
+
+    def __init__(self, equations: list[tuple[Any, Any]], tolerance: float) -> None:
+        self.integrator = import_module("heyoka").taylor_adaptive(equations, [0.0] * len(equations), tol=tolerance)
+
+    def __call__(self, x0: np.ndarray, end: float) -> np.ndarray:
+        """The state at a time, from x0 at time 0."""
+        self.integrator.time = 0.0
+        self.integrator.state[:] = x0
+        self.integrator.propagate_until(end)
+        return np.array(self.integrator.state)
+
+
+def heyoka_exact(equations: list[tuple[Any, Any]], x0: np.ndarray, end: float) -> np.ndarray:
+    """The state at a time by long doubles, where the machine has them, far below all tolerances asked."""
+    start, options = [np.longdouble(x) for x in x0], {"fp_type": np.longdouble, "compact_mode": True}
+    integrator = import_module("heyoka").taylor_adaptive(equations, start, tol=np.longdouble(1e-19), **options)
+    integrator.propagate_until(np.longdouble(end))
+    return np.array(integrator.state, dtype=float)

@@ -5,63 +5,38 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-METHODS = ("embedding", "lagrange")
 #: Tolerances of the double pendulum's runs, and where they begin.
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 START = [1.5707963267948966, 0.0, 0.0, 0.0]
 
 
-def derive_chain(n: int, method: str) -> dict[str, Any]:
-    """Describe and derive a chain with eomgen; a chain of one link first, so that nothing is imported within."""
-    from .models import chain
+def derive(model: str, size: list[int], method: str) -> dict[str, Any]:
+    """Describe and derive with eomgen; a chain of one link first, so that nothing is imported within."""
+    from . import models
 
-    chain(1).derive(method)
+    models.chain(1).derive(method)
     start = perf_counter()
-    equations = chain(n).derive(method)
+    equations = getattr(models, model)(*size).derive(method)
     seconds = perf_counter() - start
-    return {"seconds": seconds, "operations": equations.operations["mass_matrix and bias"].total}
+    counts = {name: found.total for name, found in equations.operations.items()}
+    return {"seconds": seconds, "operations": counts["mass_matrix and bias"], "counts": counts}
 
 
-def derive_chain_sympy(n: int, absolute: bool, counted: bool) -> dict[str, Any]:
-    """Describe and derive a chain with SymPy's KanesMethod; its caches are cleared after a chain of one link."""
+def derive_sympy(model: str, size: list[Any], counted: bool) -> dict[str, Any]:
+    """The same with SymPy's KanesMethod; its caches are cleared after a chain of one link."""
     from sympy.core.cache import clear_cache
 
-    from .peers import chain
+    from . import sympy_peer
 
-    chain(1, absolute)
+    sympy_peer.chain(1)
     clear_cache()
     start = perf_counter()
-    kane = chain(n, absolute)
+    kane = getattr(sympy_peer, model)(*size)
     seconds = perf_counter() - start
     return {"seconds": seconds, "operations": kane.operations() if counted else None}
-
-
-def derive_panda(method: str) -> dict[str, Any]:
-    """Describe and derive the Panda arm with eomgen, and count."""
-    from .models import chain, panda
-
-    chain(1).derive(method)
-    start = perf_counter()
-    equations = panda().derive(method)
-    seconds = perf_counter() - start
-    return {"seconds": seconds, "operations": {name: x.total for name, x in equations.operations.items()}}
-
-
-def derive_panda_sympy() -> dict[str, Any]:
-    """Describe and derive the Panda arm with SymPy's KanesMethod."""
-    from sympy.core.cache import clear_cache
-
-    from .peers import chain, panda
-
-    chain(1)
-    clear_cache()
-    start = perf_counter()
-    panda()
-    return {"seconds": perf_counter() - start}
 
 
 def compile_chain(n: int) -> dict[str, float]:
@@ -75,12 +50,11 @@ def compile_chain(n: int) -> dict[str, float]:
     total, done = perf_counter() - start, os.times()
     start = perf_counter()
     module.rhs(0.0, [0.1] * (2 * n))
-    stages = {stage: seconds for stage, seconds in equations.seconds.items() if stage not in derivation}
     first_call = perf_counter() - start
-    own, compiler = done.user + done.system, done.children_user + done.children_system
+    stages = {stage: seconds for stage, seconds in equations.seconds.items() if stage not in derivation}
     cpu = {
-        "cpu of this process": own - busy.user - busy.system,
-        "cpu of the compiler": compiler - busy.children_user - busy.children_system,
+        "cpu of this process": done.user + done.system - busy.user - busy.system,
+        "cpu of the compiler": done.children_user + done.children_system - busy.children_user - busy.children_system,
     }
     return {**stages, "total": total, **cpu, "first call": first_call, "derive": sum(derivation.values())}
 
@@ -90,7 +64,7 @@ def run_double_pendulum_sympy() -> dict[str, float]:
     start = perf_counter()
     from scipy.integrate import solve_ivp
 
-    from .peers import pendulum_rhs
+    from .sympy_peer import pendulum_rhs
 
     imported = perf_counter()
     rhs = pendulum_rhs({"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 9.81})
@@ -107,7 +81,7 @@ def run_double_pendulum_pydy(generator: str) -> dict[str, float]:
     from pydy.codegen.ode_function_generators import generate_ode_function
     from scipy.integrate import odeint
 
-    from .peers import double_pendulum
+    from .sympy_peer import double_pendulum
 
     imported = perf_counter()
     kane = double_pendulum()
@@ -142,19 +116,5 @@ def run_double_pendulum_casadi() -> dict[str, float]:
     return {"import": imported - start, "derive": made - imported, "simulate": perf_counter() - made}
 
 
-TASKS: dict[str, Callable[..., Any]] = {
-    task.__name__: task
-    for task in (
-        derive_chain,
-        derive_chain_sympy,
-        derive_panda,
-        derive_panda_sympy,
-        compile_chain,
-        run_double_pendulum_sympy,
-        run_double_pendulum_pydy,
-        run_double_pendulum_casadi,
-    )
-}
-
 if __name__ == "__main__":
-    print(json.dumps(TASKS[sys.argv[1]](*json.loads(sys.argv[2]))))
+    print(json.dumps(globals()[sys.argv[1]](*json.loads(sys.argv[2]))))

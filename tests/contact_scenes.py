@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -140,3 +140,82 @@ def depths(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) ->
             gap = to_segment(p, *outline) - 0.03 if a == "segment" else to_polygon(p, outline)
             found.append(radius - gap)
     return found
+
+
+# -- a ball shot at a fixed shape: it flies on a known parabola, so that geometry alone says whether it touches --------
+#: Depth, relative to the thinner of the two, from which on the ball has to be turned.
+GRAZING = 0.02
+
+
+class Shot(NamedTuple):
+    """A ball and what it is shot at: parameters of the model, first velocities, seconds of flight."""
+
+    parameters: dict[str, float]
+    start: dict[str, float]
+    end: float
+    depth: float  #: of the parabola at most, relative to the thinner of the two; negative where it passes by
+
+
+def shot_model(kind: str) -> eg.Model:
+    """A ball in the plane and a fixed shape."""
+    m = eg.Model(f"shot_at_{kind}", gravity=(0, "-g", 0))
+    for name, value in (("g", 9.81), ("r", 0.05), ("size", 0.5), ("thin", 0.001), ("k", 1e6)):
+        m.parameter(name, value)
+    for name in ("wx", "wy", "wa"):
+        m.parameter(name, 0.0)
+    ball = m.body("ball", mass=1.0, inertia={"zz": "0.4*r**2"})
+    m.planar("j", m.ground, ball)
+    at = m.ground.at("wx", "wy", 0, rpy=(0, 0, "wa"))
+    shapes: dict[str, dict[str, Any]] = {
+        "circle": {"radius": "size/2"},
+        "segment": {"length": "size", "radius": "thin/2"},
+        "polygon": {"points": [("size/2", 0), (0, "thin/2"), ("-size/2", 0), (0, "-thin/2")]},
+    }
+    law = {"stiffness": "k", "exponent": 1.5}
+    m.contacts("wall", {"shape": "circle", "on": ball, "radius": "r"}, {"shape": kind, "on": at, **shapes[kind]}, law)
+    return m
+
+
+def shot(rng: np.random.Generator, kind: str) -> Shot:
+    """A random one, aimed at the shape or beside it; stiff enough that the ball comes back."""
+    r, size = 0.5 * 10 ** rng.uniform(-3, 0), 10 ** rng.uniform(-3, 0)
+    thin = size * (1.0 if kind == "circle" else 10 ** rng.uniform(-2, -0.3))
+    speed, g = 10 ** rng.uniform(-1, np.log10(50)), float(rng.choice((0.0, 9.81)))
+    distance, way = 10 ** rng.uniform(-0.5, 1) + r + size, rng.uniform(-np.pi, np.pi)
+    place = distance * np.array([np.cos(way), np.sin(way)])
+    aside = rng.uniform(-0.7, 0.7) * (r + 0.5 * size) * np.array([-np.sin(way), np.cos(way)])
+    time = distance / speed
+    velocity = (place + aside) / time + np.array([0.0, 0.5 * g * time])
+    fastest, soft = float(np.hypot(*velocity) + 2.0 * g * time), 0.2 * min(2.0 * r, r + 0.5 * thin)
+    k = max(1e3, 1.25 * fastest**2 / soft**2.5)  # k d^2.5 / 2.5 is the energy at 0.2 of the thickness
+    parameters = {"g": g, "r": r, "size": size, "thin": thin, "k": k, "wa": rng.uniform(-3, 3)}
+    parameters |= {"wx": float(place[0]), "wy": float(place[1])}
+    t = np.linspace(0.0, 1.5 * time, 400_001)
+    x, y = velocity[0] * t, velocity[1] * t - 0.5 * g * t * t
+    deepest = float((r - gaps(kind, parameters, x, y)).max())
+    start = {"j_x_dot": float(velocity[0]), "j_y_dot": float(velocity[1]), "j_3_dot": rng.uniform(-20, 20)}
+    return Shot(parameters, start, 1.5 * time, deepest / min(2.0 * r, thin))
+
+
+def gaps(kind: str, p: dict[str, float], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Distances of points from the shape, negative inside."""
+    c, s = np.cos(p["wa"]), np.sin(p["wa"])
+    u, v = np.abs(c * (x - p["wx"]) + s * (y - p["wy"])), np.abs(c * (y - p["wy"]) - s * (x - p["wx"]))
+    half, thin = 0.5 * p["size"], 0.5 * p["thin"]
+    if kind == "circle":
+        return np.asarray(np.hypot(u, v) - half)
+    if kind == "segment":
+        return np.asarray(np.hypot(np.maximum(u - half, 0.0), v) - thin)
+    length = np.hypot(half, thin)  # a quarter of a rhombus
+    along = np.clip(((half - u) * half + v * thin) / length**2, 0.0, 1.0)
+    outside = np.hypot(u - half + along * half, v - along * thin)
+    return np.where(u / half + v / thin < 1.0, -outside, outside)
+
+
+def turned(module: Any, one: Shot, method: str) -> float:
+    """How much the ball was turned, relative to its speed."""
+    run = module.bind(p=one.parameters).simulate((0, one.end), initial=one.start, method=method)
+    end = np.array([run["j_x_dot"][-1], run["j_y_dot"][-1]])
+    free = np.array([one.start["j_x_dot"], one.start["j_y_dot"] - one.parameters["g"] * one.end])
+    speed = max(np.hypot(one.start["j_x_dot"], one.start["j_y_dot"]), np.hypot(*free))
+    return float(np.hypot(*(end - free)) / speed)

@@ -10,10 +10,9 @@ import numpy as np
 
 import eomgen as eg
 
-from ..measure import ROOT
+from ..harness import ROOT
 
 HERE = Path(__file__).parent
-EXAMPLES = ROOT / "examples"
 REFERENCE = ROOT / "tests" / "reference"
 
 #: Arms of which every parameter is a symbol, as papers on the dynamics of robots count their operations.

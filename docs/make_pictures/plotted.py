@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -249,18 +248,19 @@ def forms() -> Any:
 @picture
 def comparison_robots() -> Any:
     """Times of forward dynamics, from the last measurement."""
-    results = DOCS.parent / "benchmarks" / "results" / "rhs.json"
-    measured = json.loads(results.read_text(encoding="utf-8"))["measured"]
+    text = (DOCS.parent / "benchmarks" / "results.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+) \| ([^|]+) \| [\d,]* \| ([\d,]+) \|", text.partition("\n## rhs: ")[2], re.MULTILINE)
+    found = {(robot, who): float(ns.replace(",", "")) for robot, who, ns in rows}
     robots = ("UR5", "Panda", "ANYmal", "Talos")
     tools = {
-        "eomgen": ("eomgen, default",),
-        "CasADi": ("CasADi, articulated bodies, default", "CasADi, composite bodies, default"),
+        "eomgen": ("eomgen",),
+        "CasADi": ("CasADi, articulated bodies", "CasADi, composite bodies"),
         "MuJoCo": ("MuJoCo",),
         "Pinocchio (Python)": ("Pinocchio, from Python",),
     }
     figure, ax = panels(size=(7.5, 3))
-    for tool, rows in tools.items():
-        best = [min(measured[robot]["ns"][row]["best"] for row in rows) for robot in robots]
+    for tool, names in tools.items():
+        best = [min(found[robot, name] for name in names) for robot in robots]
         ax.plot(best, robots, "o", markersize=9, label=tool)
     ax.set(xscale="log", xlabel="one evaluation of forward dynamics (ns, logarithmic)")
     ax.margins(y=0.2)

@@ -96,12 +96,12 @@ class Limits:
     #: up to 36 entries, which as text take some 10 kB, against 1 kB a body of one direction
     jacobian_pairs: int = 64
     statements: int = 1500  #: statements in one generated function at most
-    #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open
+    #: Functions of more operations go through alike bodies in loops.  Measured (benchmark big_trees) on open
     #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
     #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
     rolled: int = 16_000
     #: The same where all functions together are longer than ``long``, so that they take long to compile.  Measured
-    #: (benchmarks/tracks.py) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
+    #: (benchmark tracks) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
     rolled_of_long: int = 2_500
     long: int = 50_000
     #: Functions of mechanisms with more first-order states go through these in loops too, whatever their length.

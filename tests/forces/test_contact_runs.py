@@ -16,7 +16,6 @@ from scipy.integrate import solve_ivp
 from sweeps import part_of
 
 import eomgen as eg
-from benchmarks.short_contacts import GRAZING, judge, model, shot
 
 COMPILED = ("DOP853", "RK45", "Radau")
 SPEED = 20.0
@@ -74,12 +73,12 @@ def test_derivatives_of_a_run_pass_over_no_contact() -> None:
 
 @pytest.mark.parametrize("kind", part_of(["circle", "segment", "polygon"], ("segment",).__contains__))
 def test_random_shots_are_turned_where_they_touch(kind: str) -> None:
-    module, rng, touched = model(kind).compile(optimize=0), np.random.default_rng(11), 0
+    module, rng, touched = scenes.shot_model(kind).compile(optimize=0), np.random.default_rng(11), 0
     for k in range(35):
-        one = shot(rng, kind)
-        turned, _ = judge(module, one, COMPILED[k % 3])
-        touched += one.depth > GRAZING
-        assert turned > 1e-6 if one.depth > GRAZING else one.depth > 0 or turned < 1e-6, (k, one)
+        one = scenes.shot(rng, kind)
+        turned = scenes.turned(module, one, COMPILED[k % 3])
+        touched += one.depth > scenes.GRAZING
+        assert turned > 1e-6 if one.depth > scenes.GRAZING else one.depth > 0 or turned < 1e-6, (k, one)
     assert touched > 25
 
 

@@ -14,7 +14,7 @@ from models import EXAMPLES
 from sweeps import part_of
 
 import eomgen as eg
-from benchmarks.large_loops import closed_chain, four_bars
+from benchmarks.models.linkages import closed_chain, four_bars
 
 # -- Models ------------------------------------------------------------------------------------------------------------
 LOOPS = ["offset_slider_crank", "powered_slider_crank", "spatial_loop"]

@@ -12,7 +12,7 @@ from refusals import refused, refuses
 from sweeps import TARGETS, part_of
 
 import eomgen as eg
-from benchmarks.linkages import n_four_bar
+from benchmarks.models.linkages import n_four_bar
 
 
 # -- Counts ------------------------------------------------------------------------------------------------------------

@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 from sweeps import TARGETS
 
 import eomgen as eg
-from benchmarks.four_bars import FACTOR, TIMES, Motion, compare
-from benchmarks.linkages import n_four_bar
+from benchmarks.calls import FACTOR, compare
+from benchmarks.models.linkages import TIMES, Motion, n_four_bar
 
 # -- Bricard -----------------------------------------------------------------------------------------------------------
 NAMES = ("x3", "y3", "z3", "x4", "y4", "z4", "angle1", "angle2", "angle3", "angle4", "angle5")
