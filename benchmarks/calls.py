@@ -386,11 +386,11 @@ def aba_of(names: tuple[str, ...], branches: int, q: np.ndarray, v: np.ndarray) 
 def big_trees(report: Report, quick: bool) -> None:
     """Up to 1,600 bodies: derived, compiled, called, beside straight-line text and Pinocchio."""
     rows: list[list[Any]] = []
-    cases = [("spatial chain", lambda n: closed_chain(n, False, True), n, 1)
+    chains = [("spatial chain", lambda n: closed_chain(n, False, True), n, 1)
              for n in ((16, 50) if quick else (16, 50, 100, 200, 400, 800, 1600))]  # fmt: skip
     with cold_cache():
         tree(2).derive().compile(kernels=["rhs"])  # compiles what all models share
-        for what, make, n, branches in [*cases, ("ternary tree", tree, 40 if quick else 400, 3)]:
+        for what, make, n, branches in [*chains, ("ternary tree", tree, 40 if quick else 400, 3)]:
             model = make(n)
             equations, derive = spent(lambda model=model: model.derive("recursive"))
             module, seconds = spent(lambda equations=equations: equations.compile(kernels=["rhs"]))

@@ -204,7 +204,7 @@ class Robot:
         about = np.asarray(body.inertia) + body.mass * (c @ c * np.eye(3) - np.outer(c, c))
         return ca.SX(body.mass), ca.SX(ca.DM(body.mass * c)), ca.SX(ca.DM(about))
 
-    def carried(self, k: int, motion: tuple[Any, Any]) -> tuple[Any, Any]:
+    def moved_to(self, k: int, motion: tuple[Any, Any]) -> tuple[Any, Any]:
         """Acceleration of the parent as the link's origin has it, with the velocity products added."""
         angular, linear = motion
         R = self.turn[k].T
@@ -233,7 +233,7 @@ def inverse_dynamics(robot: Robot, a: Any) -> Any:
     wrenches: list[tuple[Any, Any]] = []
     for k in links:
         above = motions[robot.parent(k)] if robot.parent(k) >= 0 else (ca.SX.zeros(3), robot.gravity)
-        angular, linear = robot.carried(k, above)
+        angular, linear = robot.moved_to(k, above)
         for c, column in enumerate(robot.columns[k]):
             rate = a[robot.first(k) + c]
             angular, linear = angular + column[:3] * rate, linear + column[3:] * rate
@@ -256,7 +256,7 @@ def composite(robot: Robot, forces: Any) -> Any:
     wrenches: list[tuple[Any, Any]] = []
     for k in links:
         above = motions[robot.parent(k)] if robot.parent(k) >= 0 else (ca.SX.zeros(3), robot.gravity)
-        motions.append(robot.carried(k, above))
+        motions.append(robot.moved_to(k, above))
         wrenches.append(_add(_times(robot.inertia(k), *motions[k]), robot.load(k)))
     right = [forces[i] for i in range(n)]
     bodies = [robot.inertia(k) for k in links]
@@ -344,7 +344,7 @@ def articulated(robot: Robot, forces: Any) -> Any:
     motions: list[tuple[Any, Any]] = []
     for k in links:
         above = motions[robot.parent(k)] if robot.parent(k) >= 0 else (ca.SX.zeros(3), robot.gravity)
-        motion = robot.carried(k, above)
+        motion = robot.moved_to(k, above)
         for i, column, u, inverse, left in reversed(released[k]):
             result[i] = inverse * (left - ca.dot(u[0], motion[0]) - ca.dot(u[1], motion[1]))
             motion = motion[0] + column[:3] * result[i], motion[1] + column[3:] * result[i]

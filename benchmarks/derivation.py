@@ -41,8 +41,8 @@ PATIENCE = 12.0  #: (s) a peer's derivation that takes longer is measured once
 def derive(report: Report, quick: bool) -> None:
     """In fresh processes, eomgen and SymPy in turns."""
     rows: list[list[Any]] = []
-    cases = [("3 links", "chain", 3)] if quick else [(f"{n} links", "chain", n) for n in (5, 10, 20)]
-    for name, model, size in cases if quick else [*cases, ("Panda", "panda", 0)]:
+    chains = [("3 links", "chain", 3)] if quick else [(f"{n} links", "chain", n) for n in (5, 10, 20)]
+    for name, model, size in chains if quick else [*chains, ("Panda", "panda", 0)]:
         sizes, counted = [size] if size else [], 0 < size <= 10
         tasks = {f"eomgen {form}": partial(in_fresh_process, "derive", model, sizes, form) for form in FORMS}
         best = "SymPy, absolute angles" if size else "SymPy"

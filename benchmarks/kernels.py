@@ -18,7 +18,7 @@ from eomgen.toolchain.compiler import Options, compile_flags, find_compiler
 from .harness import ROOT
 
 HERE = Path(__file__).parent
-#: Puts CasADi's ``f(x, u)`` behind the interface; its work array is not asked for its size.
+#: Puts CasADi's ``f(x, u)`` behind the interface; its work array has room for all.
 CASADI = """
 static double casadi_work[1000000];
 int kernel(double t, const double *x, const double *u, const double *c, double *out, double *w)
@@ -96,7 +96,7 @@ def of_module(module: Any, name: str, x: Any, u: Any = None) -> Kernel:
 
 
 def of_casadi(source: str, x: Any, n_out: int, u: Any = (), flags: Sequence[str] | None = None) -> Kernel:
-    """CasADi's C text of ``f(x, u)``; what it writes beyond the n_out results that count has room."""
+    """CasADi's C text of ``f(x, u)``; what it writes beyond the n_out results that count is lost."""
     library = compile_text(source + CASADI, flags)
     return Kernel(library.kernel, x, n_out, u)
 

@@ -177,7 +177,7 @@ def integrate(report: Report, quick: bool) -> None:
         "The hand-written loop calls the same compiled right-hand side and stores one state; ratios are of best times.",
         "simulate stores every step, projects the states and makes a trajectory; one step shows the least that costs.",
         f"Each turn takes the best of {IN_A_ROW} runs in a row: the first of them finds cold caches.",
-        "At equal error ours are integrators held ready, as heyoka's is; simulate starts from nothing.",
+        "At equal error ours are integrators made ready, as heyoka's is; simulate starts from nothing.",
         f"Errors and times at equal error: means of logarithms over {STARTS} starts, one may be lucky at a tolerance;",
         f"times on the line through those of the tolerances, four a decade, whose error is within {DECADES} decades.",
         "heyoka is given our right-hand side as it is, its parameters as numbers; ours are variable.",
@@ -194,7 +194,7 @@ def race(
     given = [(x0, heyoka_exact(equations, x0, end)) for x0 in starts]
     theirs, seconds = spent(lambda: {tolerance: Heyoka(equations, tolerance) for tolerance in TOLERANCES[n]})
 
-    def held(method: str, tolerance: float) -> Callable[[np.ndarray], np.ndarray]:
+    def integrator(method: str, tolerance: float) -> Callable[[np.ndarray], np.ndarray]:
         go = module.integrator(method=method, rtol=max(tolerance, 3e-14), atol=tolerance / 100)
         return lambda x0: go(0.0, x0, end)
 
@@ -203,7 +203,7 @@ def race(
         return lambda x0: np.asarray(module.simulate((0.0, end), x0, **options).x[:, -1])
 
     ways = {
-        "DOP853": partial(held, "DOP853"), "Taylor": partial(held, "Taylor"),
+        "DOP853": partial(integrator, "DOP853"), "Taylor": partial(integrator, "Taylor"),
         "heyoka": lambda tolerance: partial(theirs[tolerance], end=end), "simulate": simulate,
     }  # fmt: skip
     runs = {(who, tolerance): make(tolerance) for who, make in ways.items() for tolerance in TOLERANCES[n]}
@@ -418,13 +418,13 @@ def ensembles(report: Report, quick: bool) -> None:
 
     exact = many(THREADS, rtol=1e-13, atol=1e-14)
     mine, series, one = f"eomgen, {THREADS} threads", f"eomgen, Taylor, {THREADS} threads", "eomgen, 1 thread"
-    hand, alone, scipy = f"4 lanes by hand, {THREADS} threads", "4 lanes by hand, 1 thread", "solve_ivp, every 50th"
+    hand, by_one, scipy = f"4 lanes by hand, {THREADS} threads", "4 lanes by hand, 1 thread", "solve_ivp, every 50th"
     actions: dict[str, Callable[[], Any]] = {
         mine: lambda: many(THREADS, **tight),
         series: lambda: many(THREADS, method="Taylor", **tight),
         hand: pendulum_lanes(x, THREADS, end, **tight),
         one: lambda: many(1, **tight),
-        alone: pendulum_lanes(x, 1, end, **tight),
+        by_one: pendulum_lanes(x, 1, end, **tight),
         scipy: loop,
     }
     heyoka: list[str] = []
@@ -455,7 +455,7 @@ def ensembles(report: Report, quick: bool) -> None:
     if not quick:
         report.least("over a loop of solve_ivp", best[mine] / best[scipy], 600.0)
         report.least("over 4 lanes by hand", best[mine] / best[hand], 0.85)
-        report.least("over 4 lanes by hand, one thread", best[one] / best[alone], 0.85)
+        report.least("over 4 lanes by hand, one thread", best[one] / best[by_one], 0.85)
         for who in heyoka:
             report.least(f"over {who}", max(best[mine], best[series]) / best[who], 1.8)
     report.note(
@@ -615,15 +615,15 @@ def judge(family: str, number: int) -> Case:
 @benchmark("equilibria", "random stiff and soft equilibria, by us, by plain Newton and by SciPy's hybr and lm")
 def equilibria(report: Report, quick: bool) -> None:
     """Every family, each from one start."""
-    cases = {family: [judge(family, k) for k in range(4 if quick else 30)] for family in FAMILIES}
+    judged = {family: [judge(family, k) for k in range(4 if quick else 30)] for family in FAMILIES}
     rows: list[list[Any]] = []
-    for family, own in cases.items():
+    for family, own in judged.items():
         lost, times = sum(not case.ours and any(case.peers) for case in own), [1e3 * case.seconds for case in own]
         rows.append([family, len(own), *map(sum, zip(*(case.peers for case in own), strict=True)),
                      sum(case.ours for case in own), lost, np.median(times), max(times)])  # fmt: skip
     report.table("equilibria", ("family", "cases", *PEERS, "ours", "lost", "median ms", "longest ms"), rows)
     report.most("lost", sum(row[6] for row in rows), 0)
-    wrong = sum(not case.agrees for own in cases.values() for case in own)
+    wrong = sum(not case.agrees for own in judged.values() for case in own)
     report.most("stability that the stiffness contradicts", wrong, 0)
     report.note(
         "Newton with whole steps, SciPy's hybr and lm solve the bare equations of balance from the same start.",

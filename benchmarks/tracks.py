@@ -199,8 +199,8 @@ def by_mujoco(model: Any, module: Any, seconds: float, speeds: Speeds, step: flo
         mujoco.mj_step(world, data)
         most = max(most, data.ncon)
         rates.append(float(data.qvel[rate]))
-    spent_ = process_time() - start
-    return np.array(rates), [spent_, float(data.qpos[x]), most, -float(data.contact.dist.min())]
+    cpu = process_time() - start
+    return np.array(rates), [cpu, float(data.qpos[x]), most, -float(data.contact.dist.min())]
 
 
 @benchmark("rigid_tracks", "the tracked excavator with rigid contact, beside MuJoCo")
