@@ -1,1 +1,1 @@
-"""Benchmarks: eomgen timed beside SymPy in one run; ``python -m benchmarks.run [names] [--quick]``."""
+"""Measurements beside other programs: functions that ``harness.benchmark`` registers, run by ``benchmarks.run``."""
