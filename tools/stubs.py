@@ -12,8 +12,8 @@ from pathlib import Path
 
 from eomgen.elements.element_type import ElementType
 from eomgen.model import element_methods
-from eomgen.model.element_methods import ElementMethods, tables
-from eomgen.model.methods import arguments_of, documentation_of
+from eomgen.model.element_methods import ElementMethods, methods
+from eomgen.model.methods import RESULTS, arguments_of, documentation_of
 
 HOME = Path(element_methods.__file__).with_suffix(".pyi")
 _HEAD = '''# Written by python tools/stubs.py from the tables of types.
@@ -22,11 +22,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
-from .handles import ConstraintHandle, Described, ForceHandle, JointHandle
+from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 
 def tables() -> dict[str, dict[str, ElementType]]: ...
+def methods() -> dict[str, list[ElementType]]: ...
 
 class ElementMethods(Described):
     def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
@@ -38,10 +39,7 @@ class ElementMethods(Described):
 def stub() -> str:
     """The text of element_methods.pyi."""
     text = _HEAD.format(_summary(ElementMethods.joint.__doc__ or ""))
-    for section, types in tables().items():
-        for found in types.values():
-            text += _method(section, found)
-    return text
+    return text + "".join(_method(section, found) for section, types in methods().items() for found in types)
 
 
 def _method(section: str, found: ElementType) -> str:
@@ -57,7 +55,7 @@ def _method(section: str, found: ElementType) -> str:
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
-    result = {"joints": "JointHandle", "forces": "ForceHandle", "constraints": "ConstraintHandle"}.get(section, "None")
+    result = RESULTS[section][0].replace("sympy.Symbol", "Any") if section in RESULTS else "None"
     parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument
     parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
     text = f"def\0{found.name}({' '.join(parts)}"

@@ -238,6 +238,7 @@ def expressions(self: Field, value: Any, visitor: Any) -> Any:
 class Text(Field):
     """A text."""
 
+    argument, annotation = "str", "str"
     schema = _TEXT
     read = by("text")
 
@@ -248,8 +249,6 @@ class Unit(Text):
 
 class Latex(Text):
     """The LaTeX of a symbol, such as \\theta_1."""
-
-    argument, annotation = "str", "str"
 
     def map(self, value: Any, visitor: Any) -> Any:
         if isinstance(value, Mapping):
@@ -333,6 +332,7 @@ class Flag(Field):
 class Check(Field):
     """True or false, error, note or off."""
 
+    argument, annotation = "bool or {'error', 'note', 'off'}", "bool | str"
     schema = enum(True, False, *CHECKS)
     read = by("check_word")
 
@@ -340,19 +340,21 @@ class Check(Field):
 class Times(Field):
     """True, false or a whole number greater than 0."""
 
+    argument, annotation = "bool or int", "bool | int"
     schema = any_of({"type": "boolean"}, {"type": "integer", "minimum": 1})
 
 
 class Sign(Field):
     """1, -1 or 0."""
 
+    argument, annotation = "{0, 1, -1}", "int"
     schema = enum(1, -1, 0)
 
 
 class Number(Field):
     """A number."""
 
-    argument, annotation = "float", "float"
+    argument, annotation = "float", "Value"
     schema = _NUMBER
     read = by("number")
 
@@ -524,6 +526,7 @@ class Matrix6(Scalars):
 class Rates(Field):
     """A mapping of names to expressions."""
 
+    argument, annotation = "mapping", "Mapping[Any, Value]"
     schema = _mapping(ref("expression"))
 
     def map(self, value: Any, visitor: Any) -> Any:
@@ -544,7 +547,6 @@ class CoordinateForces(Rates):
 class Factors(Rates):
     """A mapping of coordinates to numbers or expressions."""
 
-    argument, annotation = "mapping", "Mapping[Any, Value]"
     schema = _mapping(ref("expression"), minProperties=1)
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
@@ -591,7 +593,7 @@ class Wheels(Field):
 class Inertia(Wheels):
     """[xx, yy, zz], a 3 x 3 tensor, or a mapping of xx yy zz xy xz yz."""
 
-    argument, annotation = "scalar", "Value"
+    argument, annotation = "sequence of three, 3 x 3 tensor or mapping", "Any"
     names = ("xx", "yy", "zz", "xy", "xz", "yz")
     schema, defines = define(
         "inertia",
@@ -676,12 +678,16 @@ PLACED: Fields = {"body": Name("a body or ground", required=True), **MARKER}
 class Markers(Field):
     """A mapping of marker names to [x, y, z] or {at, rpy}."""
 
+    argument, annotation = "mapping", "Mapping[str, Any]"
     schema, defines = define("markers", _mapping(ref("placement"), propertyNames=ref("name")))
     parts = MARKER
 
     def part(self, words: Sequence[str]) -> Field | None:
         """A marker may be written as its position alone."""
         return super().part(words) or MARKER["at"]
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return refer.markers(value)
 
     def map(self, value: Any, visitor: Any) -> Any:
         pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
@@ -880,6 +886,7 @@ def _each_limit(doc: str) -> Schema:
 class About(Field):
     """Com, origin, a marker of the body or [x, y, z]."""
 
+    argument, annotation = "str or sequence of three", "Any"
     schema = any_of(ref("reference"), ref("vector"))
 
     def map(self, value: Any, visitor: Any) -> Any:
@@ -889,6 +896,7 @@ class About(Field):
 class BodyParts(Field):
     """A list of mappings with places in the body."""
 
+    argument, annotation = "sequence of mappings", "Sequence[Mapping[str, Any]]"
     words = ("type", "axis", "subtract", "file", "shape")  #: keys that are words, not scalars
 
     def map(self, value: Any, visitor: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A method for every type in the tables; element_methods.pyi lists them."""
+"""A method for every type in the tables, and for every section of single entries; element_methods.pyi lists them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..elements.constraints import CONSTRAINTS
 from ..elements.element_type import ElementType
 from ..elements.forces import FORCES
 from ..elements.joints import JOINTS
-from .fields import joint_type
+from .fields import BODY, EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE, joint_type
 from .handles import Described, JointHandle, References
 from .methods import method_of
 
@@ -17,6 +17,52 @@ from .methods import method_of
 def tables() -> dict[str, dict[str, ElementType]]:
     """Section -> its types, those that were added to the tables after eomgen's own among them."""
     return {"joints": {name: joint_type(name) for name in JOINTS}, "forces": FORCES, "constraints": CONSTRAINTS}
+
+
+#: Section of single entries -> the method that adds one, and its keys in the order of arguments.
+ENTRIES = {
+    "parameters": ElementType("parameter", "a parameter: a constant that can change between runs.", PARAMETER),
+    "inputs": ElementType(
+        "input",
+        "an input, a quantity that is given over time.  Runs that give none take its signal; calls of the module's own "
+        "functions take its value.",
+        INPUT,
+    ),
+    "outputs": ElementType(
+        "output",
+        "an output: a named result of the model.  It may repeat a coordinate if the expression is that coordinate.",
+        OUTPUT_FIELDS,
+    ),
+    "states": ElementType(
+        "state",
+        "a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds.  Its rate "
+        "is ``<name>_dot``.",
+        {key: STATE[key] for key in ("rate", "initial", "unit", "doc", "latex")},
+    ),
+    "events": ElementType(
+        "event",
+        "an event: runs find the time where an expression becomes zero, and can stop or reset the state there.  The "
+        "times are in ``Trajectory.t_events[name]``.  With a restitution the expression is a gap between bodies: where "
+        "it closes an impact opens it again, this much slower, with impulses that obey all joints.",
+        EVENT,
+    ),
+    "bodies": ElementType(
+        "body",
+        "a rigid body.  Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in the "
+        'equations.  Solids are mappings ``{"type": "box", "size": (a, b, c), "density": rho, "at": (x, y, z), "rpy": '
+        f'(r, p, y)}}`` of the types {", ".join(SOLID)}; ``"subtract": True`` makes a hole.  Points are ``{{"mass": m, '
+        '"at": (x, y, z)}``.  Markers are positions, ``{"tip": (l, 0, 0)}``, or mappings of what '
+        ":meth:`.BodyHandle.marker` takes.",
+        BODY,
+    ),
+}
+
+
+def methods() -> dict[str, list[ElementType]]:
+    """Section -> what its methods add."""
+    return {section: [one] for section, one in ENTRIES.items()} | {
+        s: [*types.values()] for s, types in tables().items()
+    }
 
 
 class ElementMethods(Described):
@@ -67,6 +113,6 @@ class _Unmade:
         return method if model is None else MethodType(method, model)
 
 
-for _section, _types in tables().items():
-    for _found in _types.values():
+for _section, _types in methods().items():
+    for _found in _types:
         setattr(ElementMethods, _found.name, _Unmade(_section, _found))

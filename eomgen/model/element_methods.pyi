@@ -4,37 +4,60 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
-from .handles import ConstraintHandle, Described, ForceHandle, JointHandle
+from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 
 def tables() -> dict[str, dict[str, ElementType]]: ...
+def methods() -> dict[str, list[ElementType]]: ...
 
 class ElementMethods(Described):
     def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
         """Add a joint of any type."""
     def _method(self, name: str) -> Any: ...
+    def parameter(self, name: str, value: Value = None, unit: str | None = None, doc: str | None = None,
+        latex: str | None = None) -> Any:
+        """Add a parameter: a constant that can change between runs."""
+    def input(self, name: str, value: Value = 0.0, unit: str | None = None, doc: str | None = None,
+        signal: Value = None, latex: str | None = None) -> Any:
+        """Add an input, a quantity that is given over time."""
+    def output(self, name: str, expression: Value, unit: str | None = None, doc: str | None = None,
+        latex: str | None = None) -> None:
+        """Add an output: a named result of the model."""
+    def state(self, name: str, rate: Value = None, initial: Value = 0.0, unit: str | None = None,
+        doc: str | None = None, latex: str | None = None) -> Any:
+        """Add a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds."""
+    def event(self, name: str, expression: Value, terminal: bool | int | None = None, direction: int = 0,
+        reset: Mapping[Any, Value] | None = None, restitution: Value = None, doc: str | None = None,
+        friction: Value = None, slip: Any = None) -> None:
+        """Add an event: runs find the time where an expression becomes zero, and can stop or reset the state there."""
+    def body(self, name: str, mass: Value = None, com: Sequence[Value] | None = None, inertia: Any = None,
+        principal: Sequence[Value] | None = None, first_moment: Sequence[Value] | None = None, about: Any = None,
+        axes: Sequence[Value] | None = None, solids: Sequence[Mapping[str, Any]] | None = None,
+        points: Sequence[Mapping[str, Any]] | None = None, check_inertia: bool | str | None = None,
+        markers: Mapping[str, Any] | None = None, display: Sequence[Mapping[str, Any]] | None = None) -> BodyHandle:
+        """Add a rigid body."""
     def revolute(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None,
+        dry_friction: Value = None, armature: Value = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
         closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type revolute: S turns about the common z axis; the origins coincide."""
     def continuous(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None,
+        dry_friction: Value = None, armature: Value = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
         closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type continuous: A revolute joint without limits, as URDF calls it."""
     def prismatic(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None,
+        dry_friction: Value = None, armature: Value = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
         closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type prismatic: S slides along the common z axis without turning."""
     def screw(self, name: str, predecessor: Any, successor: Any, pitch: Value,
         axis: str | Sequence[float] | None = None, coordinate: Any = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None, dry_friction: float | None = None, armature: Value = None,
+        limits: Mapping[str, float] | None = None, dry_friction: Value = None, armature: Value = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
         closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type screw: S turns about the common z axis and slides along it by ``pitch`` (m) per turn."""
@@ -72,10 +95,10 @@ class ElementMethods(Described):
         stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type translational: S slides along x, y and z of P without turning."""
     def curve_slider(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value], coordinate: Any = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
-        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
+        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None, dry_friction: Value = None,
+        armature: Value = None, latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None,
+        opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type curve_slider: The origin of S slides along a curve of P, without turning: a bead on a
         wire."""
     def surface_slider(self, name: str, predecessor: Any, successor: Any, surface: Sequence[Value],

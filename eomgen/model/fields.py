@@ -45,24 +45,27 @@ PARAMETER: Fields = {
 }
 INPUT: Fields = {
     "value": k.Number("value as long as a call gives none", default=0.0),
+    "unit": _UNIT,
+    "doc": _DOC,
     "signal": k.Scalar(
         "value over time, in runs that give none: of t, coordinates, velocities, parameters", level=k.MOTION
     ),
-    "unit": _UNIT,
-    "doc": _DOC,
     "latex": _LATEX,
 }
 OUTPUT_FIELDS: Fields = {
     "expression": k.Scalar(
-        "the result: of t, parameters, inputs, coordinates, rates, markers", required=True, level=k.OUTPUT
+        "the result: of t, parameters, inputs, coordinates, rates, the motion of markers, other outputs",
+        required=True,
+        level=k.OUTPUT,
     ),
-    "unit": _UNIT,
+    "unit": _UNIT.replace(doc="unit in which the result is given; without one it is in SI units"),
     "doc": _DOC,
     "latex": _LATEX,
 }
 STATE: Fields = {
     "rate": k.Scalar(
-        "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
+        "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers, "
+        "outputs of these, what force elements do",
         level=k.LAW,
     ),
     "sampled": k.Scalar(
@@ -70,8 +73,8 @@ STATE: Fields = {
         level=k.LAW,
     ),
     "period": k.Scalar("time from one sampling time to the next (s)", dimension=TIME),
-    "offset": k.Scalar("a sampling time (s)", default=0, dimension=TIME),
-    "initial": k.Scalar("its value where a run begins", default=0),
+    "offset": k.Scalar("a sampling time (s)", default=0.0, dimension=TIME),
+    "initial": k.Scalar("its value where a run begins, of parameters", default=0.0),
     "unit": k.Unit("unit of the state; an initial value that is a number is converted to SI", default=""),
     "doc": _DOC,
     "latex": _LATEX,
@@ -84,11 +87,17 @@ EVENT: Fields = {
     ),
     "terminal": k.Times("whether the event ends the run, or how many do", default=False),
     "direction": k.Sign("1: only where it rises, -1: only where it falls, 0: both", default=0),
-    "reset": k.Rates("new coordinates and velocities, from those before the event", default=(), level=k.OUTPUT),
+    "reset": k.Rates(
+        "new coordinates and velocities, all from those before the event; they are brought back onto the constraints",
+        default=(),
+        level=k.OUTPUT,
+    ),
     "restitution": k.Number("for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
-    "friction": k.Number("beside a restitution: Coulomb's coefficient of friction in the impact"),
-    "slip": k.SomeNames("beside friction: the output that is the sliding velocity; in space two of them"),
     "doc": _DOC,
+    "friction": k.Number("beside a restitution: Coulomb's coefficient of friction in the impact"),
+    "slip": k.SomeNames(
+        "beside friction: the output that is the sliding velocity; in space two, along directions at right angles"
+    ),
 }
 FUNCTION: dict[str, Fields] = {
     "table": {
@@ -157,20 +166,26 @@ BODY: Fields = {
     "mass": k.Scalar("mass (kg); 0 for a body without mass", dimension=MASS),
     "com": k.Vector("centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "inertia": k.Inertia(
-        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say",
+        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say; of a mapping what is "
+        "missing is 0, and products have the tensor's own sign; one moment alone is that of a body moving in a plane",
         default=(0, 0, 0),
         dimension=MOMENT_OF_INERTIA,
     ),
-    "markers": k.Markers("named frames fixed in the body", default=()),
-    "principal": k.Vector("principal moments (kg m^2), instead of inertia", dimension=MOMENT_OF_INERTIA),
+    "principal": k.Vector("principal moments (kg m^2) along axes, instead of inertia", dimension=MOMENT_OF_INERTIA),
     "first_moment": k.Vector(
         "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
     ),
-    "about": k.About("point of the inertia; a marker gives its axes too", default="com", dimension=LENGTH),
+    "about": k.About(
+        "point that inertia or principal is about; a marker gives its axes too", default="com", dimension=LENGTH
+    ),
     "axes": k.Vector("roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
     "solids": Solids("solids of uniform density, which give mass, com, inertia", default=()),
     "points": k.Points("point masses that are added", default=()),
-    "check_inertia": k.Check("a mass and inertia that no body can have: as in the model, unless given"),
+    "check_inertia": k.Check(
+        "a mass and inertia that no body can have: refused (error, true), noted (note) or taken in silence (off, "
+        "false); as in the model unless given"
+    ),
+    "markers": k.Markers("named frames fixed in the body, known as body.name", default=()),
     "display": k.Display("shapes for pictures, in body axes", default=()),
 }
 GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}

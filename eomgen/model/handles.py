@@ -385,18 +385,6 @@ class BodyHandle(MarkerHandle):
         return MarkerHandle(self.model, f"{self.name}.{name}")
 
 
-def placed_markers(given: Any) -> Any:
-    """Markers by name as :meth:`BodyHandle.marker` keeps them; what is no mapping is left as it is."""
-    if not isinstance(given, Mapping):
-        return given
-    found = []
-    for name, place in given.items():
-        if isinstance(place, Mapping):
-            place = {**place, **_turned(place.get("axes"), place.get("matrix"))}
-        found.append((name, place))
-    return found
-
-
 def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
     """Keys of a place for axes and matrix, those that are given."""
     rows = None if matrix is None else items(matrix)
@@ -545,6 +533,13 @@ class References(NamedTuple):
         if isinstance(value, MarkerHandle):
             raise ill_placed(f"{value.label} is a body or marker; a joint or a coordinate is expected")
         return self._own(value).name if isinstance(value, JointHandle) else value
+
+    def markers(self, given: Any) -> Any:
+        """Markers by name, their axes as a model file writes them; what is no mapping is left as it is."""
+        if not isinstance(given, Mapping):
+            return given
+        turned = {n: _turned(x.get("axes"), x.get("matrix")) for n, x in given.items() if isinstance(x, Mapping)}
+        return {name: {**x, **turned[name]} if name in turned else x for name, x in given.items()}
 
     def _own(self, handle: Any) -> Any:
         if handle.model is self.model:

@@ -17,12 +17,20 @@ from ..elements.element_type import ElementType
 from ..elements.joints import JOINTS
 from ..elements.kinds import Field, Law, items
 from ..errors import UsageError, at_odds, ill_typed, no_such
-from .handles import ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
+from .description import DescribedEntry
+from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
 from .names import nearest
+from .sympy_face import symbol
 
 Method = TypeVar("Method", bound=Callable[..., Any])
-#: Section -> what its methods return.
+#: Section of elements -> what its methods return.
 _HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
+#: Section -> what its methods return, and how it follows from the model and the entry; of others nothing.
+RESULTS: dict[str, tuple[str, Callable[[Described, DescribedEntry], Any]]] = {
+    **{section: (handle.__name__, handle) for section, handle in _HANDLES.items()},
+    **dict.fromkeys(("parameters", "inputs", "states"), ("sympy.Symbol", lambda model, entry: symbol(entry.name))),
+    "bodies": ("BodyHandle", lambda model, entry: BodyHandle(model, entry.name, entry)),
+}
 _WIDTH = 108  #: of the text of a method's documentation
 
 
@@ -50,7 +58,9 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
     kind, annotation = field.described, field.annotation
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
     default: Any = field.default if type(field.default) in (int, float) else None
-    if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
+    if (
+        isinstance(field.default, (str, bool)) and field.default != ""
+    ):  # which is no default of the method: given, it may contradict the rest
         doc = f"{doc} Default: {str(field.default).lower()}."
     anywhere = {"joint", "between"} <= {*found.one_of}
     if field.required and (anywhere or not later):  # what follows *between is given by its keyword
@@ -113,11 +123,11 @@ def documentation_of(section: str, found: ElementType) -> str:
         needed = found.keys[one.key].required or one.name in ("on", "*between")
         lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
         lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
-    return "\n".join(lines + (["", "Returns", "-------", _HANDLES[section].__name__] if section in _HANDLES else []))
+    return "\n".join(lines + (["", "Returns", "-------", RESULTS[section][0]] if section in RESULTS else []))
 
 
 def method_of(section: str, found: ElementType) -> Callable[..., Any]:
-    """The method that adds an element of a type to its section of a description; of a joint, it returns the handle."""
+    """The method that adds an entry to a section of a description, an element of a type."""
     signature, every = signature_of(found), arguments_of(found)
     allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
     required = [one.name for one in every if one.default is Parameter.empty]
@@ -128,17 +138,22 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
         if anywhere:
             args = _take_value(required, args, keys)
         try:
-            bound = signature.bind(self, *args, **keys).arguments
+            bound = signature.bind(self, *args, **keys)
         except TypeError as error:
             twin = f"joint_{found.name}" if section == "forces" else ""
             more = f"; on the coordinate of a joint use {twin}" if hasattr(type(self), twin or "-") else ""
             raise TypeError(f"{found.name}() {error}{more}") from None
-        kept = {key: value for key, value in bound.items() if value is not None or key in found.ends}
-        given = {key: value for key, value in kept.items() if key not in ("self", "name")}
-        values = {"type": found.name, **_entry(self, found, bound["name"], given)}
-        entry = self._add(section, bound["name"], values)
-        handle = _HANDLES.get(section)
-        return None if handle is None else handle(self, entry)
+        if section not in _HANDLES:
+            bound.apply_defaults()
+        kept = {key: value for key, value in bound.arguments.items() if value is not None or key in found.ends}
+        name, given = kept.pop("name"), {key: value for key, value in kept.items() if key != "self"}
+        values = (
+            {"type": found.name, **_entry(self, found, name, given)}
+            if section in _HANDLES
+            else _said(self, found, given)
+        )
+        entry = self._add(section, name, values)
+        return RESULTS[section][1](self, entry) if section in RESULTS else None
 
     add.__name__, add.__qualname__, add.__module__ = found.name, f"Model.{found.name}", "eomgen.api.model"
     add.__doc__ = documentation_of(section, found)
@@ -159,6 +174,17 @@ def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, 
         keys[missing[0]] = places[-1]
         return args[:-1]
     return args
+
+
+def _said(model: Described, found: ElementType, given: dict[str, Any]) -> dict[str, Any]:
+    """What a model file would write of an entry that is no element; texts and whole numbers by default say nothing."""
+    values, refer = dict[str, Any](), References(model)
+    for key, value in given.items():
+        default = "" if found.keys[key].default is None else found.keys[key].default
+        plain = isinstance(value, str | int) and not isinstance(default, float)
+        if not (plain and value == default) and not (isinstance(value, dict) and not value):
+            values[key] = found.keys[key].reference(value, refer)
+    return values
 
 
 def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from .build_mechanism import build
 from .components import Component, Instance, add_instance, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items
 from .element_methods import ElementMethods
-from .fields import fields_of
 from .handles import (
     BodyHandle,
     Described,
@@ -28,7 +27,6 @@ from .handles import (
     References,
     Settings,
     Triple,
-    placed_markers,
 )
 from .methods import check_keywords, checked_keywords, keywords_of
 from .names import fault_of_name
@@ -129,124 +127,7 @@ class Builder(ElementMethods):
             names.noted(describe_equations(name, *names.put([coordinates, mass_matrix, forcing]), **further))
         )
 
-    # -- quantities -----------------------------------------------------------------------------------------------
-    def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
-        """Declare a parameter: a constant that can change between runs.
-
-        Parameters
-        ----------
-        name : str
-            Identifier.
-        value : number, optional
-            Needed to compile, not to derive.
-        unit : str, optional
-            Unit of the value, such as ``"mm"`` or ``"N*m/rad"``; the value is converted to SI units.
-        doc : str, optional
-            For display.
-        latex : str, optional
-            How formulas and plots print it, such as ``"m_{c}"``; from its name unless given.
-
-        Returns
-        -------
-        sympy.Symbol
-        """
-        self._give("parameters", name, value=value, unit=unit, doc=doc, latex=latex)
-        return symbol(name)
-
-    def input(
-        self,
-        name: str,
-        value: Value = 0.0,
-        unit: str = "",
-        doc: str = "",
-        signal: Value | None = None,
-        latex: str = "",
-    ) -> Any:
-        """Declare an input, a quantity that is given over time; ``value`` is used as long as a call gives none.
-
-        ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
-        calls of the module's own functions still take ``value``.  ``unit``, ``doc`` and ``latex`` are those
-        of :meth:`parameter`.
-
-        Returns
-        -------
-        sympy.Symbol
-        """
-        self._give("inputs", name, value=value, unit=unit, doc=doc, latex=latex, signal=signal)
-        return symbol(name)
-
-    def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:
-        """Declare an output: a named result of the model.
-
-        Parameters
-        ----------
-        name : str
-            Identifier; it may repeat a coordinate if the expression is that coordinate.
-        expression : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, their rates, the motion of markers and other outputs.
-        unit : str, optional
-            Unit in which the result is given; without one it is in SI units.
-        doc : str, optional
-            For display.
-        latex : str, optional
-            How formulas and plots print it, in LaTeX; from its name unless given.
-        """
-        self._give("outputs", name, expression=expression, unit=unit, doc=doc, latex=latex)
-
-    def event(
-        self,
-        name: str,
-        expression: Value,
-        terminal: bool | int = False,
-        direction: int = 0,
-        reset: Mapping[Any, Value] | None = None,
-        restitution: Value | None = None,
-        doc: str = "",
-        friction: Value | None = None,
-        slip: str | Sequence[str] | None = None,
-    ) -> None:
-        """Declare an event: runs find the time where an expression becomes zero, and can stop or reset the state there.
-
-        Parameters
-        ----------
-        name : str
-            Identifier, for ``Trajectory.t_events[name]``.
-        expression : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, velocities, the position and velocity of markers, and outputs that
-            need no accelerations.
-        terminal : bool or int
-            End the run there; a number: when it has happened so often.
-        direction : {0, 1, -1}
-            Both ways, only where it rises, only where it falls.
-        reset : mapping of coordinates and velocities to expressions, optional
-            New values, all from the state right before.  Positions and velocities are brought back onto the
-            constraints afterwards.
-        restitution : float, optional
-            The expression is a gap between bodies; where it closes an impact opens it again, this much slower (0 to
-            1; Newton's law), with impulses that obey all joints.
-        doc : str, optional
-        friction : float, optional
-            Beside a restitution: the coefficient of Coulomb friction in the impact.
-        slip : str or sequence of str, optional
-            Beside friction: the output that is the sliding velocity, linear in the velocities; in space two outputs,
-            along directions at right angles.
-        """
-        self._give(
-            "events", name, expression=expression, terminal=terminal, direction=direction,
-            reset=None if isinstance(reset, dict) and not reset else reset,
-            restitution=restitution, doc=doc, friction=friction, slip=slip,
-        )  # fmt: skip
-
-    def _give(self, section: str, name: str, **given: Any) -> None:
-        """Append an entry with what is neither None nor its default; arrays, which compare by parts, are none."""
-        fields, values = fields_of(section, {}), dict[str, Any]()
-        for key, value in given.items():
-            default = "" if fields[key].default is None else fields[key].default
-            plain = isinstance(value, str | int) and not isinstance(default, float)
-            if value is not None and not (plain and value == default):
-                values[key] = value
-        self._add(section, name, values)
-
+    # -- names -----------------------------------------------------------------------------------------------------
     def coordinate(self, name: str) -> Any:
         """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
         return symbol(name)
@@ -258,31 +139,6 @@ class Builder(ElementMethods):
     )
 
     # -- states and functions -----------------------------------------------------------------------------------------
-
-    def state(
-        self, name: str, rate: Any = None, initial: Any = 0.0, unit: str = "", doc: str = "", latex: str = ""
-    ) -> Any:
-        """Declare a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds.
-
-        Parameters
-        ----------
-        name : str
-            Identifier; its rate is ``<name>_dot``.
-        rate : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, their rates, states, positions and velocities of markers, outputs
-            of these and quantities of force elements.
-        initial : number, str or SymPy expression, optional
-            Where runs begin, 0 unless given; of parameters, if an expression.
-        unit, doc, latex : str, optional
-            Those of :meth:`parameter`; an initial value that is a number has this unit.
-
-        Returns
-        -------
-        sympy.Symbol
-        """
-        self._give("states", name, rate=rate, initial=initial, unit=unit, doc=doc, latex=latex)
-        return symbol(name)
-
     def sampled(
         self, name: str, value: Any = None, period: Any = None, *, offset: Any = 0.0, initial: Any = 0.0,
         unit: str = "", doc: str = "", latex: str = "",
@@ -314,7 +170,8 @@ class Builder(ElementMethods):
         sympy.Symbol
         """
         given = {"sampled": value, "period": period, "offset": offset, "initial": initial}
-        self._give("states", name, **given, unit=unit, doc=doc, latex=latex)
+        given |= {key: text for key, text in (("unit", unit), ("doc", doc), ("latex", latex)) if text != ""}
+        self._add("states", name, {key: x for key, x in given.items() if x is not None})
         return symbol(name)
 
     @checked_keywords
@@ -449,83 +306,6 @@ class Builder(ElementMethods):
     def _body_handle(self, name: str) -> BodyHandle:
         entries = self._description.sections["bodies"]
         return BodyHandle(self, name, next((entry for entry in entries if entry.name == name), None))
-
-    def body(
-        self,
-        name: str,
-        mass: Any = None,
-        com: Sequence[Any] | None = None,
-        inertia: Any = None,
-        *,
-        principal: Sequence[Any] | None = None,
-        first_moment: Sequence[Any] | None = None,
-        about: Any = None,
-        axes: Sequence[Any] | None = None,
-        solids: Sequence[Mapping[str, Any]] | None = None,
-        points: Sequence[Mapping[str, Any]] | None = None,
-        check_inertia: bool | str | None = None,
-        markers: Mapping[str, Any] | None = None,
-        display: Sequence[Mapping[str, Any]] | None = None,
-    ) -> BodyHandle:
-        """Add a rigid body.
-
-        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in the equations.
-
-        Parameters
-        ----------
-        name : str
-            Identifier.
-        mass : number, str or SymPy expression
-            Mass (kg); 0 for a body without mass.
-        com : sequence of three, optional
-            Centre of mass in body axes (m); the origin unless given.
-        inertia : sequence of three, 3 x 3 tensor or mapping, optional
-            About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
-            with the tensor's own sign; what is missing is 0.  One moment alone is that of a body moving in a plane.
-        principal : sequence of three, optional
-            Principal moments (kg m^2) instead of ``inertia``, along ``axes``.
-        first_moment : sequence of three, optional
-            m c about the body's origin (kg m) instead of ``com``.
-        about : {'com', 'origin'}, name of a marker of the body, or sequence of three, optional
-            The point that ``inertia`` or ``principal`` is about; a marker gives its axes too.
-        axes : sequence of three, optional
-            Fixed-axis roll, pitch, yaw (rad) of the axes that ``inertia`` or ``principal`` is written in.
-        solids : sequence of mappings, optional
-            Solids of uniform density, from which mass, centre of mass and inertia follow:
-            ``{"type": "box", "size": (a, b, c), "density": rho, "at": (x, y, z), "rpy": (r, p, y)}``; the types are
-            box, cylinder, tube, sphere, rod, cone, ellipsoid and mesh (an STL file); ``"subtract": True`` makes a hole.
-        points : sequence of mappings, optional
-            Point masses to add: ``{"mass": m, "at": (x, y, z)}``.
-        check_inertia : {'error', 'note', 'off'} or bool, optional
-            Whether a mass and inertia that no rigid body can have is refused, noted (``note``) or taken in silence
-            (``off``, False); the model's own setting unless given.
-        markers : mapping, optional
-            Named markers, as in the model file: a position ``{"tip": (l, 0, 0)}`` (m, body axes), or a mapping of
-            ``at``, ``rpy``, ``axes`` and ``matrix`` as :meth:`.BodyHandle.marker` takes them.  Each is known as
-            ``body.name`` everywhere.
-        display : sequence of mappings, optional
-            Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
-
-        Returns
-        -------
-        BodyHandle
-        """
-        given = {
-            "mass": mass,
-            "com": com,
-            "inertia": inertia,
-            "principal": principal,
-            "first_moment": first_moment,
-            "about": about,
-            "axes": axes,
-            "solids": solids,
-            "points": points,
-            "check_inertia": check_inertia,
-            "markers": placed_markers(markers),
-            "display": display,
-        }
-        values = {key: value for key, value in given.items() if value is not None}
-        return BodyHandle(self, name, self._add("bodies", name, values))
 
     @property
     def check_inertia(self) -> bool | str:
