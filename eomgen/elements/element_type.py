@@ -7,8 +7,9 @@ of their class, which :func:`key` marks.  The reader of entries is :class:`~eomg
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ..base.value_rules import Allowed
 from ..expr.core import Expr, Graph
@@ -37,37 +38,55 @@ class Meaning(NamedTuple):
     measure: str = ""
 
 
-class Entry(Protocol):
+class Entry(ABC):
     """An entry on its way to an element.
 
     Every method reads one key, notes what is wrong with it as a fault of that key, and returns None or a stand-in then,
-    so that one pass finds all faults.
+    so that one pass finds all faults.  What the keys mean to the model is known by its subclass there.
+
+    Attributes
+    ----------
+    values : dict
+        What the user gave, by key.
+    fields : Fields
+        The keys of its type.
+    stand_in : Expr
+        In place of an expression that is at fault.
     """
 
-    name: str
-    values: dict[str, Any]  #: what the user gave, by key
-    fields: Fields  #: the keys of its type
-    graph: Graph
-    stand_in: Expr  #: in place of an expression that is at fault
+    def __init__(self, reader: Any, name: str, path: str, values: dict[str, Any]) -> None:
+        self.reader, self.name, self.path, self.values = reader, name, path, values
+        self.graph: Graph = reader.graph
+        self.stand_in: Expr = reader.stand_in
+        self.fields: Fields = {}
 
     # -- faults ---------------------------------------------------------------------------------------------------
+    def _at(self, key: str) -> str:
+        return f"{self.path}.{key}" if key else self.path
+
     def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
         """Note a fault of one key, or of the entry as a whole (``""``)."""
+        self.reader.faults.add(self._at(key), message, remedy, code)
 
     def missing(self, key: str, remedy: str) -> None:
         """Note that a key is missing."""
+        self.reader.faults.missing(self._at(key), remedy)
 
     def at_fault(self, key: str = "") -> bool:
         """Whether a fault of the key, or any, has been noted."""
+        return bool(self.reader.faults.under(self._at(key)))
 
     def refuse(self, key: str, why: str) -> None:
         """Note a key that has no meaning beside the others, if it is given."""
+        if key in self.values:
+            self.fault(key, why, "leave it out")
 
     def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
         """Require an expression in a range, at the declared values of parameters and at those given later.
 
         ``rule`` says what is allowed; ``{:g}`` in a ``message`` of its own stands for the number.
         """
+        self.reader.requirements.inside(self._at(key), value, allowed, rule, message)
 
     def judge(
         self, key: str, rule: str, values: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
@@ -76,51 +95,79 @@ class Entry(Protocol):
 
         ``data`` is what the rule takes beside them, ``local`` the names that stand for the points at which it looks.
         """
+        self.reader.requirements.judge(self._at(key), rule, values, data, local)
 
     # -- values ---------------------------------------------------------------------------------------------------
     def __getitem__(self, key: str) -> Any:
         """What a key holds, or its default, read by its kind."""
+        return self.read(key)
 
     def read(self, key: str, kind: type[Field] | None = None) -> Any:
         """The same, read as if the key was of another kind."""
+        field = self.fields[key]
+        if key not in self.values and field.default is None:
+            return field.absent(self.reader)
+        return (kind or type(field)).read(field, self.reader, self._at(key), self.values.get(key, field.default))
 
     def law(self, key: str, local: Mapping[str, Expr], exclusive: bool = True) -> Expr:
         """An expression with names that it alone knows; with ``exclusive`` none may be a name of the model too."""
+        field = self.fields[key]
+        found: Expr = self.reader.expression(
+            self._at(key), self.values.get(key, field.default), field.level, local, exclusive
+        )
+        return found
 
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
+        found: tuple[Marker, Marker] | None = self[key]
+        return found
 
     def positive(self, key: str) -> Expr:
         """An expression that must be greater than 0."""
-
-    def states(self) -> tuple[Expr, ...]:
-        """The symbols of its own first-order states, in the order in which its type names them."""
+        value: Expr | None = self[key]
+        if value is None:
+            return self.stand_in  # missing, which is noted by who asks
+        self.reader.requirements.positive(self._at(key), value)
+        return value
 
     # -- coordinates and names ------------------------------------------------------------------------------------
     def symbol(self, found: Found) -> Expr:
         """The symbol of a coordinate."""
-
-    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
-        """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
-
-    def require_one_carrier(self, key: str, a: Found, b: Found) -> None:
-        """Note two coordinates that are measured from different bodies."""
-
-    def carrier(self, coordinate: Found) -> int | None:
-        """The body from which a coordinate is measured, bodies that are welded together counting as one."""
-
-    def carried(self, coordinate: Found) -> int | None:
-        """The body that a coordinate moves."""
-
-    def meaning(self, name: str) -> Meaning:
-        """What a name in an expression stands for."""
+        return self.graph.symbol(found.name)
 
     def known(self, kind: str) -> list[str]:
         """The model's names of a kind."""
+        return [*self.reader.names.of(kind)]
 
+    @abstractmethod
+    def states(self) -> tuple[Expr, ...]:
+        """The symbols of its own first-order states, in the order in which its type names them."""
+
+    @abstractmethod
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
+
+    @abstractmethod
+    def require_one_carrier(self, key: str, a: Found, b: Found) -> None:
+        """Note two coordinates that are measured from different bodies."""
+
+    @abstractmethod
+    def carrier(self, coordinate: Found) -> int | None:
+        """The body from which a coordinate is measured, bodies that are welded together counting as one."""
+
+    @abstractmethod
+    def carried(self, coordinate: Found) -> int | None:
+        """The body that a coordinate moves."""
+
+    @abstractmethod
+    def meaning(self, name: str) -> Meaning:
+        """What a name in an expression stands for."""
+
+    @abstractmethod
     def table_kind(self, function: str) -> str | None:
         """The kind of a function that is a table."""
 
+    @abstractmethod
     def contact_point(self, axis: Marker) -> tuple[Marker, Expr] | None:
         """A massless body about a marker's axis, whose x axis points to a contact, and the angle that turns it."""
 
@@ -174,7 +221,7 @@ class Where(NamedTuple):
     """What an element acts on: keys before and behind those of its law, and how they are read together."""
 
     keys: Fields
-    read: Callable[[Entry], Any]  #: None where anything is at fault
+    read: Callable[[Entry], Any]  #: what the element holds of it, several values as a tuple; None where it is at fault
     behind: Mapping[str, Field] = {}
     one_of: tuple[str, ...] = ()
 
@@ -191,7 +238,13 @@ def keys_of(element: type) -> Fields:
 
 
 def element(
-    kind: type, name: str, doc: str, where: Where | None = None, keys: Fields | None = None, **more: Any
+    kind: type,
+    name: str,
+    doc: str,
+    where: Where | None = None,
+    keys: Fields | None = None,
+    check: Callable[[Entry], None] | None = None,
+    **more: Any,
 ) -> ElementType:
     """The type of elements whose fields are read from their keys one by one, in this order.
 
@@ -204,16 +257,22 @@ def element(
     where : Where, optional
     keys : Fields, optional
         Other keys for the same fields, in their order.
+    check : callable, optional
+        Notes what is wrong with the entry beside its keys.
     **more
         What else an ElementType has.
     """
     own = keys_of(kind) if keys is None else keys
 
     def read(e: Entry) -> Any:
-        values = [*([] if where is None else [where.read(e)]), *(e[one] for one in own)]
-        needed = [True] * (where is not None) + [x.required or x.default is not None for x in own.values()]
-        missing = any(value is None and need for value, need in zip(values, needed, strict=True))
-        return None if missing else kind(e.name, *values)
+        if check is not None:
+            check(e)
+        place = () if where is None else where.read(e)
+        values = [e[one] for one in own]
+        needed = (x.required or x.default is not None for x in own.values())
+        if place is None or any(value is None and need for value, need in zip(values, needed, strict=True)):
+            return None
+        return kind(e.name, *(place if isinstance(place, tuple) else (place,)), *values)
 
     more = {"read": read, **({} if where is None else {"one_of": where.one_of}), **more}
     return ElementType(name, doc, own if where is None else {**where.keys, **own, **where.behind}, **more)

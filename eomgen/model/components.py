@@ -14,20 +14,20 @@ from typing import Any, NamedTuple
 
 from ..base.notation import with_instance
 from ..elements import kinds
-from ..elements.constraints.switching import is_switched, state_of
-from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
-from .build_joints import coordinate_names, sketch
-from .build_states import COUNTER, SAMPLED
+from ..expr.core import Graph
+from .build_joints import declare_coordinates
+from .build_states import declare_states, declare_switches
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
-from .element_entry import needs_point, states_of
+from .element_entry import declare_contacts, own_states
 from .fields import ADDED, COMPONENT
 from .names import fault_of_name, function_words, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
-from .scope import ENERGIES, RATES
+from .scope import ENERGIES, RATES, Namespace
 from .units import UnitError, read_unit
+from .values import Reader
 from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
 
 #: Notes a fault: path, message, remedy, code.
@@ -55,25 +55,14 @@ class OwnNames:
         self.bodies = named("bodies") - {GROUND_NAME}
         self.elements = named("joints", "constraints")
         self.symbols = named("parameters", "inputs", "functions", "states", "outputs", "events")
-        for entry in sections["joints"]:
-            kind = entry.values.get("type")
-            if not isinstance(entry.name, str):
-                continue
-            if not isinstance(kind, str) or kind not in JOINTS:  # told when the model is checked
-                self.symbols |= {entry.name, str(entry.values.get("coordinate", entry.name))}
-                continue
-            joint = sketch(kind, entry.values)
-            self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
-            self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
-        self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
-        able = (*sections["constraints"], *sections["joints"])
-        self.symbols |= {state_of(str(entry.name)) for entry in able if is_switched(entry.values)}
-        for entry in sections["states"]:
-            if "period" in entry.values and isinstance(entry.name, str):
-                self.symbols |= {entry.name + COUNTER, entry.name + SAMPLED}
-        for entry in sections["constraints"]:
-            if needs_point(entry.values):
-                self.symbols.add(str(entry.values.get("coordinate", f"{entry.name}_contact")))
+        faults = Faults(Description())  # told where the model is checked
+        reader = Reader(Graph(), Namespace(faults), faults, description)
+        declare_coordinates(reader, sections["joints"])
+        declare_contacts(reader, sections["constraints"])
+        declare_states(reader, sections["states"], False)
+        own_states(reader, sections["forces"])
+        declare_switches(reader, [*sections["constraints"], *sections["joints"]])
+        self.symbols |= {*reader.names.kinds} - {"t"}
 
     def has_symbol(self, name: str) -> bool:
         """Whether a name, or the quantity whose rate it is, is declared."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
-from ..base.value_rules import TURN, Allowed
+from ..base.value_rules import TURN
 from ..elements.constraints import Constraint
 from ..elements.constraints.cams import Profile
-from ..elements.element_type import ElementType, Found, Meaning, Types
+from ..elements.element_type import ElementType, Entry, Found, Meaning, Types
 from ..elements.forces import FORCES
 from ..elements.frames import Frame, Marker
 from ..elements.joints import JOINTS
-from ..elements.kinds import Field, Fields, Law
+from ..elements.kinds import Law
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, symbols_of
@@ -134,14 +134,12 @@ class Surroundings(NamedTuple):
     contacts: Contacts
 
 
-class ElementEntry:
-    """The reader of :class:`~..elements.element_type.Entry`, which says what its methods do."""
+class ElementEntry(Entry):
+    """The reader of one entry of a model."""
 
     def __init__(self, around: Surroundings, entry: DescribedEntry) -> None:
-        self.around, self.entry, self.reader = around, entry, around.reader
-        self.name, self.path, self.values = str(entry.name), entry.path, entry.values
-        self.graph, self.stand_in = self.reader.graph, self.reader.stand_in
-        self.fields: Fields = {}
+        super().__init__(around.reader, str(entry.name), entry.path, entry.values)
+        self.around, self.entry = around, entry
 
     def type_of(self, what: str, types: Types) -> ElementType | None:
         """The type, if the entry has one and says in one way what it acts on; its keys are checked."""
@@ -182,65 +180,8 @@ class ElementEntry:
                 return True
         return False
 
-    # -- faults ---------------------------------------------------------------------------------------------------
-    def _at(self, key: str) -> str:
-        return f"{self.path}.{key}" if key else self.path
-
-    def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
-        self.reader.faults.add(self._at(key), message, remedy, code)
-
-    def missing(self, key: str, remedy: str) -> None:
-        self.reader.faults.missing(self._at(key), remedy)
-
-    def at_fault(self, key: str = "") -> bool:
-        return bool(self.reader.faults.under(self._at(key)))
-
-    def refuse(self, key: str, why: str) -> None:
-        if key in self.values:
-            self.fault(key, why, "leave it out")
-
-    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
-        self.reader.requirements.inside(self._at(key), value, allowed, rule, message)
-
-    def judge(
-        self, key: str, rule: str, values: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
-    ) -> None:
-        self.reader.requirements.judge(self._at(key), rule, values, data, local)
-
-    # -- values ---------------------------------------------------------------------------------------------------
-    def __getitem__(self, key: str) -> Any:
-        return self.read(key)
-
-    def read(self, key: str, kind: type[Field] | None = None) -> Any:
-        field, read = self.fields[key], (kind or type(self.fields[key])).read
-        if key in self.values:
-            return read(field, self.reader, self._at(key), self.values[key])
-        return (
-            field.absent(self.reader)
-            if field.default is None
-            else read(field, self.reader, self._at(key), field.default)
-        )
-
-    def law(self, key: str, local: Mapping[str, Expr], exclusive: bool = True) -> Expr:
-        value = self.values.get(key, self.fields[key].default)
-        return self.reader.expression(self._at(key), value, self.fields[key].level, local, exclusive)
-
-    def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
-        found: tuple[Marker, Marker] | None = self[key]
-        return found
-
-    def positive(self, key: str) -> Expr:
-        value: Expr | None = self[key]
-        if value is None:
-            return self.stand_in  # missing, which is noted by who asks
-        self.reader.requirements.positive(self._at(key), value)
-        return value
-
     def states(self) -> tuple[Expr, ...]:
         return tuple(self.graph.symbol(name) for name in states_of(self.entry))
-
-    def symbol(self, found: Found) -> Expr:
-        return self.graph.symbol(found.name)
 
     def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
         if key not in self.values:
@@ -307,9 +248,6 @@ class ElementEntry:
         of = name.removesuffix(RATES[level])
         kinds = {c: k.kind for j in self.around.joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True)}
         return Meaning(kind, level, "length" if kinds.get(of) == "length" else "angle")
-
-    def known(self, kind: str) -> list[str]:
-        return [*self.reader.names.of(kind)]
 
     def table_kind(self, function: str) -> str | None:
         entries = self.reader.description.sections["functions"]

@@ -13,7 +13,7 @@ from ...expr.core import Expr, cos, sin, sqrt, substitute
 from ...expr.differentiate import jvp
 from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
-from ..element_type import ElementType, Entry, table
+from ..element_type import ElementType, Entry, element, key, table
 from ..frames import Marker, velocity_at
 from ..kinds import Axis, Choice, Flag, MarkerReference, Scalar, Vector
 from ..looks import Contour, Seen, Wheel
@@ -157,9 +157,9 @@ class KnifeEdge(Constraint):
     sentence: ClassVar[str] = r"The marker does not move along one of its axes $\mathbf{n}$."
     formula: ClassVar[str] = r"\mathbf{n}^T \mathbf{v} = 0"
     type_name: ClassVar[str] = "knife_edge"
-    marker: Marker
-    axis: Vec3  #: unit vector, marker axes
-    on: Marker
+    marker: Marker = key(MarkerReference("marker at the point where the blade touches", required=True))
+    axis: Vec3 = key(Axis("direction in which the marker cannot move, in its own axes", default="y"))
+    on: Marker = key(MarkerReference("the body on which the blade moves", default="ground"))
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         sideways = vec.times(view.rotation(self.marker), self.axis)
@@ -238,9 +238,9 @@ _NEEDED = {"disc": "radius", "sphere": "radius", "ellipsoid": "semi_axes", "conv
 
 def _rolling(e: Entry) -> Constraint | None:
     shape, wheel, plane = e["shape"], e["wheel"], e["plane"]
-    for key, shapes in _OWN.items():
+    for own, shapes in _OWN.items():
         if shape in _NEEDED and shape not in shapes:
-            e.refuse(key, f"only {' and '.join(_NAMES[one] for one in shapes)} have it")
+            e.refuse(own, f"only {' and '.join(_NAMES[one] for one in shapes)} have it")
     needed = _NEEDED.get(shape)
     if needed is not None and needed not in e.values:
         e.missing(needed, f"needed where shape is {shape}")
@@ -263,11 +263,10 @@ def _rolling(e: Entry) -> Constraint | None:
     return RollingConvex(e.name, wheel, plane, ellipsoid_support(local, (a, b, c)), local)
 
 
-def _knife_edge(e: Entry) -> Constraint | None:
-    marker, on, axis = e["marker"], e["on"], e["axis"]
-    if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
-        return None
-    return KnifeEdge(e.name, marker, axis, on)
+def _check_blade(e: Entry) -> None:
+    marker, on = e["marker"], e["on"]
+    if marker is not None and on is not None:
+        on_two_bodies(e, "on", marker, on)
 
 
 TYPES = table(
@@ -297,14 +296,10 @@ TYPES = table(
         },
         _rolling,
     ),
-    ElementType(
+    element(
+        KnifeEdge,
         "knife_edge",
         "a blade: a marker that cannot move sideways, along one of its own axes.",
-        {
-            "marker": MarkerReference("marker at the point where the blade touches", required=True),
-            "axis": Axis("direction in which the marker cannot move, in its own axes", default="y"),
-            "on": MarkerReference("the body on which the blade moves", default="ground"),
-        },
-        _knife_edge,
+        check=_check_blade,
     ),
 )

@@ -11,12 +11,13 @@ from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt
 from ...expr.vectors import Vec3
 from ..dimensions import FORCE, LENGTH, NONE, SPEED
-from ..element_type import ElementType, Entry, table
+from ..element_type import Entry, Where, element, key, keys_of, table
 from ..frames import Marker, velocity_at
 from ..kinds import LAW, Choice, Pair, Scalar
 from .force import Force, Load, MarkerLoad, View, beyond_zero, where
 
 LAWS = ("linear", "vermeulen_johnson", "polach")
+_FACTOR = Scalar("", level=LAW, dimension=FORCE)
 
 
 @dataclass(frozen=True)
@@ -40,15 +41,27 @@ class Creep(Force):
     not_finite_where: ClassVar[str] = "its speed of rolling is 0: give it a speed that does not vanish at rest"
     track: Marker  #: x along it, z its normal, to the side of the wheel
     wheel: Marker  #: on the axle
-    radius: Expr
-    speed: Expr | None
-    longitudinal: Expr
-    lateral: Expr
-    lateral_spin: Expr
-    spin: Expr
-    law: str
-    normal: Expr | None
-    friction: Expr | None
+    radius: Expr = key(
+        Scalar(
+            "rolling radius (m), which may change with the place",
+            required=True, level=LAW, dimension=LENGTH, allowed=POSITIVE,
+        )
+    )  # fmt: skip
+    longitudinal: Expr = key(_FACTOR.replace(doc="creep coefficient f11 (N)", required=True, allowed=NOT_NEGATIVE))
+    lateral: Expr = key(_FACTOR.replace(doc="creep coefficient f22 (N)", required=True, allowed=NOT_NEGATIVE))
+    lateral_spin: Expr = key(
+        _FACTOR.replace(doc="creep coefficient f23 (N m)", default=0, dimension=FORCE.times(LENGTH))
+    )
+    spin: Expr = key(_FACTOR.replace(doc="creep coefficient f33 (N m^2)", default=0, dimension=FORCE.times(LENGTH, 2)))
+    speed: Expr | None = key(
+        Scalar(
+            "by which velocities are divided (m/s); that of the wheel's marker along the track unless given",
+            level=LAW, dimension=SPEED,
+        )
+    )  # fmt: skip
+    law: str = key(Choice("how the forces saturate", default="linear", choices=LAWS))
+    normal: Expr | None = key(_FACTOR.replace(doc="normal force (N), such as -multiplier(roll.height)"))
+    friction: Expr | None = key(Scalar("coefficient of friction", level=LAW, dimension=NONE, allowed=NOT_NEGATIVE))
 
     def _slip(self, view: View) -> tuple[Vec3, Expr, Expr, Vec3]:
         """Velocity of the wheel on the track where they touch, spin, speed of rolling (track axes), and the arm."""
@@ -102,57 +115,25 @@ class Creep(Force):
         ]
 
 
-def _creep(e: Entry) -> Creep | None:
-    pair, law, radius = e.pair(), e["creep_law"], e["radius"]
-    e.require("radius", radius, POSITIVE, "must be greater than 0")
-    for key in ("normal", "friction"):
+def _check_saturation(e: Entry) -> None:
+    law = e["creep_law"]
+    for needed in ("normal", "friction"):
         if law == "linear":
-            e.refuse(key, "the linear law does not saturate")
-        elif key not in e.values:
-            e.missing(key, f"the law {law} needs the normal force and the coefficient of friction")
-    along, across, turning, spin = (e[key] for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
-    for key, value in (("longitudinal", along), ("lateral", across)):
-        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    friction = e["friction"]
-    if friction is not None:
-        e.require("friction", friction, NOT_NEGATIVE, "must be 0 or greater")
-    if pair is None or e.at_fault():
-        return None
-    track, wheel = pair
-    speed, normal = e["speed"], e["normal"]
-    return Creep(e.name, track, wheel, radius, speed, along, across, turning, spin, law, normal, friction)
+            e.refuse(needed, "the linear law does not saturate")
+        elif needed not in e.values:
+            e.missing(needed, f"the law {law} needs the normal force and the coefficient of friction")
 
+
+_ENDS = "the track (x along it, z its normal, to the side of the wheel) and a marker on the wheel's axle"
 
 TYPES = table(
-    ElementType(
+    element(
+        Creep,
         "creep",
         "creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach).",
-        {
-            "between": Pair(
-                "the track (x along it, z its normal, to the side of the wheel) and a marker on the wheel's axle",
-                required=True,
-            ),
-            "radius": Scalar("rolling radius (m), which may change with the place", required=True, level=LAW,
-                dimension=LENGTH,
-            ),
-            "longitudinal": Scalar("creep coefficient f11 (N)", required=True, level=LAW, dimension=FORCE
-            ),
-            "lateral": Scalar("creep coefficient f22 (N)", required=True, level=LAW, dimension=FORCE),
-            "lateral_spin": Scalar("creep coefficient f23 (N m)", default=0, level=LAW, dimension=FORCE.times(LENGTH)
-            ),
-            "spin": Scalar("creep coefficient f33 (N m^2)", default=0, level=LAW, dimension=FORCE.times(LENGTH, 2)
-            ),
-            "speed": Scalar(
-                "by which velocities are divided (m/s); that of the wheel's marker along the track unless given",
-                level=LAW,
-                dimension=SPEED,
-            ),
-            "creep_law": Choice("how the forces saturate", default="linear", choices=LAWS),
-            "normal": Scalar("normal force (N), such as -multiplier(roll.height)", level=LAW, dimension=FORCE
-            ),
-            "friction": Scalar("coefficient of friction", level=LAW, dimension=NONE),
-        },
-        _creep,
+        Where({"between": Pair(_ENDS, required=True)}, Entry.pair),
+        {"creep_law" if name == "law" else name: field for name, field in keys_of(Creep).items()},
+        check=_check_saturation,
         ends=("track", "wheel"),
     )
-)  # fmt: skip
+)

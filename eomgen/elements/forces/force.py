@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...base.records import dataclass
@@ -28,6 +29,13 @@ def beyond_zero(x: Expr, law: Callable[[Expr], Expr]) -> Expr:
     """
     inside = x.graph.apply("lt", 0.0, x)
     return where(inside, law(where(inside, x, 1.0)), 0.0)
+
+
+def map_law(law: Any, own: Callable[[Expr], Expr]) -> Any:
+    """A law with other expressions: its own, and those of the laws in it."""
+    parts = {field.name: getattr(law, field.name) for field in fields(law)}
+    laws = {name: x.mapped(own) for name, x in parts.items() if hasattr(x, "mapped")}
+    return replace(law, **laws, **{name: own(x) for name, x in parts.items() if isinstance(x, Expr)})
 
 
 # -- the class ---------------------------------------------------------------------------------------------------------

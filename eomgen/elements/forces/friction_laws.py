@@ -16,7 +16,7 @@ from ...expr.vectors import Mat3, Vec3
 from ..dimensions import NONE, RATE, REACH
 from ..element_type import Entry
 from ..kinds import LAW, Choice, Fields, Scalar
-from .force import beyond_zero, where
+from .force import beyond_zero, map_law, where
 
 # -- dry friction ------------------------------------------------------------------------------------------------------
 
@@ -30,9 +30,10 @@ class DryFriction(ABC):
     def in_plane(self, slip: Slip) -> Vec3:
         """Friction at a sliding velocity, with the direction of the velocity."""
 
-    @abstractmethod
     def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
         """The law with other expressions, in the graph of a pair; without its states."""
+        law: DryFriction = map_law(self, own)
+        return law
 
     def on_pad(self, area: Expr) -> DryFriction:
         """The law of a point that stands for an area of a plate."""
@@ -202,9 +203,7 @@ class LuGre(LineFriction):
         return tuple(-relaxed * z for z in self.deflections)
 
     def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
-        static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
-        dynamic, stiffness, damping = own(self.dynamic), own(self.stiffness), own(self.damping)
-        return LuGre(dynamic, stiffness, damping, own(self.viscous), static, stribeck, ())
+        return replace(map_law(self, own), deflections=(), lateral=None)  # type: ignore[no-any-return]
 
     def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> LuGre:
         return replace(self, deflections=states, lateral=lateral)
@@ -298,10 +297,6 @@ class Friction(SlidingFriction):
         size = squared.graph.apply("sqrt", squared + self.smoothing * self.smoothing)
         return self.level(squared) / size + self.viscous
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> Friction:
-        static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
-        return Friction(own(self.dynamic), own(self.smoothing), own(self.viscous), static, stribeck)
-
 
 @dataclass(frozen=True)
 class BrownMcPhee(SlidingFriction):
@@ -340,9 +335,6 @@ class BrownMcPhee(SlidingFriction):
     def _rise(self, square: Expr) -> Expr:
         base = 0.25 * square + 0.75
         return (self.static - self.dynamic) / (base * base)
-
-    def mapped(self, own: Callable[[Expr], Expr]) -> BrownMcPhee:
-        return BrownMcPhee(own(self.dynamic), own(self.static), own(self.transition), own(self.viscous))
 
 
 def has_bristles(values: Mapping[str, Any]) -> bool:

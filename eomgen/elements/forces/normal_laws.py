@@ -12,7 +12,7 @@ from ...expr.core import Expr, sqrt
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..element_type import Entry
 from ..kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
-from .force import beyond_zero
+from .force import beyond_zero, map_law
 
 _PRESSURE = FORCE.times(LENGTH, -2)
 
@@ -62,9 +62,10 @@ class NormalLaw(ABC):
     def energy(self, depth: Expr) -> Expr:
         """The potential of the elastic part (J)."""
 
-    @abstractmethod
     def mapped(self, own: Callable[[Expr], Expr]) -> NormalLaw:
         """The law with other expressions, in the graph of a pair."""
+        law: NormalLaw = map_law(self, own)
+        return law
 
     def at(self, radius: Callable[[], Expr]) -> NormalLaw:
         """The law of two surfaces of an effective radius R, 1 / R = 1 / R1 + 1 / R2."""
@@ -113,9 +114,6 @@ class HuntCrossley(NormalLaw):
         power = self.exponent + 1.0
         return beyond_zero(depth, lambda d: self.stiffness * d**power / power)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> HuntCrossley:
-        return HuntCrossley(own(self.stiffness), own(self.exponent), own(self.dissipation))
-
 
 @dataclass(frozen=True)
 class DampedLinear(NormalLaw):
@@ -138,9 +136,6 @@ class DampedLinear(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return beyond_zero(depth, lambda d: 0.5 * self.stiffness * d * d)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> DampedLinear:
-        return DampedLinear(own(self.stiffness), own(self.damping))
-
 
 @dataclass(frozen=True)
 class HertzBodies(HuntCrossley):
@@ -154,9 +149,6 @@ class HertzBodies(HuntCrossley):
 
     def at(self, radius: Callable[[], Expr]) -> HuntCrossley:
         return HuntCrossley(self.stiffness * sqrt(radius()), self.exponent, self.dissipation)
-
-    def mapped(self, own: Callable[[Expr], Expr]) -> HertzBodies:
-        return HertzBodies(own(self.stiffness), own(self.exponent), own(self.dissipation))
 
 
 @dataclass(frozen=True)
@@ -176,9 +168,6 @@ class PartOfLaw(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return self.share * self.law.energy(depth)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> PartOfLaw:
-        return PartOfLaw(self.law.mapped(own), own(self.share), own(self.less))
-
 
 @dataclass(frozen=True)
 class PartlyDamped(NormalLaw):
@@ -197,9 +186,6 @@ class PartlyDamped(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return self.law.energy(depth)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> PartlyDamped:
-        return PartlyDamped(self.law.mapped(own), own(self.grip))
-
 
 @dataclass(frozen=True)
 class ElasticPart(NormalLaw):
@@ -216,9 +202,6 @@ class ElasticPart(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return self.law.energy(depth)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> ElasticPart:
-        return ElasticPart(self.law.mapped(own))
-
 
 @dataclass(frozen=True)
 class RigidLaw(NormalLaw):
@@ -234,9 +217,6 @@ class RigidLaw(NormalLaw):
 
     def energy(self, depth: Expr) -> Expr:
         return depth.graph.zero
-
-    def mapped(self, own: Callable[[Expr], Expr]) -> RigidLaw:
-        return self
 
 
 NORMAL: Fields = {
