@@ -39,6 +39,7 @@ quick: $(VENV)/.installed-test
 
 lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .
+	@$(BIN)/python tools/stubs.py
 	@$(BIN)/mypy
 	@$(BIN)/python tools/lint.py
 

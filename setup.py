@@ -1,11 +1,13 @@
-"""The build of the package: what pyproject.toml says, and the extension module of all models, ``eomgen._native``.
+"""The build of the package: what pyproject.toml says, the extension module of all models, and a stub for editors.
 
-It is compiled by eomgen's own code.  Where there is no compiler the build asks for the package ziglang, which has one.
+``eomgen._native`` is compiled by eomgen's own code.  Where there is no compiler the build asks for the package ziglang,
+which has one.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -73,4 +75,6 @@ def compilers() -> list[str]:
     return []
 
 
+if (ROOT / "tools").is_dir():  # a source distribution has the stub already
+    import_module("tools.stubs").write()
 setup(cmdclass={"build": Build, "build_native": BuildNative}, distclass=Compiled, setup_requires=compilers())

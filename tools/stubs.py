@@ -1,7 +1,7 @@
 """The tables of types -> eomgen/model/element_methods.pyi, for editors and type checkers.
 
-``python tools/stubs.py`` writes it anew; ``make lint`` compares it with the tables.  It has the first sentence of each
-method; ``help(Model.spring)`` has the rest.
+The build of the package and ``make lint`` write it.  It has the first sentence of each method; ``help(Model.spring)``
+has the rest.
 """
 
 from __future__ import annotations
@@ -68,5 +68,12 @@ def _summary(doc: str) -> str:
     return " ".join(cleandoc(doc).partition("\n\n")[0].split())
 
 
+def write() -> None:
+    """Write the file, if it differs."""
+    text = stub()
+    if not HOME.exists() or HOME.read_text(encoding="utf-8") != text:
+        HOME.write_text(text, encoding="utf-8")
+
+
 if __name__ == "__main__":
-    HOME.write_text(stub(), encoding="utf-8")
+    write()
