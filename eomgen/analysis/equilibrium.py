@@ -76,7 +76,7 @@ class Equilibrium(Result):
         vars(self).update(found)
 
     def __getitem__(self, name: str) -> float:
-        values = {**self.coordinates, **self.states, **self.unknowns}
+        values, name = {**self.coordinates, **self.states, **self.unknowns}, self.module.layout.plain(name)
         if name not in values:
             raise unknown("coordinate, state or unknown", name, values)
         return values[name]

@@ -77,7 +77,14 @@ def allowed() -> str:
     return f"{start}'a if c else b' and the functions {' '.join(function_words())}"
 
 
-def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
+def parse(
+    text: str,
+    graph: Graph,
+    resolve: Resolve,
+    locate: Locate | None = None,
+    any_function: bool = False,
+    plain: Callable[[str], str] = str,
+) -> Expr:
     """The graph expression of a text.
 
     Parameters
@@ -92,6 +99,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         Gives the expression of a marker's motion; without it such calls are refused.
     any_function : bool, optional
         Whether functions that the graph does not declare pass; what they stand for has no meaning then.
+    plain : callable, optional
+        ``leg1.hip`` of an instance of a component -> ``leg1_hip``; other names with dots are refused.
 
     Returns
     -------
@@ -133,7 +142,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
-    return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
+    return _Walker(text, start, graph, resolve, locate, any_function, plain).walk(body[0].value, 0)
 
 
 def names_in(text: str) -> list[str]:
@@ -155,9 +164,16 @@ class _Walker:
     """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
 
     def __init__(
-        self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None, any_function: bool
+        self,
+        text: str,
+        start: int,
+        graph: Graph,
+        resolve: Resolve,
+        locate: Locate | None,
+        any_function: bool,
+        plain: Callable[[str], str],
     ) -> None:
-        self.text, self.start, self.graph, self.any_function = text, start, graph, any_function
+        self.text, self.start, self.graph, self.any_function, self.plain = text, start, graph, any_function, plain
         self.resolve, self.locate = resolve, locate
         self.words = function_words()
         self.size = 0
@@ -175,7 +191,9 @@ class _Walker:
         if isinstance(node, ast.Constant):
             return self.number(node)
         if isinstance(node, ast.Name):
-            return self.name(node)
+            return self.name(node, node.id)
+        if isinstance(node, ast.Attribute) and (name := self.plain(_label(node))).isidentifier():
+            return self.name(node, name)
         if isinstance(node, ast.BinOp):
             return self.binary(node, depth)
         if isinstance(node, ast.UnaryOp):
@@ -208,13 +226,13 @@ class _Walker:
             raise self.fault(node, "the number is too large", "numbers go up to 1.7e308")
         return self.graph.constant(number)
 
-    def name(self, node: ast.Name) -> Expr:
-        if node.id == "pi":
+    def name(self, node: ast.expr, name: str) -> Expr:
+        if name == "pi":
             return self.graph.constant(math.pi)
-        if node.id in self.words or node.id in self.graph.functions:
-            raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
+        if name in self.words or name in self.graph.functions:
+            raise self.fault(node, f"{name!r} is a function", f"write {name}(...)")
         try:
-            return self.resolve(node.id)
+            return self.resolve(name)
         except ExpressionError as error:
             raise self.fault(node, error.message, error.remedy, error.code) from None
 

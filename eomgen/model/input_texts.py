@@ -21,11 +21,14 @@ class Names(NamedTuple):
         States and parameters, in order.
     moving : mapping of str to str
         Coordinate -> the state that is its rate.
+    plain : callable
+        ``leg1.hip`` of an instance of a component -> ``leg1_hip``.
     """
 
     x: Sequence[str]
     p: Sequence[str]
     moving: Mapping[str, str]
+    plain: Callable[[str], str]
 
 
 class RecordedText(NamedTuple):
@@ -59,7 +62,7 @@ def record_text(text: str, names: Names, unknown: Callable[[str], Exception]) ->
             raise unknown(name)
         return graph.symbol(name)
 
-    return _record(text, names, parse(text, graph, resolve))
+    return _record(text, names, parse(text, graph, resolve, plain=names.plain))
 
 
 def _record(text: str, names: Names, expression: Expr) -> RecordedText:

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.algebra import Array, Indices
 from ..base.numeric.projection import largest
 from ..errors import too_large
-from .argument_checks import unknown
+from .argument_checks import plain_name, unknown
 from .inputs import Forcing
 from .layout import Layout
 
@@ -28,14 +28,15 @@ class Named(list[Array]):
     It is a list, so that a loop over it meets the arrays; ``in``, ``keys()``, ``items()`` and ``get`` go by name.
     """
 
-    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
+    def __init__(self, values: Sequence[Array], names: Sequence[str], instances: Mapping[str, str]) -> None:
         super().__init__(values)
-        self.names = tuple(names)
+        self.names, self.instances = tuple(names), instances
 
     @classmethod
     def of(cls, values: Sequence[Array], header: Mapping[str, Any]) -> Named:
         """What belongs to the events of a run, by the names in its header; without names they are counted."""
-        return cls(values, header.get("event_names") or [f"event_{k}" for k in range(len(values))])
+        names = header.get("event_names") or [f"event_{k}" for k in range(len(values))]
+        return cls(values, names, header.get("instances", {}))
 
     @overload
     def __getitem__(self, key: str | SupportsIndex) -> Array: ...
@@ -43,15 +44,16 @@ class Named(list[Array]):
     def __getitem__(self, key: slice) -> list[Array]: ...
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str):
-            if key not in self.names:
+            name = plain_name(key, self.instances)
+            if name not in self.names:
                 raise unknown("event", key, self.names)
-            key = self.names.index(key)
+            key = self.names.index(name)
         return super().__getitem__(key)
 
     def __contains__(self, name: object) -> bool:
         """Whether an event has this name; an array is in it if it is one of those here."""
         if isinstance(name, str):
-            return name in self.names
+            return plain_name(name, self.instances) in self.names
         return any(name is values for values in self)
 
     def keys(self) -> tuple[str, ...]:

@@ -257,7 +257,9 @@ def read_text(layout: Layout, text: str, what: str) -> Expression:
     moving = {q: v for q, v in zip(layout.velocity_labels, layout.v, strict=True) if q in layout.q}
     try:
         recorded = reader.record_text(
-            text, reader.Names(layout.x, layout.p, moving), lambda name: unknown("name", name, known, what)
+            text,
+            reader.Names(layout.x, layout.p, moving, layout.plain),
+            lambda name: unknown("name", name, known, what),
         )
     except ExpressionError as error:
         raise UsageError(f"{what}: {error}", code=error.code) from None

@@ -92,8 +92,8 @@ class Trajectory:
 
     _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
     units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
-    t_events = cached_property[Named](lambda self: Named.of(self._times, self._header))
-    x_events = cached_property[Named](lambda self: Named.of(self._states, self._header))
+    t_events = cached_property[Named](lambda self: Named.of(self._times, self._header | self._described()))
+    x_events = cached_property[Named](lambda self: Named.of(self._states, self._header | self._described()))
     nfev = cached_property[int](lambda self: int(self._header.get("nfev", 0)))
     njev = cached_property[int](lambda self: int(self._header.get("njev", 0)))
     nlu = cached_property[int](lambda self: int(self._header.get("nlu", 0)))

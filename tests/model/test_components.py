@@ -405,6 +405,7 @@ components:
     joints: {hinge: {type: revolute, between: [top, rod], coordinate: q}}
     forces: {motor: {type: torque, joint: hinge, value: tau}}
     outputs: {height: y(rod.end)}
+    events: {low: {expression: q - 0.2, direction: -1}}
 add:
   a: {component: arm, prefix: PREFIXa, at: ground, initial: {q: 0.3}}
   b: {component: arm, prefix: PREFIXb, at: a.rod.end}
@@ -441,6 +442,10 @@ DOORS: dict[str, Door] = {
     "bind": lambda m, n: m.bind(p={n("a.l"): 0.4}, u={n("b.tau"): 1.0}).rhs(0.0, m.x0()),
     "simulate": lambda m, n: m.simulate(0.1, initial={n("a.q"): 0.2}, parameters={n("a.l"): 0.4},
                                         inputs={n("b.tau"): 0.1}).x,
+    "an event": lambda m, n: m.simulate(0.5).t_events[n("a.low")],
+    "an event of many": lambda m, n: m.simulate_many(0.5, {n("a.q"): [0.3]}, reduce="events").events(n("a.low"))[0],
+    "text of an event": lambda m, n: m.simulate(0.5, events={"zero": f"{n('a.q')} - 0.1"}).t_events["zero"],
+    "text of an input": lambda m, n: m.simulate(0.1, inputs={n("a.tau"): f"sin({n('b.q')})"}).x,
     "column": lambda m, n: m.simulate(0.1)[n("b.height")],
     "position of a run": lambda m, n: m.simulate(0.1).position(n("b.rod.end")),
     "simulate_many": lambda m, n: m.simulate_many(0.1, {n("a.q"): [0.1, 0.2]}, {n("b.l"): [0.4, 0.5]},
@@ -448,10 +453,12 @@ DOORS: dict[str, Door] = {
     "simulate_many of a place": lambda m, n: m.simulate_many(0.1, initial={f"x({n('a.rod.end')})": [0.1, 0.2]}).x,
     "grid": lambda m, n: m.simulate_many(0.1, grid={n("a.q"): [0.1, 0.2], n("b.l"): (0.4, 0.5, 2)}).x,
     "kinematic_analysis": lambda m, n: m.kinematic_analysis(**{n("a.q"): RANGE, n("b.q"): 0.1}).x,
+    "a value at an equilibrium": lambda m, n: m.equilibrium({n("a.q"): 0.3})[n("a.q")],
     "equilibrium": lambda m, n: m.equilibrium({n("a.q"): 0.3}, hold={n("a.q"): 0.2}, unknowns=[n("a.tau")]).x,
     "linearize": lambda m, n: m.linearize({n("a.q"): 0.1}).A,
     "modes": lambda m, n: m.modes({n("a.q"): 0.0, n("b.q"): 0.0}).frequencies,
     "sensitivities": lambda m, n: m.sensitivities([n("a.l"), n("a.q")], 0.1).dx,
+    "one sensitivity": lambda m, n: m.sensitivities([n("a.l")], 0.1)[n("a.height"), n("a.l")],
     "motion_range": lambda m, n: m.motion_range(n("a.q"), within=(-0.5, 0.5)).upper,
     "consistent": lambda m, n: m.consistent(m.x0() + 1e-3, weights={n("a.q"): 3.0}, hold=[n("b.q")]),
     "actuator_forces": lambda m, n: m.actuator_forces(0.0, m.x0(), {n("a.q"): 1.0}, actuated=[n("a.q"), n("b.q")])

@@ -18,7 +18,7 @@ from ...base.names import place_of_marker
 from ...base.numeric.projection import minimum_norm
 from ...base.results import Result, ResultTable, plain, same_keys
 from ...errors import NoDerivativeError, at_odds, cannot, ill_placed, ill_typed, incomplete, untrue
-from ..argument_checks import read_names, unknown
+from ..argument_checks import plain_name, read_names, unknown
 from ..change_points import scaled_jacobians
 from ..columns import Named
 from ..initial import Initial
@@ -84,7 +84,8 @@ class Sensitivities(Result):
         self.dx, self.dy, self.held, self.events = dx, dy, tuple(held), tuple(events)
         watched = trajectory.t_events.names if len(trajectory.t_events) else ()
         times = [[event.dt for event in self.events if event.name == name] for name in watched]
-        self.event_times = Named([np.array(found).reshape(-1, len(names)) for found in times], watched)
+        self._instances = trajectory.metadata.get("instances", {})
+        self.event_times = Named([np.array(found).reshape(-1, len(names)) for found in times], watched, self._instances)
         self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
         self._rows |= dict(zip(trajectory.x_names, dx, strict=True))
 
@@ -129,7 +130,7 @@ class Sensitivities(Result):
     def __getitem__(self, key: tuple[str, str]) -> Array:
         if not (isinstance(key, tuple) and len(key) == 2):
             raise ill_typed(f"write sensitivities[state or output, parameter], not {key!r}")
-        what, name = key
+        what, name = (plain_name(part, self._instances) for part in key)
         if what not in self._rows:
             raise unknown("state or output", what, self._rows)
         if name not in self.names:
