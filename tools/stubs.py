@@ -55,7 +55,8 @@ def _method(section: str, found: ElementType) -> str:
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
-    result = RESULTS[section][0].replace("sympy.Symbol", "Any") if section in RESULTS else "None"
+    result = RESULTS[section][0] if section in RESULTS else "None"
+    result = "Any" if result.startswith("sympy.") else result
     parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument
     parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
     text = f"def\0{found.name}({' '.join(parts)}"

@@ -377,12 +377,17 @@ class Count(Field):
 class Numbers(Field):
     """A list of numbers."""
 
+    argument, annotation = "sequence of floats", "Any"
     schema = array(_NUMBER, 2)
+
+    def reference(self, value: Any, refer: Any) -> Any:
+        return [*value] if isinstance(value, range) else value
 
 
 class Grid(Field):
     """A list of lists of numbers, a row for each x."""
 
+    argument, annotation = "2-D array", "Any"
     schema = array(array(_NUMBER), 2)
 
 

@@ -9,7 +9,7 @@ from ..elements.constraints import CONSTRAINTS
 from ..elements.element_type import ElementType
 from ..elements.forces import FORCES
 from ..elements.joints import JOINTS
-from .fields import BODY, EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE, joint_type
+from .fields import BODY, EVENT, FUNCTION, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE, joint_type
 from .handles import Described, JointHandle, References
 from .methods import method_of
 
@@ -45,6 +45,12 @@ ENTRIES = {
         "times are in ``Trajectory.t_events[name]``.  With a restitution the expression is a gap between bodies: where "
         "it closes an impact opens it again, this much slower, with impulses that obey all joints.",
         EVENT,
+    ),
+    "functions": ElementType(
+        "table",
+        "a table: a smooth function through its points, which is called on SymPy expressions and, in texts, by its "
+        "name.",
+        FUNCTION["table"],
     ),
     "bodies": ElementType(
         "body",

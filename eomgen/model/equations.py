@@ -31,50 +31,10 @@ from .values import Reader
 
 
 def describe_lagrangian(
-    name: str,
-    L: Any,
-    coordinates: Sequence[Any],
-    forces: Sequence[Any] | Mapping[Any, Any] | None = None,
-    dissipation: Any = None,
-    constraints: Sequence[Any] = (),
-    parameters: Mapping[Any, Any] | None = None,
-    inputs: Mapping[Any, Any] | None = None,
-    latex: Mapping[Any, str] | None = None,
-) -> Description:
-    """Describe a system by its Lagrangian L = T - V.
-
-    Parameters
-    ----------
-    name : str
-        Identifier; the generated module bears it.
-    L : sympy.Expr or str
-        T - V in coordinates, velocities and t.
-    coordinates : sequence
-        Generalized coordinates: functions of time ``q(t)`` (``dynamicsymbols``), whose velocities are their
-        derivatives, or plain symbols (or names) ``q``, whose velocities are the symbols ``q_dot``.
-    forces : sequence or mapping, optional
-        Generalized forces, one for each coordinate in order, or by coordinate.
-    dissipation : sympy.Expr, optional
-        Rayleigh's dissipation function D(q, q_dot); it adds the forces -dD/dq_dot.
-    constraints : sequence of sympy.Expr, optional
-        Constraints, each = 0: of coordinates and t (holonomic), or linear in the velocities (nonholonomic).
-    parameters : mapping, optional
-        Values by symbol or name.  Every other free symbol becomes a parameter without a value.
-    inputs : mapping, optional
-        Quantities given over time, by symbol or name: the value that holds while none is given.
-    latex : mapping, optional
-        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``; also
-        velocities, ``"q_dot"``, and the multipliers of the constraints, ``"lambda_1"``.
-
-    Returns
-    -------
-    Description
-
-    Raises
-    ------
-    ModelError
-        A coordinate is neither a symbol nor a function of time ``q(t)``.
-    """
+    name: str, L: Any, coordinates: Any, forces: Any, dissipation: Any, constraints: Any, parameters: Any, inputs: Any,
+    latex: Any,
+) -> Description:  # fmt: skip
+    """Describe a system by its Lagrangian; arguments as for :meth:`.Model.from_lagrangian`."""
     names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
     given: dict[str, Any] = {"coordinates": names, "expression": L}
     if forces is not None:

@@ -104,9 +104,17 @@ FUNCTION: dict[str, Fields] = {
         "x": k.Numbers("points, strictly increasing", required=True),
         "y": k.Numbers("values at the points; with z, points along the second argument", required=True),
         "z": k.Grid("values on the grid of x and y, for a function of two arguments"),
-        "kind": k.Choice("interpolation between the points", default="cubic", choices=tuple(TABLES)),
+        "kind": k.Choice(
+            "cubic and natural are splines with continuous curvature, with not-a-knot ends and with ends without "
+            "curvature; periodic likewise, repeating from the last point on, whose value is the first; monotone "
+            "(PCHIP) has a continuous slope and never overshoots; a grid takes cubic or natural",
+            default="cubic",
+            choices=tuple(TABLES),
+        ),
         "extrapolation": k.Choice(
-            "beyond the points: keep the slope or the value", default="linear", choices=("linear", "constant")
+            "beyond the points: keep the slope or the value (the slope then jumps)",
+            default="linear",
+            choices=("linear", "constant"),
         ),
     },
     "native": {

@@ -20,7 +20,7 @@ from ..errors import UsageError, at_odds, ill_typed, no_such
 from .description import DescribedEntry
 from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
 from .names import nearest
-from .sympy_face import symbol
+from .sympy_face import function, symbol
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 #: Section of elements -> what its methods return.
@@ -29,6 +29,7 @@ _HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "const
 RESULTS: dict[str, tuple[str, Callable[[Described, DescribedEntry], Any]]] = {
     **{section: (handle.__name__, handle) for section, handle in _HANDLES.items()},
     **dict.fromkeys(("parameters", "inputs", "states"), ("sympy.Symbol", lambda model, entry: symbol(entry.name))),
+    "functions": ("sympy.Function", lambda model, entry: function(entry.name)),
     "bodies": ("BodyHandle", lambda model, entry: BodyHandle(model, entry.name, entry)),
 }
 _WIDTH = 108  #: of the text of a method's documentation
@@ -147,11 +148,9 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
             bound.apply_defaults()
         kept = {key: value for key, value in bound.arguments.items() if value is not None or key in found.ends}
         name, given = kept.pop("name"), {key: value for key, value in kept.items() if key != "self"}
-        values = (
-            {"type": found.name, **_entry(self, found, name, given)}
-            if section in _HANDLES
-            else _said(self, found, given)
-        )
+        values = _entry(self, found, name, given) if section in _HANDLES else _said(self, found, given)
+        if section in (*_HANDLES, "functions"):
+            values = {"type": found.name, **values}
         entry = self._add(section, name, values)
         return RESULTS[section][1](self, entry) if section in RESULTS else None
 

@@ -102,7 +102,40 @@ class Builder(ElementMethods):
         inputs: Mapping[Any, Any] | None = None,
         latex: Mapping[Any, str] | None = None,
     ) -> Self:
-        """Make a model from a Lagrangian; see :func:`eomgen.model.equations.describe_lagrangian`."""
+        """Make a model from a Lagrangian L = T - V.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; the generated module bears it.
+        L : sympy.Expr or str
+            T - V in coordinates, velocities and t.
+        coordinates : sequence
+            Generalized coordinates: functions of time ``q(t)`` (``dynamicsymbols``), whose velocities are their
+            derivatives, or plain symbols (or names) ``q``, whose velocities are the symbols ``q_dot``.
+        forces : sequence or mapping, optional
+            Generalized forces, one for each coordinate in order, or by coordinate.
+        dissipation : sympy.Expr, optional
+            Rayleigh's dissipation function D(q, q_dot); it adds the forces -dD/dq_dot.
+        constraints : sequence of sympy.Expr, optional
+            Constraints, each = 0: of coordinates and t (holonomic), or linear in the velocities (nonholonomic).
+        parameters : mapping, optional
+            Values by symbol or name.  Every other free symbol becomes a parameter without a value.
+        inputs : mapping, optional
+            Quantities given over time, by symbol or name: the value that holds while none is given.
+        latex : mapping, optional
+            How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``;
+            also velocities, ``"q_dot"``, and the multipliers of the constraints, ``"lambda_1"``.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ModelError
+            A coordinate is neither a symbol nor a function of time ``q(t)``.
+        """
         from .equations import describe_lagrangian
         from .sympy_text import SympyNames
 
@@ -173,45 +206,6 @@ class Builder(ElementMethods):
         given |= {key: text for key, text in (("unit", unit), ("doc", doc), ("latex", latex)) if text != ""}
         self._add("states", name, {key: x for key, x in given.items() if x is not None})
         return symbol(name)
-
-    @checked_keywords
-    def table(
-        self,
-        name: str,
-        x: Any,
-        y: Any,
-        z: Any = None,
-        kind: str | None = None,
-        extrapolation: str | None = None,
-    ) -> Any:
-        """Declare a smooth function through the points of a table.
-
-        Parameters
-        ----------
-        name : str
-            Identifier.
-        x : sequence of floats
-            Points, strictly increasing.
-        y : sequence of floats
-            Values at the points; with ``z``, points along the second argument.
-        z : (len(x), len(y)) array, optional
-            Values of a function of two arguments on a grid.
-        kind : {"cubic", "natural", "periodic", "monotone"}, optional
-            ``cubic`` (default) and ``natural`` are splines with continuous curvature, with not-a-knot ends and with
-            ends without curvature; ``periodic`` likewise, repeating with the period ``x[-1] - x[0]``, where the last
-            value is the first; ``monotone`` (PCHIP) has a continuous slope and never overshoots.  A grid takes
-            ``cubic`` or ``natural``.
-        extrapolation : {"linear", "constant"}, optional
-            Beyond the points: on with the slope of the end (default), or with its value (the slope then jumps).
-
-        Returns
-        -------
-        sympy.Function
-            Call it on SymPy expressions; in texts write ``name(...)``.
-        """
-        x, y, z = (list(points) if isinstance(points, range) else points for points in (x, y, z))
-        given = {"x": x, "y": y, "z": z, "kind": kind, "extrapolation": extrapolation}
-        return self._function("table", name, given)
 
     @checked_keywords
     def native(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import ClassVar, cast
+from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import Allowed
@@ -12,7 +12,7 @@ from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt
 from ...expr.vectors import Vec3
 from ..dimensions import ENERGY, TIME
-from ..element_type import ElementType, Entry, table
+from ..element_type import Entry, Where, element, key, table
 from ..frames import Marker
 from ..kinds import LAW, Matrix6
 from ..looks import RUBBER, Drawn, Seen
@@ -40,8 +40,19 @@ class Bushing(Force):
     formula: ClassVar[str] = r"\mathbf{Q} = -\mathbf{K} \mathbf{y} - \mathbf{D} \dot{\mathbf{y}}"
     first: Marker
     second: Marker
-    stiffness: Mat6
-    damping: Mat6
+    stiffness: Mat6 = key(
+        Matrix6(
+            "six values for the diagonal, three of forces and three of torques, or a symmetric 6 x 6 matrix (N/m, N, "
+            "N m/rad)",
+            required=True, dimension=ENERGY,
+        )
+    )  # fmt: skip
+    damping: Mat6 = key(
+        Matrix6(
+            "the same form, for the velocity of the displacement (N s/m, N s, N m s/rad)",
+            default=(0,) * 6, level=LAW, dimension=ENERGY.times(TIME),
+        )
+    )  # fmt: skip
 
     def drawn(self) -> list[Seen]:
         return [Drawn((self.first, self.second), along=RUBBER)]
@@ -126,47 +137,23 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total
 
 
-def _bushing(e: Entry) -> Bushing | None:
-    pair, stiffness, damping = e.pair(), e["stiffness"], e["damping"]
+def _check_symmetry(e: Entry) -> None:
+    stiffness: Mat6 | None = e["stiffness"]
     for i, j in combinations(range(6), 2) if stiffness is not None else ():
-        difference = cast(Mat6, stiffness)[j][i] - cast(Mat6, stiffness)[i][j]
-        if difference.is_zero:
-            continue
-        if difference.value is not None:
-            e.fault(
-                f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal", "EG-RANGE"
-            )
-        else:
-            e.require(
-                f"stiffness[{j}][{i}]",
-                difference,
-                Allowed(0.0, 0.0),
-                "this is its difference from [j][i]; both must be equal",
-            )
-    if pair is None or stiffness is None or damping is None:
-        return None
-    return Bushing(e.name, *pair, cast(Mat6, stiffness), cast(Mat6, damping))
+        difference, place = stiffness[j][i] - stiffness[i][j], f"stiffness[{j}][{i}]"
+        if difference.value is None:
+            rule = "this is its difference from [j][i]; both must be equal"
+            e.require(place, difference, Allowed(0.0, 0.0), rule)
+        elif not difference.is_zero:
+            e.fault(place, "the matrix is not symmetric", "[i][j] and [j][i] must be equal", "EG-RANGE")
 
 
 TYPES = table(
-    ElementType(
+    element(
+        Bushing,
         "bushing",
         "a bushing: force and torque are matrices times the displacement of the second marker in axes of the first.",
-        {
-            "between": BETWEEN.replace(required=True),
-            "stiffness": Matrix6(
-                "six values for the diagonal, three of forces and three of torques, or a symmetric 6 x 6 matrix "
-                "(N/m, N, N m/rad)",
-                required=True,
-                dimension=ENERGY,
-            ),
-            "damping": Matrix6(
-                "the same form, for the velocity of the displacement (N s/m, N s, N m s/rad)",
-                default=(0,) * 6,
-                level=LAW,
-                dimension=ENERGY.times(TIME),
-            ),
-        },
-        _bushing,
+        Where({"between": BETWEEN.replace(required=True)}, Entry.pair),
+        check=_check_symmetry,
     )
 )

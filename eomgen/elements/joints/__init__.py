@@ -1,50 +1,15 @@
-"""Joints: one short class a type; :data:`JOINTS` is the literal table of all of them."""
+"""Joints: one short class a type; :data:`JOINTS` is the table of all of them."""
 
-from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
+from . import guides, joint_types, rods
 from .joint import Closure, Coordinate, Joint, QuaternionSlot, Shape, Velocity
-from .joint_types import (
-    ConstantVelocity,
-    Continuous,
-    Cylindrical,
-    Free,
-    Planar,
-    Prismatic,
-    Revolute,
-    Screw,
-    Spherical,
-    Translational,
-    Universal,
-    Weld,
-)
-from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
+from .joint_types import Continuous, Prismatic, Revolute
 
+#: By their words, in the order of their files.
 JOINTS: dict[str, type[Joint]] = {
-    joint.type_name: joint
-    for joint in (
-        Revolute,
-        Continuous,
-        Prismatic,
-        Screw,
-        Cylindrical,
-        Universal,
-        ConstantVelocity,
-        Spherical,
-        Planar,
-        Translational,
-        CurveSlider,
-        SurfaceSlider,
-        PointOnCurve,
-        PointOnSurface,
-        Free,
-        Weld,
-        Distance,
-        RevoluteSpherical,
-        Inline,
-        Inplane,
-        Parallel,
-        Perpendicular,
-        Orientation,
-    )
+    one.type_name: one
+    for home in (joint_types, guides, rods)
+    for one in vars(home).values()
+    if isinstance(one, type) and issubclass(one, Joint) and "type_name" in vars(one)
 }
 
 __all__ = [
@@ -52,14 +17,10 @@ __all__ = [
     "Closure",
     "Continuous",
     "Coordinate",
-    "Distance",
-    "Free",
     "Joint",
     "Prismatic",
     "QuaternionSlot",
     "Revolute",
     "Shape",
-    "Spherical",
     "Velocity",
-    "Weld",
 ]
