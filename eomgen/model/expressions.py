@@ -11,7 +11,8 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from ..base.operations import OPERATIONS
 from ..base.syntax_trees import parse_statement
@@ -160,23 +161,19 @@ def names_in(text: str) -> list[str]:
     return list(found)
 
 
+@dataclass
 class _Walker:
     """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
 
-    def __init__(
-        self,
-        text: str,
-        start: int,
-        graph: Graph,
-        resolve: Resolve,
-        locate: Locate | None,
-        any_function: bool,
-        plain: Callable[[str], str],
-    ) -> None:
-        self.text, self.start, self.graph, self.any_function, self.plain = text, start, graph, any_function, plain
-        self.resolve, self.locate = resolve, locate
-        self.words = function_words()
-        self.size = 0
+    text: str
+    start: int  #: of the expression in it
+    graph: Graph
+    resolve: Resolve
+    locate: Locate | None
+    any_function: bool
+    plain: Callable[[str], str]
+    words: Mapping[str, tuple[int, int]] = field(default_factory=function_words)
+    size: int = 0
 
     def fault(self, node: ast.AST, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:
         column = getattr(node, "col_offset", 0) + self.start + 1

@@ -411,31 +411,22 @@ def model_schema() -> dict[str, Any]:
     dict
         Plain data, ready for ``json.dumps``.  It describes the layout; names and expressions are judged by the check.
     """
-    values = {**_section(ref("expression"), ""), "propertyNames": ref("reference")}
-    sections: Schema = {
-        "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
-        "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
-        "functions": _section(
-            {"oneOf": [typed_schema(function_fields(name), name) for name in FUNCTION]}, MODEL["functions"].doc
-        ),
-        "bodies": _section(_body(), MODEL["bodies"].doc),
-        "joints": _section({"oneOf": [typed_schema(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
-        "forces": _section({"oneOf": [_element("force", FORCES, name) for name in FORCES]}, MODEL["forces"].doc),
-        "contacts": _section(_contacts(), MODEL["contacts"].doc),
-        "constraints": _section(
-            {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
-        ),
-        "states": _section(_short("states", STATE), MODEL["states"].doc),
-        "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
-        "events": _section(_short("events", EVENT), MODEL["events"].doc),
-        "lagrangian": {**table_schema(LAGRANGIAN), "description": MODEL["lagrangian"].doc},
-        "equations": {**table_schema(EQUATIONS), "description": MODEL["equations"].doc},
-        "simulation": {**table_schema(SIMULATION), "description": MODEL["simulation"].doc},
-        "initial": {**values, "description": MODEL["initial"].doc},
-        "guess": {**values, "description": MODEL["guess"].doc},
+    entries: Schema = {
+        "functions": {"oneOf": [typed_schema(function_fields(name), name) for name in FUNCTION]},
+        "bodies": _body(),
+        "joints": {"oneOf": [typed_schema(joint_fields(name), name) for name in JOINTS]},
+        "forces": {"oneOf": [_element("force", FORCES, name) for name in FORCES]},
+        "contacts": _contacts(),
+        "constraints": {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]},
+        "add": table_schema(ADDED),
+        **{section: _short(section, fields_of(section, {})) for section in SHORT},
     }
+    sections: Schema = {section: _section(entry, MODEL[section].doc) for section, entry in entries.items()}
+    values = {**_section(ref("expression"), ""), "propertyNames": ref("reference")}
+    tables = {"lagrangian": LAGRANGIAN, "equations": EQUATIONS, "simulation": SIMULATION}
+    plain = {"initial": values, "guess": values, **{key: table_schema(fields) for key, fields in tables.items()}}
+    sections |= {key: {**schema, "description": MODEL[key].doc} for key, schema in plain.items()}
     sections["bodies"]["properties"] = {"ground": table_schema(GROUND)}
-    sections["add"] = _section(table_schema(ADDED), MODEL["add"].doc)
     own = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in COMPONENT.items()}
     sections["components"] = _section(object_schema(own), MODEL["components"].doc)
     properties = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in MODEL.items()}
