@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from ..base.notation import with_instance
 from ..elements import kinds
+from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from ..expr.core import Graph
@@ -62,7 +63,8 @@ class OwnNames:
         declare_states(reader, sections["states"], False)
         own_states(reader, sections["forces"])
         declare_switches(reader, [*sections["constraints"], *sections["joints"]])
-        self.symbols |= {*reader.names.kinds} - {"t"}
+        unknown = [entry for entry in sections["joints"] if str(entry.values.get("type")) not in JOINTS]
+        self.symbols |= {str(entry.name) for entry in unknown} | {*reader.names.kinds} - {"t"}
 
     def has_symbol(self, name: str) -> bool:
         """Whether a name, or the quantity whose rate it is, is declared."""

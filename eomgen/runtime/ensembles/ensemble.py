@@ -17,7 +17,7 @@ from ...base.results import plain as plain_values
 from ...base.texts import html_table
 from ...base.value_rules import read_count
 from ...errors import UsageError, cannot, off_range
-from ..argument_checks import plain_name, require, unknown
+from ..argument_checks import require, unknown
 from ..identity import origin, plain, spell_input
 from ..runs.simulate import simulate
 from ..storage import attributes, free, table_path
@@ -147,7 +147,7 @@ class Ensemble(Result):
 
     def events(self, name: str) -> tuple[Array, Array]:
         """Times (m, k) of an event in each run, and the projected states (n_x, m, k) there; NaN where it was not."""
-        name = plain_name(name, self.metadata.get("instances", {}))
+        name = self._module.layout.plain(name)
         if name not in self.event_names:
             raise unknown("event", name, self.event_names)
         if self._notes is None:
