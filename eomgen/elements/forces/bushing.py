@@ -16,6 +16,7 @@ from ..element_type import Entry, Where, element, key, table
 from ..frames import Marker
 from ..kinds import LAW, Matrix6
 from ..looks import RUBBER, Drawn, Seen
+from ..rotations.scalars import dot
 from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN
 
@@ -95,8 +96,8 @@ class Bushing(Force):
             (y, xy, 1.0 - a + b - c, yz),
             (z, zx, yz, 1.0 - a - b + c),
         )
-        along = [_dot(row, Q[0]) for row in Q]
-        size = 2.0 * sqrt(_dot(along, Q[0]))
+        along = [dot(row, Q[0]) for row in Q]
+        size = 2.0 * sqrt(dot(along, Q[0]))
         return along[0] / size, (along[1] / size, along[2] / size, along[3] / size)
 
     def _displacements(self, view: View) -> list[Expr]:
@@ -127,14 +128,7 @@ class Bushing(Force):
 
 
 def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
-    return [_dot(row, y) for row in m]
-
-
-def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
-        total = total + x * y
-    return total
+    return [dot(row, y) for row in m]
 
 
 def _check_symmetry(e: Entry) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,24 +49,7 @@ def where_less(a: Scalar, b: Scalar, yes: Scalar, no: Scalar) -> Scalar:
     return yes if a < b else no
 
 
-def sin(x: Scalar) -> Scalar:
-    """sin x"""
-    return apply("sin", x)
-
-
-def cos(x: Scalar) -> Scalar:
-    """cos x"""
-    return apply("cos", x)
-
-
-def sqrt(x: Scalar) -> Scalar:
-    """Square root of x"""
-    return apply("sqrt", x)
-
-
-def atan2(y: Scalar, x: Scalar) -> Scalar:
-    """Angle of the vector (x, y); 0 for numbers that are both 0."""
-    return apply("atan2", y, x)
+sin, cos, sqrt, atan2 = (partial(apply, name) for name in ("sin", "cos", "sqrt", "atan2"))
 
 
 def cosine_and_sine(angle: Scalar) -> tuple[Scalar, Scalar]:
