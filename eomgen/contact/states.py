@@ -254,11 +254,6 @@ class On(MarkerReference):
         many = items(value)
         return refer.marker(value) if many is None else [refer.marker(one) for one in many]
 
-    def map(self, value: Any, visitor: Any) -> Any:
-        if isinstance(value, list | tuple):
-            return [visitor.marker(one) for one in value]
-        return None if value is None else visitor.marker(value)
-
 
 _RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
 _PLACE = Scalar("", dimension=LENGTH)

@@ -109,7 +109,7 @@ class Field:
     annotation: ClassVar[str] = "Value"
     schema: ClassVar[Schema] = {}
     defines: ClassVar[Mapping[str, Schema | Callable[[], Schema]]] = {}  #: what the schema refers to
-    names_of: ClassVar[str] = ""  #: 'coordinate' or 'body', where it holds names of these
+    holds: ClassVar[str] = ""  #: what a visitor changes of it: vector, marker, latex, or the names coordinate, body
     joins: ClassVar[bool] = False  #: whether the method has an argument for each of its two ends
     parts: ClassVar[Fields] = {}  #: keys within it
 
@@ -172,7 +172,10 @@ class Field:
 
     def map(self, value: Any, visitor: Any) -> Any:
         """A value as a visitor changes what it holds; what has not the form of the kind stays as it is."""
-        return _named(value, getattr(visitor, self.names_of)) if self.names_of else value
+        if isinstance(value, list | tuple) and self.holds:
+            return [self.map(part, visitor) for part in value]
+        no_name = self.holds in ("coordinate", "body") and not isinstance(value, str)
+        return value if no_name or not self.holds else getattr(visitor, self.holds)(value)
 
     def is_default(self, value: Any) -> bool:
         """Whether leaving a value out means the same."""
@@ -219,21 +222,6 @@ def by(method: str) -> Any:
     return lambda self, reader, path, value: getattr(reader, method)(path, value)
 
 
-def _each(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A list whose items are changed; anything else as it is."""
-    return [change(part) for part in value] if isinstance(value, list | tuple) else value
-
-
-def _named(value: Any, change: Callable[[str], str]) -> Any:
-    """A name, or a list of names, changed; anything else as it is."""
-    return change(value) if isinstance(value, str) else _each(value, lambda name: _named(name, change))
-
-
-def expressions(self: Field, value: Any, visitor: Any) -> Any:
-    """Changing what a value of expressions holds, whatever lists and mappings they stand in."""
-    return visitor.vector(value)
-
-
 # -- words, names and plain numbers -----------------------------------------------------------------------------------
 class Text(Field):
     """A text."""
@@ -250,10 +238,12 @@ class Unit(Text):
 class Latex(Text):
     """The LaTeX of a symbol, such as \\theta_1."""
 
+    holds = "latex"
+
     def map(self, value: Any, visitor: Any) -> Any:
         if isinstance(value, Mapping):
-            return {_named(name, visitor.coordinate): visitor.latex(part) for name, part in value.items()}
-        return _each(value, visitor.latex) if isinstance(value, list | tuple) else visitor.latex(value)
+            return {visitor.coordinate(str(name)): visitor.latex(part) for name, part in value.items()}
+        return super().map(value, visitor)
 
 
 class Latexes(Latex):
@@ -273,7 +263,7 @@ class Name(Field):
 class CoordinateName(Name):
     """The name that an entry gives to a coordinate."""
 
-    says, names_of = Name.says, "coordinate"
+    says, holds = Name.says, "coordinate"
 
 
 class Names(Field):
@@ -286,14 +276,14 @@ class Names(Field):
 class CoordinateNames(Names):
     """The names that an entry gives to coordinates or velocities."""
 
-    says, names_of = Names.says, "coordinate"
+    says, holds = Names.says, "coordinate"
 
 
 class SomeNames(Field):
     """A list of names, or one name."""
 
     argument, annotation = "str or sequence of str", "Any"
-    names_of = "coordinate"
+    holds = "coordinate"
     schema = any_of(ref("name"), array(ref("name")))
 
 
@@ -425,7 +415,7 @@ class Scalar(Field):
     def absent(self, reader: Any) -> Any:
         return reader.stand_in if self.required else None
 
-    map = expressions
+    holds = "vector"
 
 
 class Vector(Scalar):
@@ -468,7 +458,7 @@ class Scalars(Field):
                 reader.requirements.inside(f"{path}[{k}]", part, self.allowed, self.remedy or _RULES[self.allowed])
         return None if found is None else tuple(found)
 
-    map = expressions
+    holds = "vector"
 
 
 class Two(Scalars):
@@ -537,7 +527,7 @@ class Rates(Field):
     def map(self, value: Any, visitor: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        return {_named(name, visitor.coordinate): visitor.scalar(x) for name, x in value.items()}
+        return {visitor.coordinate(str(name)): visitor.scalar(x) for name, x in value.items()}
 
 
 class CoordinateForces(Rates):
@@ -592,7 +582,7 @@ class Wheels(Field):
             reader.requirements.inside(f"{path}.{name}", size, POSITIVE, "give a size greater than 0")
         return found
 
-    map = expressions
+    holds = "vector"
 
 
 class Inertia(Wheels):
@@ -710,6 +700,7 @@ class MarkerReference(Field):
     """A body, body.marker, ground or {body, at, rpy}."""
 
     argument, annotation = "handle or str", "Any"
+    holds = "marker"
     schema, defines = define("marker", lambda: any_of(ref("reference"), table_schema(PLACED)))
     parts = MARKER
 
@@ -718,14 +709,12 @@ class MarkerReference(Field):
     def reference(self, value: Any, refer: Any) -> Any:
         return refer.marker(value)
 
-    def map(self, value: Any, visitor: Any) -> Any:
-        return visitor.marker(value)
-
 
 class Pair(Field):
     """A list of two markers, each a body, body.marker, ground or {body, at, rpy}."""
 
     argument, annotation = "handles or str", "Sequence[Any]"
+    holds = "marker"
     schema, defines = define("pair", array(ref("marker"), 2, 2))
     parts, joins = MARKER, True
 
@@ -733,9 +722,6 @@ class Pair(Field):
 
     def reference(self, value: Any, refer: Any) -> Any:
         return [refer.marker(part) for part in items(value) or [value]]
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        return _each(value, visitor.marker)
 
 
 CYLINDER: Fields = {
@@ -757,6 +743,7 @@ class Via(Field):
     """A list of markers and cylinders {around, radius, sense, friction, smoothing}."""
 
     argument, annotation = "sequence", "Sequence[Any]"
+    holds = "marker"
     schema = array(ref("stop"))
     defines = define("stop", lambda: any_of(ref("marker"), table_schema(CYLINDER)))[1]
     parts = CYLINDER | MARKER
@@ -806,14 +793,9 @@ class Via(Field):
         return {key: refer.marker(x) if key == "around" else x for key, x in stop.items()}
 
     def map(self, value: Any, visitor: Any) -> Any:
-        return _each(value, lambda stop: self._mapped(stop, visitor))
-
-    @staticmethod
-    def _mapped(stop: Any, visitor: Any) -> Any:
-        if not (isinstance(stop, Mapping) and "around" in stop):
-            return visitor.marker(stop)
-        inside = {key: CYLINDER[key].map(x, visitor) for key, x in stop.items() if key in CYLINDER}
-        return {**stop, **inside}
+        if not (isinstance(value, Mapping) and "around" in value):
+            return super().map(value, visitor)
+        return {key: CYLINDER[key].map(x, visitor) if key in CYLINDER else x for key, x in value.items()}
 
 
 # -- joints, coordinates and bodies -----------------------------------------------------------------------------------
@@ -821,7 +803,7 @@ class BodyName(Reference):
     """The name of a body."""
 
     argument, annotation = "handle or str", "Any"
-    names_of = "body"
+    holds = "body"
     schema = ref("reference")
     read = by("body")
 
@@ -833,7 +815,7 @@ class JointReference(Reference):
     """The name of a joint, or of one coordinate of a joint."""
 
     argument, annotation = "handle or str", "Any"
-    names_of = "coordinate"
+    holds = "coordinate"
     schema = ref("reference")
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
@@ -847,7 +829,7 @@ class JointPair(Field):
     """A list of two joints, or coordinates of joints."""
 
     argument, annotation = "handles or str", "Sequence[Any]"
-    names_of = "coordinate"
+    holds = "coordinate"
     schema = array(ref("reference"), 2, 2)
     joins = True
 
@@ -905,7 +887,7 @@ class BodyParts(Field):
     words = ("type", "axis", "subtract", "file", "shape")  #: keys that are words, not scalars
 
     def map(self, value: Any, visitor: Any) -> Any:
-        return _each(value, lambda part: self._mapped(part, visitor))
+        return [self._mapped(part, visitor) for part in value] if isinstance(value, list | tuple) else value
 
     def _mapped(self, part: Any, visitor: Any) -> Any:
         if not isinstance(part, Mapping):
