@@ -179,6 +179,7 @@ BODY: Fields = {
         default=(0, 0, 0),
         dimension=MOMENT_OF_INERTIA,
     ),
+    "markers": k.Markers("named frames fixed in the body, known as body.name", default=()),
     "principal": k.Vector("principal moments (kg m^2) along axes, instead of inertia", dimension=MOMENT_OF_INERTIA),
     "first_moment": k.Vector(
         "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
@@ -193,7 +194,6 @@ BODY: Fields = {
         "a mass and inertia that no body can have: refused (error, true), noted (note) or taken in silence (off, "
         "false); as in the model unless given"
     ),
-    "markers": k.Markers("named frames fixed in the body, known as body.name", default=()),
     "display": k.Display("shapes for pictures, in body axes", default=()),
 }
 GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}

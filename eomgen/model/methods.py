@@ -146,8 +146,8 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
             raise TypeError(f"{found.name}() {error}{more}") from None
         if section not in _HANDLES:
             bound.apply_defaults()
-        kept = {key: value for key, value in bound.arguments.items() if value is not None or key in found.ends}
-        name, given = kept.pop("name"), {key: value for key, value in kept.items() if key != "self"}
+        given = {key: value for key, value in bound.arguments.items() if value is not None or key in found.ends}
+        name, given = bound.arguments["name"], {key: x for key, x in given.items() if key not in ("self", "name")}
         values = _entry(self, found, name, given) if section in _HANDLES else _said(self, found, given)
         if section in (*_HANDLES, "functions"):
             values = {"type": found.name, **values}

@@ -133,7 +133,9 @@ def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
 
 def _check_symmetry(e: Entry) -> None:
     stiffness: Mat6 | None = e["stiffness"]
-    for i, j in combinations(range(6), 2) if stiffness is not None else ():
+    if stiffness is None:
+        return
+    for i, j in combinations(range(6), 2):
         difference, place = stiffness[j][i] - stiffness[i][j], f"stiffness[{j}][{i}]"
         if difference.value is None:
             rule = "this is its difference from [j][i]; both must be equal"
