@@ -34,7 +34,7 @@ def describe_lagrangian(
     name: str, L: Any, coordinates: Any, forces: Any, dissipation: Any, constraints: Any, parameters: Any, inputs: Any,
     latex: Any,
 ) -> Description:  # fmt: skip
-    """Describe a system by its Lagrangian; arguments as for :meth:`.Model.from_lagrangian`."""
+    """Describe a system by its Lagrangian; arguments as for ``Model.from_lagrangian``."""
     names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
     given: dict[str, Any] = {"coordinates": names, "expression": L}
     if forces is not None:
