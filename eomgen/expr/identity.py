@@ -1,8 +1,9 @@
 """Expressions -> which of them vanish identically; values with bounds of their rounding.
 
-An expression vanishes if it does so, to rounding, at three random points.  An analytic one that is not zero passes a
-point with a probability of about delta^(1/d), where delta = 1.4e-14 is what counts as rounding of its terms and d the
-order of its zeros (E. J. Remez, 1936), and all three points with delta^(3/d): below 2e-14 for d up to 3.
+An expression vanishes if it does so, to rounding, at three random points, with all signs of its roots.  An analytic one
+that is not zero passes a point with a probability of about delta^(1/d), where delta = 1.4e-14 is what counts as
+rounding of its terms and d the order of its zeros (E. J. Remez, 1936), and all three points with delta^(3/d): below
+2e-14 for d up to 3.
 
 Running error analysis (J. H. Wilkinson; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002,
 3.3): beside every value x stands a bound e such that x is known to about eps e.  A sum adds the bounds of its terms, so
@@ -18,12 +19,13 @@ import numpy as np
 
 from ..base.limits.numbers import CHANCE, ROUNDED
 from ..base.operations import OPERATIONS, operations_with, unit
-from .core import LEAVES, Expr, Graph, common_graph, reachable, symbols_of
+from .core import LEAVES, Expr, Graph, common_graph, reachable, substitute, symbols_of
 from .differentiate import gradient
 from .evaluate import Evaluator, Value
 from .vectors import Mat3, Vec3
 
 TRIES = 3  #: random points at which an expression has to vanish
+ROOTS = 4  #: of an expression, up to which all their signs are tried
 DRAWS = 9  #: points that are drawn for it: some lie outside of the domain of a root or logarithm
 
 
@@ -131,13 +133,15 @@ def vanishes(
     graph = common_graph(outputs)
     if graph is None:
         return []
-    left = {k: 0 for k, analytic in enumerate(_analytic(graph, outputs)) if analytic or pieces}  # points passed
+    of = [[y] for y in outputs] if pieces else _branches(graph, outputs)
+    flat = [x for branches in of for x in branches]
+    left = dict.fromkeys(range(len(flat)), 0)  # points passed
     found, values = set[int](), dict[str, float]()
     random = np.random.default_rng(11)
     for draw in range(DRAWS):
         if not left:
             break
-        tried = [outputs[k] for k in left]
+        tried = [flat[k] for k in left]
         values |= random_point(tried, random, signs=draw < TRIES)
         numbers, bounds = with_bounds(tried, values)
         zero = is_rounding(numbers, bounds) if within is None else np.abs(numbers) < within
@@ -146,10 +150,12 @@ def vanishes(
         for k in [k for k, passed in left.items() if passed == TRIES]:
             del left[k]
             if within is not None or (
-                is_rounding(*with_likely_bounds([outputs[k]], values)) and _is_flat(outputs[k], values)
+                is_rounding(*with_likely_bounds([flat[k]], values)) and _is_flat(flat[k], values)
             ):
                 found.add(k)
-    return [k in found or (unknown and k in left) for k in range(len(outputs))]
+    verdicts = iter([k in found or (unknown and k in left) for k in range(len(flat))])
+    judged = [[next(verdicts) for _ in branches] for branches in of]
+    return [bool(own) and all(own) for own in judged]
 
 
 def dependence(
@@ -244,13 +250,26 @@ def terms_of(x: Expr) -> Expr:
     return found[x.id]
 
 
-def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
-    found: dict[int, bool] = {}
+def _branches(graph: Graph, outputs: Sequence[Expr]) -> list[list[Expr]]:
+    """Each output with every choice of the signs of its roots, as sqrt(x^2) - x vanishes for one of them alone.
+
+    Alone where it has no roots; nothing of one that is not analytic but for a few roots beside each other.
+    """
     analytic = operations_with(lambda row: row.analytic)
+    kinds: dict[int, int] = {}  # 0 of what is analytic, 1 but for roots, 2 of others
     for i in reachable(graph, (y.id for y in outputs)):
         operation, *operands = graph.nodes[i]
-        found[i] = operation in LEAVES or (operation in analytic and all(found[k] for k in operands))
-    return [found[y.id] for y in outputs]
+        inside = 0 if operation in LEAVES else max((kinds[k] for k in operands), default=0)
+        own = 0 if operation in LEAVES or operation in analytic else 2 if operation != "sqrt" or inside else 1
+        kinds[i] = max(inside, own)
+    found = [[y] if kinds[y.id] < 2 else [] for y in outputs]
+    for branches in found:
+        roots = [i for y in branches if kinds[y.id] for i in reachable(graph, [y.id]) if graph.nodes[i][0] == "sqrt"]
+        for root in (Expr(graph, i) for i in roots if len(roots) <= ROOTS):
+            branches += substitute(branches, {root: -root})
+        if len(roots) > ROOTS:
+            branches.clear()
+    return found
 
 
 def settled_vector(a: Vec3, size: float) -> Vec3:

@@ -25,6 +25,24 @@ def test_an_equation_that_holds_identically(seed: int) -> None:
 
 
 @pytest.mark.quick
+@pytest.mark.parametrize(
+    ("factor", "rows"), [("sqrt(p)*sqrt(r)*sqrt(p) - p*sqrt(r)", 0), ("sqrt(p)*sqrt(r) - p", 1), ("sqrt(p) - p", 1)]
+)
+def test_an_equation_whose_roots_cancel(factor: str, rows: int) -> None:
+    """It holds identically only where it does so with either sign of each root."""
+    m = eg.Model("arms", gravity=(0, -9.81, 0))
+    m.parameter("p", 2.0)
+    m.parameter("r", 3.0)
+    a, b = (m.body(n, mass=1, inertia=(0.1, 0.1, 0.1)) for n in "ab")
+    m.revolute("A", m.ground, a)
+    m.revolute("B", a.at(0.5, 0, 0), b)
+    b.marker("tip", at=(0.4, 0, 0))
+    m.coupling("level", equation=f"({factor})*(x(b.tip) - 0.3)")
+    report = m.check()
+    assert (report.constraints, report.rank, report.degrees_of_freedom) == (rows, rows, 2 - rows)
+
+
+@pytest.mark.quick
 def test_angular_velocity_of_bodies_without_mass() -> None:
     """It needs no mass: w = theta' e_z, alpha = theta'' e_z."""
     m = eg.Model("massless")
