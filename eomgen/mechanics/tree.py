@@ -144,7 +144,7 @@ def settled_matrix(turned: Mat3, before: Mat3) -> Mat3:
 # What a joint lets free about and along its z axis alone does not change if both of its markers turn about z by the
 # same angle. Along which direction x then lies is chosen for the link: along an arm, a hinge's axis or an axis of the
 # parent. Without that, mechanisms that lie obliquely in ground carry three components where straight ones carry two: a
-# V6 engine turned in space takes 1,336 operations with it and 2,451 without (benchmarks/linkages.py).
+# V6 engine turned in space takes 1,336 operations with it and 2,451 without (benchmarks/models/linkages.py).
 
 
 #: What an entry costs that is neither 0, nor 1 in its own place, also one of a centre of mass, which enters no equation
