@@ -16,7 +16,7 @@ from ..elements.joints import JOINTS
 from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from ..errors import ModelError, Problem
 from ..model.description import GROUND_NAME, Description, Values
-from ..model.names import LONGEST, clean_name, fault_of_model_name, nearest, unique
+from ..model.names import LONGEST, clean_name, fault_of_model_name, listing, nearest, unique
 from ..model.placement import TURNS, axis_word
 from ..model.scope import RATES
 from .robot import (
@@ -36,7 +36,6 @@ from .robot import (
     numbers,
     sum_inertias,
 )
-from .xml_file import some_of
 
 GROUND = ""  #: the body that stands still
 
@@ -694,11 +693,11 @@ class _Writer:
         limited = [self.joints[j.name] for j in moving if any(k != "effort" or j.clamp is None for k in j.limits)]
         if limited and self.options.limits == "note":
             remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
-            self.out.notes.append(f"joint limits are not enforced ({some_of(limited, SHOWN)}); {remedy}")
+            self.out.notes.append(f"joint limits are not enforced ({listing(limited, SHOWN)}); {remedy}")
         rubbing = [self.joints[j.name] for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             remedy = "load with friction=0.01 to let it act"
-            self.out.notes.append(f"the dry friction of joints does not act ({some_of(rubbing, SHOWN)}); {remedy}")
+            self.out.notes.append(f"the dry friction of joints does not act ({listing(rubbing, SHOWN)}); {remedy}")
 
 
 def _cut(law: str, bounds: Range) -> str:

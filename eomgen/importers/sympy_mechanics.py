@@ -30,6 +30,7 @@ from ..model.sympy_face import (
     names_of,
     one_or_several,
     sympy_name,
+    with_sympy,
 )
 from ..model.sympy_text import SympyNames
 
@@ -215,16 +216,13 @@ def _paired(q_dot: Sequence[Any], v: Sequence[Any], rates: dict[Any, Any]) -> li
 # -- noncontributing forces --------------------------------------------------------------------------------------------
 def replaced(value: Any, given: Mapping[Any, Any]) -> Any:
     """SymPy expressions, or lists and mappings of them, with functions of time and their derivatives replaced."""
-    if isinstance(value, Mapping):
-        return {key: replaced(part, given) for key, part in value.items()}
-    if isinstance(value, list):
-        return [replaced(part, given) for part in value]
-    if not given or not is_sympy(value) or not value.has(*given):
-        return value
     from sympy import Derivative
 
-    rates = {d: d.subs(given).doit() for d in value.atoms(Derivative) if d.has(*given)}
-    return value.xreplace(rates).xreplace(dict(given))
+    def put(expression: Any) -> Any:
+        rates = {d: d.subs(given).doit() for d in expression.atoms(Derivative) if d.has(*given)}
+        return expression.xreplace(rates).xreplace(dict(given))
+
+    return with_sympy(value, lambda x: put(x) if given and x.has(*given) else x)
 
 
 def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[str]) -> dict[Any, Any]:

@@ -15,6 +15,7 @@ from xml.parsers import expat
 from ..base.files import open_plain
 from ..base.limits.numbers import DEPTH, ELEMENTS, LONGEST, SIZE
 from ..errors import ModelError, Problem
+from ..model.names import listing
 
 
 @dataclass
@@ -190,9 +191,4 @@ class Constructs:
                 continue  # all is well, or the note of the element says it
             construct = f"<{tag}{' ' * bool(attribute)}{attribute}>" + (f" {count} times" * (count > 1))
             left.setdefault("what this reader does not know" if row is None else row.why, []).append(construct)
-        return [f"left out: {why} ({some_of(names, SHOWN)})" for why, names in left.items()]
-
-
-def some_of(names: list[str], most: int) -> str:
-    """The first names of a list, and how many there are if not all are named."""
-    return ", ".join(names[:most]) + (f", ... ({len(names)} in all)" if len(names) > most else "")
+        return [f"left out: {why} ({listing(names, SHOWN)})" for why, names in left.items()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..base.limits.numbers import TENSOR
@@ -24,7 +24,7 @@ from .mechanism import GivenEquations, Lagrangian, Output
 from .names import fault_of_name, nearest
 from .printed_names import MULTIPLIERS, give_latex, numbered, take_coordinates_latex
 from .scope import ENERGIES, RATES
-from .sympy_face import derivative_names, free_names, function_names, in_order, is_sympy, name_of, named, names_of
+from .sympy_face import derivative_names, free_names, function_names, in_order, name_of, named, names_of, values_in
 from .values import Reader
 
 # -- what Python gives -------------------------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ def describe_lagrangian(
     known = {q + rate for q in names for rate in RATES} | set(driven)
     stems = {split_rate(source)[0] for source in driven}
     found = _names_of_section(given)
-    further = derivative_names([part for part in _parts(given) if is_sympy(part)])
+    further = derivative_names([*values_in(given)])
     others = [name for name in sorted({*found, *further}) if name not in {*known, *values}]
     rates = [name for name in others if split_rate(name)[0] in stems]
     known |= set(rates)
@@ -142,20 +142,11 @@ def describe_equations(
     return description
 
 
-def _parts(value: Any) -> Iterator[Any]:
-    """Texts and SymPy expressions that a value holds."""
-    if isinstance(value, str) or is_sympy(value):
-        yield value
-    else:
-        for part in value.values() if isinstance(value, Mapping) else items(value) or ():
-            yield from _parts(part)
-
-
 def _names_of_section(given: Mapping[str, Any]) -> list[str]:
     """Names in the expressions of a section; functions of time are coordinates or faults, never parameters."""
     declared = ("coordinates", "velocities", "multipliers")
     found: set[str] = set()
-    for part in _parts({key: value for key, value in given.items() if key not in declared}):
+    for part in values_in({key: value for key, value in given.items() if key not in declared}):
         found |= {*names_in(part)} if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
     return sorted(found - {"t"})
 

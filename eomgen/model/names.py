@@ -112,11 +112,11 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     return fault_of_name(name, symbol=True)
 
 
-def listing(known: Iterable[str]) -> str:
+def listing(known: Iterable[str], most: int = LISTED) -> str:
     """The first names joined by commas, and how many there are; ``"none"`` if there are none."""
     names = list(known)
-    shown = ", ".join(names[:LISTED])
-    return (shown + f", ... ({len(names)} in all)" if len(names) > LISTED else shown) or "none"
+    shown = ", ".join(names[:most])
+    return (shown + f", ... ({len(names)} in all)" if len(names) > most else shown) or "none"
 
 
 def nearest(name: str, known: Iterable[str], what: str = "known") -> str:

@@ -89,6 +89,28 @@ def is_sympy(value: object) -> bool:
     return sympy is not None and isinstance(value, sympy.Basic)
 
 
+def values_in(given: Any, keys: bool = False) -> Iterator[Any]:
+    """Texts and SymPy expressions in lists, matrices and mappings, of these the keys too if asked for."""
+    if isinstance(given, str) or is_sympy(given):
+        yield given
+        return
+    parts = (*(given if keys else ()), *given.values()) if isinstance(given, Mapping) else items(given) or ()
+    for part in parts:
+        yield from values_in(part, keys)
+
+
+def with_sympy(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A value whose SymPy expressions are changed, whatever lists and mappings they stand in."""
+    if is_sympy(value):
+        return change(value)
+    if isinstance(value, Mapping):
+        return {key: with_sympy(part, change) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(with_sympy(part, change) for part in value)
+    listed = items(value)
+    return value if listed is None else [with_sympy(part, change) for part in listed]
+
+
 def name_of(value: object) -> Any:
     """The name behind a coordinate given as a symbol or as a function of time; else a text that is no name.
 

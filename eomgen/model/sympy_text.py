@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import partialmethod
 from itertools import count
@@ -21,7 +21,7 @@ from .expressions import parse
 from .names import fault_of_name, unique
 from .quantities import Named
 from .scope import RATES
-from .sympy_face import free_names, function_name, function_names, is_sympy, one_or_several
+from .sympy_face import free_names, function_name, function_names, is_sympy, one_or_several, values_in, with_sympy
 
 LARGE = 200  #: operations of an expression from which given equations are written with intermediates
 _WORDS = {sign: word for word, sign in GREEK.items()}
@@ -47,7 +47,7 @@ class SympyNames:
         time = sympy.Symbol("t")
         clock = next((x.args[0] for x in listed if isinstance(x.args[0], sympy.Symbol) and x.args[0].name != "t"), time)
         self.replaced: dict[Any, Any] = {} if clock == time else {clock: time}
-        for expression in _expressions(given):
+        for expression in filter(is_sympy, values_in(given, keys=True)):
             for part in parts_of(expression):
                 if isinstance(part, sympy.Symbol) and part.name != clock.name:
                     found[part] = part.name
@@ -105,18 +105,6 @@ class SympyNames:
             renamed.setdefault(homes.get(new, "coordinates"), {})[old] = new
         description.note_renamed(renamed)
         return description
-
-
-def _expressions(given: Any) -> Iterator[Any]:
-    """All SymPy expressions in lists, matrices, and keys and values of mappings."""
-    if is_sympy(given):
-        yield given
-    elif isinstance(given, Mapping):
-        for part in (*given, *given.values()):
-            yield from _expressions(part)
-    else:
-        for part in items(given) or ():
-            yield from _expressions(part)
 
 
 def _plain(name: str) -> str:
@@ -241,7 +229,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 # -- given equations ---------------------------------------------------------------------------------------------------
 def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
     """The section with the common parts of its expressions named, if one of them is large."""
-    found = list(_expressions(equations))
+    found = [*filter(is_sympy, values_in(equations))]
     if not found or max(int(x.count_ops()) for x in found) < LARGE:
         return equations
     import sympy
@@ -253,7 +241,7 @@ def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
             return equations
         inside[sympy.Symbol(name)] = part.xreplace(inside)
     equations = {key: value for key, value in equations.items() if key != "intermediates"}
-    found = [x.xreplace(inside) for x in _expressions(equations)]
+    found = [x.xreplace(inside) for x in values_in(equations) if is_sympy(x)]
 
     plain: dict[Any, Any] = {}
     names: set[str] = set()
@@ -272,14 +260,5 @@ def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
     for key, value in equations.items():
         if key == "mass_matrix":
             result["intermediates"] = {str(symbol): expression for symbol, expression in common}
-        result[key] = _rebuilt(value, replaced)
+        result[key] = with_sympy(value, lambda x: next(replaced))
     return result
-
-
-def _rebuilt(value: Any, replaced: Iterator[Any]) -> Any:
-    listed = None if is_sympy(value) else items(value)
-    if isinstance(value, Mapping):
-        return {key: _rebuilt(inner, replaced) for key, inner in value.items()}
-    if listed is not None:
-        return [_rebuilt(inner, replaced) for inner in listed]
-    return next(replaced) if is_sympy(value) else value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numbers
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..errors import cannot
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description
 from .fields import MODEL, SHORT, fields_of
 from .quantities import Named
-from .sympy_face import free_names, is_sympy, name_of, symbol
+from .sympy_face import free_names, is_sympy, name_of, symbol, values_in, with_sympy
 from .visit import undotted
 from .yaml_file import scalar
 
@@ -37,7 +37,7 @@ def with_named_markers(description: Description) -> Description:
     if not description.motions:
         return description
     parts = [description.values, *(entry.values for part in description.sections.values() for entry in part)]
-    uses = {name: found for name in sorted(_names_in(parts)) if (found := Named.parse(name))}
+    uses = {name: found for name in free_names([*values_in(parts)]) if (found := Named.parse(name))}
     spoken = {label for quantity in uses.values() for label in quantity.markers}
     labels = [label for label in description.motions if label in spoken]
     if not labels:
@@ -49,12 +49,16 @@ def with_named_markers(description: Description) -> Description:
         for name, quantity in uses.items()
         if not named.keys().isdisjoint(quantity.markers)
     }
+
+    def put(expression: Any) -> Any:
+        return expression.xreplace(named_symbols)
+
     for name, entries in sections.items():
         sections[name] = [
-            DescribedEntry(entry.name, _replaced(entry.values, named_symbols), entry.path, entry.trusted, entry.folder)
+            DescribedEntry(entry.name, with_sympy(entry.values, put), entry.path, entry.trusted, entry.folder)
             for entry in entries
         ]
-    values = _replaced(description.values, named_symbols)
+    values = with_sympy(description.values, put)
     return Description(values=values, sections=sections, notes=description.notes, renamed=description.renamed)
 
 
@@ -81,30 +85,6 @@ def _give_name(bodies: list[DescribedEntry], reference: Mapping[str, Any]) -> st
         entry.folder,
     )
     return f"{body}.marker_{k}"
-
-
-def _names_in(value: Any) -> Iterator[str]:
-    """Names of the symbols in everything that a value holds."""
-    if is_sympy(value):
-        yield from free_names([value])
-    elif isinstance(value, Mapping):
-        for part in value.values():
-            yield from _names_in(part)
-    elif not isinstance(value, str) and (parts := items(value)) is not None:
-        for part in parts:
-            yield from _names_in(part)
-
-
-def _replaced(value: Any, symbols: Mapping[Any, Any]) -> Any:
-    """A value with other symbols in its expressions."""
-    if is_sympy(value):
-        return value.xreplace(symbols)
-    if isinstance(value, Mapping):
-        return {key: _replaced(part, symbols) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return type(value)(_replaced(part, symbols) for part in value)
-    parts = None if isinstance(value, str) else items(value)
-    return value if parts is None else [_replaced(part, symbols) for part in parts]
 
 
 Names = frozenset[Any]  # of declared functions
