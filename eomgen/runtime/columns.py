@@ -28,9 +28,11 @@ class Named(list[Array]):
     It is a list, so that a loop over it meets the arrays; ``in``, ``keys()``, ``items()`` and ``get`` go by name.
     """
 
-    def __init__(self, values: Sequence[Array], names: Sequence[str], instances: Mapping[str, str]) -> None:
+    def __init__(
+        self, values: Sequence[Array], names: Sequence[str], instances: Mapping[str, str] | None = None
+    ) -> None:
         super().__init__(values)
-        self.names, self.instances = tuple(names), instances
+        self.names, self.instances = tuple(names), instances or {}
 
     @classmethod
     def of(cls, values: Sequence[Array], header: Mapping[str, Any]) -> Named:
