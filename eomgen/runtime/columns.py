@@ -72,10 +72,10 @@ class Named(list[Array]):
 
     def get(self, name: str, default: Any = None) -> Any:
         """What belongs to the event of a name, ``default`` if there is none."""
-        return self[name] if name in self.names else default
+        return self[name] if name in self else default
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Named, (list(self), self.names)
+        return Named, (list(self), self.names, self.instances)
 
 
 class Residuals(NamedTuple):
