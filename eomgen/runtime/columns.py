@@ -72,7 +72,7 @@ class Named(list[Array]):
 
     def get(self, name: str, default: Any = None) -> Any:
         """What belongs to the event of a name, ``default`` if there is none."""
-        return self[name] if name in self else default
+        return self[name] if name in self else default  # noqa: SIM401  (this is that method)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Named, (list(self), self.names, self.instances)
