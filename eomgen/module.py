@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from .analysis.regressor import inertial_remainder as _inertial_remainder
     from .analysis.regressor import regressor as _regressor
     from .analysis.regressor import standard_parameters as _standard_parameters
+    from .codegen.targets.web import page as _page
     from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
-    from .runtime.drawing import explore as _explore
     from .runtime.drawing import report as _report
     from .runtime.ensembles.simulate_many import simulate_many as _simulate_many
     from .runtime.minimal import Minimal
@@ -79,7 +79,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "report": "runtime.drawing",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
-    "explore": "runtime.drawing",
+    "page": "codegen.targets.web",
 }
 
 
@@ -255,7 +255,7 @@ class Module(BoundModel):
         report = _report
         draw = _draw
         draw_branches = _draw_branches
-        explore = _explore
+        page = _page
         minimal: Minimal
         canonical: Canonical
         dae: Dae

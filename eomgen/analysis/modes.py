@@ -33,7 +33,8 @@ from .linearization import Linearization, symmetric_modes, uncertainty
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.option_types import FilmOptions
-    from ..show.browser import InlineFilm, InlinePage
+    from ..show.page import InlinePage
+    from ..show.writers import InlineFilm
 
 
 COLUMNS = 12  #: of mode shapes in the table of a notebook
@@ -167,7 +168,7 @@ class Modes(Result):
         mode : int
             From 1, the slowest, as they are listed.
         file : str or Path, optional
-            ``.gif``, ``.mp4``, ``.html`` or a folder for frames, as of a trajectory; a k3d plot by default.
+            ``.gif``, ``.mp4``, ``.html`` or a folder for frames, as of a trajectory; a page by default.
         **options
             ``format``, ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of
             :meth:`~..runtime.trajectory.Trajectory.animate`.

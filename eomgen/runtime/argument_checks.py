@@ -294,7 +294,7 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
         return own.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
-    answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
+    answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and page()"
     meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
     raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}")
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from ..show.explore import Explorer
     from .bound_model import BoundModel
 
 # -- files that draw ---------------------------------------------------------------------------------------------------
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 PARTS = {
     "animate": "show.animate",
     "draw": "show.draw",
-    "explore": "show.explore",
     "mode_shapes": "show.animate",
 }
 
@@ -265,33 +263,6 @@ def draw(
             raise unknown("argument of draw or coordinate", name, ("ax", "t", "names", "axes", *known))
     drawn: Axes = load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
     return drawn
-
-
-def explore(model: BoundModel, /, x: Any = None) -> Explorer:
-    """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
-
-    At each position the loops are closed near the previous one; a line of text says where that is not possible.
-
-    Parameters
-    ----------
-    x : array (n_x,) or (n_q,), or mapping of str to float, optional
-        Where to begin, as for :func:`draw`.
-
-    Returns
-    -------
-    Explorer
-        A notebook shows it; ``q`` is the position, ``module`` has the parameters of the sliders.
-
-    Raises
-    ------
-    MissingDependencyError
-        k3d or ipywidgets is not installed.
-    UsageError
-        The model has no bodies, or x does not fit.
-    """
-    start = load_show("draw").position(model, with_numbers("x", x), 0.0)
-    shown: Explorer = load_show("explore").explore(model, start)
-    return shown
 
 
 def draw_branches(

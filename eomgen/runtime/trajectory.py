@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from ..show.browser import InlineFilm, InlinePage
+    from ..show.page import InlinePage
+    from ..show.writers import InlineFilm
     from .bound_model import BoundModel
     from .change_points import ChangePoint
     from .option_types import AnimationOptions
@@ -343,7 +344,7 @@ class Trajectory:
         ----------
         file : str or Path, optional
             ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
-            turned and zoomed and needs no network (k3d); a name without an ending is a folder for PNG frames.
+            turned and zoomed and needs no network; a name without an ending is a folder for PNG frames.
             Without a file a page comes back that a notebook shows, or what ``format`` says.
         format : {'gif', 'mp4', 'html'}, optional
             Of an animation without a file: a GIF or a film that a notebook shows; its ``data`` are the bytes.
@@ -371,7 +372,7 @@ class Trajectory:
         Raises
         ------
         MissingDependencyError
-            matplotlib, k3d or ffmpeg is not installed.
+            matplotlib or ffmpeg is not installed.
         UsageError
             Another ending, an unknown name, or too many frames.
         """

@@ -1,4 +1,4 @@
-"""A trajectory or a mode -> a GIF, MP4 or PNG frames, or a page or widget through k3d."""
+"""A trajectory or a mode -> a GIF, MP4 or PNG frames, or a page."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..base.notation import Notation
 from ..base.picture_data import GROUND, PlacedFrame, read_picture
 from ..base.texts import shown
 from ..errors import EvaluationError, ill_typed, no_such, off_range
-from .browser import InlineFilm, InlinePage
 from .build_scene import build_scene
 from .draw import matplotlib
 from .frames import DPI, MOST_DOTS, Frames, ShownColumn, ShownMotion, States, moving_scene, sample, with_fine_traces
+from .page import InlinePage, page_html
 from .scene import Item, Scene, attachments, placed
-from .writers import FILMS, WRITERS, gif_bytes, kind_of, require_target
+from .writers import FILMS, WRITERS, InlineFilm, gif_bytes, kind_of, require_target
 
 # -- arrows of forces --------------------------------------------------------------------------------------------------
 
@@ -175,11 +175,12 @@ def animate(
     times, values = columns(plot) if plot else (trajectory.t, {})
     over = motion.over if still else times
     printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
-    curves = [ShownColumn(printed(n), units.get(n, ""), over, row) for n, row in values.items()]
-    return write(file, scene, motion, curves, dpi, format)
+    curves = [ShownColumn(printed(n), units.get(n, ""), over, row, n) for n, row in values.items()]
+    return write(module, file, scene, motion, curves, dpi, format)
 
 
 def write(
+    module: Any,
     file: Path | str | None,
     scene: Scene,
     motion: ShownMotion,
@@ -195,9 +196,7 @@ def write(
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":
-        from .browser import page
-
-        text = page(scene, motion, curves)
+        text = page_html(module, scene, motion, curves)
         if path is None:
             return InlinePage(text)
         with whole_file(path) as handle:
@@ -280,7 +279,7 @@ def animate_mode(
     require_target(file, format)
     look = {"names": names, "axes": axes, "trace": (trace,) if isinstance(trace, str) else tuple(trace)}
     scene, motion = mode_scene(module, x, shape, max(2, round(fps * PERIOD)), **look)
-    return write(file, scene, motion, dpi=dpi, format=format)
+    return write(module, file, scene, motion, dpi=dpi, format=format)
 
 
 def swinging_gif(module: Any, x: Array, shapes: Sequence[tuple[Array, str]]) -> bytes:

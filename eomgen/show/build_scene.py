@@ -29,6 +29,7 @@ def build_scene(
     axes: bool = False,
     trace: Sequence[str] = (),
     quiet: bool = False,
+    like: Scene | None = None,
 ) -> Scene:
     """The scene of a module over frames.
 
@@ -50,6 +51,8 @@ def build_scene(
         Markers (``rod.tip``) or bodies, whose ways over the frames are drawn.
     quiet : bool
         Without warnings about meshes that cannot be drawn, where nobody asked for a picture.
+    like : Scene, optional
+        With the view and the size of symbols of another scene.
     """
     data = read_picture(module.metadata, module.p)
     layout = module.layout
@@ -64,10 +67,11 @@ def build_scene(
     frames = _with_ground(poses)
     start = np.array(q[:, 0])
     quaternions = [i for i, _ in layout.quaternion_slots]
-    view = find_view(lambda trial: np.asarray(module.poses(trial)), start, quaternions, data.gravity)
+    view = like.view if like else find_view(lambda at: np.asarray(module.poses(at)), start, quaternions, data.gravity)
     up = _up(data.gravity) if view is None else view[1]
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
+    symbol = like.symbol if like else symbol
     known = {name: q[k] for k, name in enumerate(layout.q)}
     items = link_items(data, points, symbol, extent, _model_file(module), quiet)
     items += joint_items(data, view, up, symbol, frames, known)

@@ -130,6 +130,7 @@ class ShownColumn(NamedTuple):
     unit: str
     over: Array
     values: Array
+    plain: str = ""  #: its name as it is typed
 
 
 def by_unit(curves: Sequence[ShownColumn]) -> list[list[ShownColumn]]:

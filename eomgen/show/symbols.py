@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def joint_items(
                 mesh = attached(frame, symbol_mesh(shape, sizes, axis, symbol))
                 items.append(Item("block" if block else "joint", joint.name, frame.body, *mesh))
         if joint.bar:
-            items.append(_bar(joint, symbol, frames[0]))
+            items.append(_rod_between(joint, joint.name, GROUND, BAR * symbol, (0.0, 1.0), frames[0]))  # without mass
         if joint.guide is not None:
             items += _guide(joint, symbol, q)
     return items
@@ -152,40 +152,47 @@ def _rod(line: Array, radius: float) -> Mesh:
     return vertices @ _upright(along / length).T + line[0], faces
 
 
-def between(
-    start: Callable[[Array], Array], end: Callable[[Array], Array], radius: float, part: tuple[float, float]
-) -> Callable[[Array], Array]:
-    """Vertices of a round bar over a part of the way between two points that move."""
+class Stretched(NamedTuple):
+    """Points along the way between two places that move: rows of the part of the way, and of lengths across it (m)."""
 
-    def points(poses: Array) -> Array:
-        a, b = start(poses), end(poses)
-        along = b - a
-        if float(np.linalg.norm(along)) < radius:
-            along = np.array([0.0, 0.0, radius])
-        return _rod(np.array([a + part[0] * along, a + part[1] * along]), radius)[0]
+    start: PlacedFrame
+    end: PlacedFrame
+    shape: Array  #: (n, 3)
+    view: Array | None
 
-    return points
+    def __call__(self, poses: Array) -> Array:
+        (turn, a), (_, b) = placed(poses, self.start), placed(poses, self.end)
+        way = b - a
+        length = float(np.linalg.norm(way))
+        across, other = _across(way / length if length > 0.0 else turn[:, 2], self.view)
+        points: Array = a + self.shape @ np.array([way, across, other])
+        return points
 
 
-def _origin(frame: PlacedFrame) -> Callable[[Array], Array]:
-    return lambda poses: placed(poses, frame)[1]
+class Shifted(NamedTuple):
+    """Points (n, 3) around a place that moves, which do not turn (m, ground axes)."""
+
+    frame: PlacedFrame
+    shape: Array
+
+    def __call__(self, poses: Array) -> Array:
+        return placed(poses, self.frame)[1] + self.shape
+
+
+def _rod_between(
+    joint: JointData, name: str, body: int, radius: float, part: tuple[float, float], poses: Array
+) -> Item:
+    """A round bar over a part of the way from P to S."""
+    vertices, faces = turned((1.0, 1.0), (0.0, 1.0), 12)
+    shape = np.column_stack([part[0] + (part[1] - part[0]) * vertices[:, 2], radius * vertices[:, :2]])
+    follow = Stretched(joint.P, joint.S, shape, None)
+    return Item("link", name, body, follow(poses), faces, follow)
 
 
 def _telescope(joint: JointData, symbol: float, poses: Array) -> list[Item]:
     """A cylinder on P and its rod on S."""
-    items = []
-    for radius, part, body in ((1.1, (0.0, 0.6), joint.P.body), (0.5, (0.5, 1.0), joint.S.body)):
-        follow = between(_origin(joint.P), _origin(joint.S), radius * symbol, part)
-        points = follow(poses)
-        faces = turned((1.0, 1.0), (0.0, 1.0), 12)[1]
-        items.append(Item("link", joint.name, body, points, faces, follow))
-    return items
-
-
-def _bar(joint: JointData, symbol: float, poses: Array) -> Item:
-    """A rod without mass."""
-    follow = between(_origin(joint.P), _origin(joint.S), BAR * symbol, (0.0, 1.0))
-    return Item("link", joint.name, GROUND, follow(poses), turned((1.0, 1.0), (0.0, 1.0), 12)[1], follow)
+    parts = ((1.1, (0.0, 0.6), joint.P.body), (0.5, (0.5, 1.0), joint.S.body))
+    return [_rod_between(joint, joint.name, body, radius * symbol, part, poses) for radius, part, body in parts]
 
 
 def _guide(joint: JointData, symbol: float, q: dict[str, Array]) -> list[Item]:
@@ -375,24 +382,14 @@ def _lines(
     if len(frames) < 2 or (element.get("joint") is not None and not element["along"]):
         return []
     if not element["along"]:
-        follow = _rope(element["stops"])
-        return [Item("force", name, GROUND, follow(poses), None, follow)]
-    shape = _broken([np.asarray(line) for line in element["along"]])
-
-    def points_at(now: Array) -> Array:
-        a, b = placed(now, frames[0])[1], placed(now, frames[-1])[1]
-        way = b - a
-        length = float(np.linalg.norm(way))
-        along = way / length if length > 0.0 else placed(now, frames[0])[0][:, 2]
-        across, other = _across(along, view)
-        base = a + aside * across
-        sides = symbol * (shape[:, 1:2] * across + shape[:, 2:3] * other)
-        moved: Array = base + shape[:, :1] * way + sides
-        if aside:  # short legs to where the element is held
-            moved = np.vstack([a, base, GAP, moved, GAP, b + aside * across, b])
-        return moved
-
-    return [Item("force", name, GROUND, points_at(poses), None, points_at)]
+        rope = Rope(element["stops"])
+        return [Item("force", name, GROUND, rope(poses), None, rope)]
+    shape = _broken([np.asarray(line) for line in element["along"]]) * [1.0, symbol, symbol] + [0.0, aside, 0.0]
+    if aside:  # short legs to where the element is held
+        ends = np.array([[0.0, 0.0, 0.0], [0.0, aside, 0.0], GAP[0], [1.0, aside, 0.0], [1.0, 0.0, 0.0]])
+        shape = np.vstack([ends[:3], shape, ends[2:]])
+    follow = Stretched(frames[0], frames[-1], shape, view)
+    return [Item("force", name, GROUND, follow(poses), None, follow)]
 
 
 def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Array) -> list[Item]:
@@ -403,15 +400,16 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
         return []
     shape = _broken([np.asarray(line) for line in element["lines"]])
 
-    def points_at(now: Array) -> Array:
-        rotation, place = placed(now, marker)
-        along = (rotation @ way if element["own"] else way) / size
-        across, other = _across(along, view)
-        if element["turns"]:  # counterclockwise, seen against the axis
-            return np.asarray(place + symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other)))
-        return np.asarray(place + symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * across))
-
-    return [Item("pull", element["name"], GROUND, points_at(poses), None, points_at)]
+    rotation, place = placed(poses, marker)
+    along = (rotation @ way if element["own"] else way) / size
+    across, other = _across(along, view)
+    if element["turns"]:  # counterclockwise, seen against the axis
+        points = symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other))
+    else:
+        points = symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * across)
+    if element["own"]:  # it turns with its marker
+        return [Item("pull", element["name"], marker.body, move_frame(marker, points @ rotation))]
+    return [Item("pull", element["name"], GROUND, place + points, None, Shifted(marker, points))]
 
 
 def _across(along: Array, view: Array | None) -> tuple[Array, Array]:
@@ -437,21 +435,20 @@ def _broken(lines: Sequence[Array]) -> Array:
     return np.vstack(parts[:-1])
 
 
-def _rope(stops: Sequence[tuple[PlacedFrame, float | None, int | None]]) -> Callable[[Array], Array]:
+class Rope(NamedTuple):
     """A line over markers and round cylinders; 25 points a cylinder, wound where it is touched."""
 
-    def points(poses: Array) -> Array:
-        places = [placed(poses, frame)[1] for frame, _, _ in stops]
+    stops: Sequence[tuple[PlacedFrame, float | None, int | None]]
+
+    def __call__(self, poses: Array) -> Array:
+        places = [placed(poses, frame)[1] for frame, _, _ in self.stops]
         found = [places[0][None]]
-        for k in range(1, len(stops)):
-            frame, radius, sense = stops[k]
-            if radius is None or k + 1 == len(stops):
+        for k, (frame, radius, sense) in enumerate(self.stops[1:], 1):
+            if radius is None or k + 1 == len(self.stops):
                 found.append(places[k][None])
             else:
                 found.append(_wound(poses, frame, float(radius), int(sense or 1), places[k - 1], places[k + 1]))
         return np.vstack(found)
-
-    return points
 
 
 def _wound(poses: Array, frame: PlacedFrame, r: float, sense: int, a: Array, b: Array) -> Array:
@@ -513,8 +510,9 @@ def _circles(data: PictureData, element: dict[str, Any], symbol: float, poses: A
         wheel = joint.P if joint is a and fixed else joint.S if joint.P.body == carrier else joint.P
         items += _wheel(element["name"], wheel, radius, symbol)
     if element["belt"]:
-        follow = _belt(a.P, b.P, r_a, r_b, ratio < 0.0)
-        items.append(Item("force", element["name"], GROUND, follow(poses), None, follow))
+        pose = poses[carrier]
+        spans = (_belt(poses, a.P, b.P, r_a, r_b, ratio < 0.0) - pose[:3, 3]) @ pose[:3, :3]
+        items.append(Item("force", element["name"], carrier, spans))
     return items
 
 
@@ -539,20 +537,16 @@ def _rack(data: PictureData, element: dict[str, Any], symbol: float, poses: Arra
     return [*_wheel(element["name"], a.S, radius, symbol), rack]
 
 
-def _belt(first: PlacedFrame, second: PlacedFrame, r_a: float, r_b: float, opened: bool) -> Callable[[Array], Array]:
+def _belt(poses: Array, first: PlacedFrame, second: PlacedFrame, r_a: float, r_b: float, opened: bool) -> Array:
     """The two straight spans of a belt, which cross where the pulleys turn opposite ways."""
-
-    def points(poses: Array) -> Array:
-        (turn, a), (_, b) = placed(poses, first), placed(poses, second)
-        along = b - a
-        distance = float(np.linalg.norm(along))
-        along = along / distance
-        across = np.cross(turn[:, 2], along)
-        lean = np.arccos(np.clip((r_a - r_b if opened else r_a + r_b) / distance, -1.0, 1.0))
-        found = []
-        for side in (1.0, -1.0):
-            normal = np.cos(lean) * along + side * np.sin(lean) * across
-            found += [a + r_a * normal, b + (r_b if opened else -r_b) * normal, GAP[0]]
-        return np.array(found[:-1])
-
-    return points
+    (turn, a), (_, b) = placed(poses, first), placed(poses, second)
+    along = b - a
+    distance = float(np.linalg.norm(along))
+    along = along / distance
+    across = np.cross(turn[:, 2], along)
+    lean = np.arccos(np.clip((r_a - r_b if opened else r_a + r_b) / distance, -1.0, 1.0))
+    found = []
+    for side in (1.0, -1.0):
+        normal = np.cos(lean) * along + side * np.sin(lean) * across
+        found += [a + r_a * normal, b + (r_b if opened else -r_b) * normal, GAP[0]]
+    return np.array(found[:-1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ..base.files import as_path, refuse_link, whole_file
 from ..base.texts import shown
 from ..errors import MissingDependencyError, at_odds, bad_file, no_choice
-from .draw import k3d, matplotlib
+from .draw import matplotlib
 from .frames import Frames
 
 # -- palettes of GIF files ---------------------------------------------------------------------------------------------
@@ -65,6 +66,32 @@ def _packed(image: Image) -> NDArray[np.int64]:
 def _unpacked(packed: NDArray[np.int64]) -> Image:
     colors: Image = (packed[:, None] // SHADES % 256).astype(np.uint8)
     return colors
+
+
+class InlineFilm:
+    """A GIF or a film that a notebook shows.
+
+    Attributes
+    ----------
+    data : bytes
+        The file, as it would be written.
+    format : {'gif', 'mp4'}
+    """
+
+    def __init__(self, data: bytes, format: str) -> None:
+        self.data, self.format = data, format
+
+    def __bytes__(self) -> bytes:
+        return self.data
+
+    def __repr__(self) -> str:
+        return f"<InlineFilm: {self.format} of {len(self.data) / 1e6:.2f} MB>"
+
+    def _repr_html_(self) -> str:
+        text = b64encode(self.data).decode()
+        if self.format == "gif":
+            return f'<img alt="animation" src="data:image/gif;base64,{text}">'
+        return f'<video controls loop autoplay muted src="data:video/{self.format};base64,{text}"></video>'
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -126,7 +153,6 @@ def require_kind(path: Path) -> None:
 
 def _require_libraries(kind: str) -> None:
     if kind == ".html":
-        k3d("an animation as a page")
         return
     matplotlib("figure", "an animation")
     if kind == ".mp4":

@@ -53,7 +53,7 @@ def check_version(version: str) -> str:
     raise no_choice(f"there is no version {version!r} of FMI here; there are {', '.join(FMI_VERSIONS)}")
 
 
-def refuse_impacts(program: Program) -> None:
+def refuse_impacts(program: Program, holder: str = "an FMU") -> None:
     """Refuse events and contacts whose impacts the generated code leaves to Python.
 
     Raises
@@ -62,14 +62,14 @@ def refuse_impacts(program: Program) -> None:
     """
     remedy = "describe the new velocities with reset, or leave the event out"
     problems = [
-        Problem(f"events.{event['name']}.restitution", "an FMU cannot hold an impact", remedy, code="EG-UNSUPPORTED")
+        Problem(f"events.{event['name']}.restitution", f"{holder} cannot hold an impact", remedy, code="EG-UNSUPPORTED")
         for event in program.metadata.get("events", ())
         if event["restitution"] is not None
     ]
     problems += [
         Problem(
             f"contacts.{name}.normal_law",
-            "rigid contacts exert impulses, which an FMU cannot hold",
+            f"rigid contacts exert impulses, which {holder} cannot hold",
             "choose another normal_law",
             code="EG-UNSUPPORTED",
         )

@@ -1,0 +1,235 @@
+"""Target web: Program -> WebAssembly, and the page in which the mechanism runs: one HTML file without a network."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.files import as_path, write_whole
+from ...base.limits.in_c import definitions
+from ...errors import EomgenError, ModelError, Problem, ToolchainError, cannot
+from ...runtime.bound_model import BoundModel
+from ...runtime.drawing import module_of
+from ...runtime.layout import bounds_of
+from ...runtime.plotting import states_at
+from ...runtime.runs.events import Events
+from ...runtime.runs.simulate import plan_run
+from ...show.build_scene import build_scene
+from ...show.frames import sample
+from ...show.page import InlinePage, page_html, scene_position
+from ...toolchain.cache import Cache, cache_directory, compute_key
+from ...toolchain.compiler import run
+from ...toolchain.layer import read_layer
+from ..build import program_of
+from ..c import emit_c
+from ..files import read_template
+from ..program import Program
+from .fmu import refuse_impacts
+
+#: Functions that a page calls.
+KERNELS = ("rhs", "energy", "constraints", "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs",
+           "events", "resets", "alignment", "scales")  # fmt: skip
+METHODS = {"DOP853": "dop853", "RK45": "rk45", "Radau": "radau"}  #: of runs in a page; DOP853 stands for others
+STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_steppers.c")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-mexec-model=reactor", "-s", "-DEOMGEN_LANES=0",
+         "-DEOMGEN_PORTABLE", "-DEOMGEN_WITHOUT_METADATA")  # fmt: skip
+SECONDS = 1800.0  #: that the compiler may take: the first time zig builds its C library, once for all
+BODIES = 200  #: more take too long for a page
+BRANCHES = 8  #: ways of closing the loops that are offered
+
+
+def find_compiler() -> list[str]:
+    """The command of a C compiler for WebAssembly.
+
+    Raises
+    ------
+    ToolchainError
+        There is none.
+    """
+    zig, spec = shutil.which("zig"), importlib.util.find_spec("ziglang")
+    if zig is None and spec is not None and spec.origin is not None:
+        zig = str(Path(spec.origin).with_name("zig"))
+    if zig is not None:
+        return [zig, "cc", "-target", "wasm32-wasi", "-fno-sanitize=undefined"]
+    kit = os.environ.get("WASI_SDK_PATH", "")
+    clang = shutil.which(f"{kit}/bin/clang" if kit else "clang")
+    if clang is not None and (kit or shutil.which("wasm-ld")):
+        return [clang, "--target=wasm32-wasi"]
+    raise ToolchainError(
+        "no compiler for WebAssembly was found; pip install ziglang, or set WASI_SDK_PATH to wasi-sdk (clang with "
+        "wasm-ld and a C library); a run can be shown without one: traj.animate('run.html')",
+        code="EG-COMPILER-MISSING",
+    )
+
+
+def refuse(program: Program) -> None:
+    """Refuse models that cannot run in a page.
+
+    Raises
+    ------
+    ModelError
+    """
+    refuse_impacts(program, "a page")
+    metadata, remedy = program.metadata, "simulate it, and show the run: traj.animate('run.html')"
+    problems = [Problem(f"constraints.{name}", "it closes and opens by impacts, which a page does not compute", remedy,
+                        code="EG-UNSUPPORTED") for name in metadata.get("switched", {})]  # fmt: skip
+    given = {place for _, place in metadata.get("resets", ())}
+    problems += [Problem(f"states.{clock['name']}", "it is sampled without a law, by a function in Python", remedy,
+                         code="EG-UNSUPPORTED") for clock in metadata.get("clocks", ())
+                 if not given.intersection(clock.get("states", given))]  # fmt: skip
+    if program.sizes.n_bodies > BODIES:
+        problems.append(Problem("bodies", f"{program.sizes.n_bodies} are more than the {BODIES} that a page takes",
+                                remedy, code="EG-UNSUPPORTED"))  # fmt: skip
+    if problems:
+        raise ModelError(problems)
+
+
+def compile_wasm(program: Program, method: str) -> bytes:
+    """The model and the library as WebAssembly, or those of an earlier call.
+
+    Raises
+    ------
+    ToolchainError
+        There is no compiler, it fails, or the model calls more of C than its functions of numbers.
+    """
+    command, layer = find_compiler(), read_layer()
+    sources = {name: text for name, text in emit_c(program, lanes=False).items() if name.endswith((".c", ".h"))}
+    sources |= {name: layer[name] for name in STEPPERS}
+    face = read_template("web/web.c")
+    sources["web.c"] = definitions(face) + face
+    flags = [*FLAGS, f"-DWEB_METHOD=eomgen_{METHODS.get(method, 'dop853')}"]
+    key = compute_key({"kind": "web", "sources": sources, "flags": flags, "command": command})
+    cache = Cache(cache_directory())
+    entry = cache.find(key)
+    if entry is None:
+        with cache.attempt(key) as folder:
+            for name, text in sources.items():
+                (folder / name).write_text(text, encoding="utf-8")
+            files, product = sorted(name for name in sources if name.endswith(".c")), f"{program.name}.wasm"
+            run([*command, *flags, *files, "-o", product], folder, SECONDS, f"compiling {program.name} for a page")
+            entry = cache.publish(folder, key, "web", program.name, product, {"flags": flags})
+    made = entry.product.read_bytes()
+    if b"wasi_snapshot_preview1" in made:
+        raise ToolchainError(
+            f"the C functions of {program.name} call the system, which a page does not have; give them nothing of C "
+            "but math.h, or show a run: traj.animate('run.html')"
+        )
+    return made
+
+
+def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
+    """What the script of a page knows of a model."""
+    info, layout = module.info, module.layout
+    plan = plan_run(module, method, None, None, None, None, {}, {})
+    events = Events(layout, None)
+    coded = events.encode() or {"direction": [], "most": [], "action": []}
+    rows = zip(events.names, coded["direction"], coded["most"], coded["action"], strict=True)
+    x0, inputs = module.x0(), dict(zip(layout.u, map(float, module.u), strict=True))
+    scene = build_scene(module, scene_position(module), quiet=True)
+    size = float((scene.high - scene.low).max())
+    independent = [int(i) for i in info.independent if int(i) < layout.moving]
+    places = [layout.q.index(layout.velocity_labels[i]) for i in independent if layout.velocity_labels[i] in layout.q]
+    ranges: dict[str, list[float]] = {}
+    for name, value in zip(layout.p, map(float, module.p), strict=True):
+        low, high = bounds_of(info).get(name, (-np.inf, np.inf))
+        ends = sorted((0.5 * value, 2.0 * value)) if value else [-1.0, 1.0]
+        ranges[name] = [float(np.clip(end, low, high)) for end in ends]
+    ranges |= {name: [-max(10.0, 2.0 * abs(value)), max(10.0, 2.0 * abs(value))] for name, value in inputs.items()}
+    for k in places:
+        limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
+        ends = [limits.get("lower", x0[k] - reach), limits.get("upper", x0[k] + reach)]
+        ranges[layout.q[k]] = [float(min(ends[0], x0[k])), float(max(ends[1], x0[k]))]
+    signals = {layout.u.index(name): ["as declared", *_tape(tape)] for name, tape in info.signals.items()
+               if name in layout.u}  # fmt: skip
+    try:
+        found = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []  # type: ignore[attr-defined]
+    except EomgenError:
+        found = []
+    settings, bounds = plan.settings, bounds_of(info)
+    finite = {name: [float(np.clip(end, -1e300, 1e300)) for end in pair] for name, pair in bounds.items()}
+    return {
+        "q": list(layout.q), "v": list(layout.v), "x": list(layout.x), "u": list(layout.u), "p": list(layout.p),
+        "y": list(layout.y), "docs": dict(info.docs), "pValues": [float(p) for p in module.p],
+        "uValues": [inputs[name] for name in layout.u], "x0": [float(x) for x in x0], "rows": layout.n_c,
+        "slots": [list(pair) for pair in layout.quaternion_slots], "independent": independent, "independentQ": places,
+        "sizes": [float(info.length_scale or 1.0) if layout.unit(name) == "m" else 1.0 for name in layout.q],
+        "ranges": ranges, "bounds": finite, "signals": signals, "branches": [[float(x) for x in q] for q in found],
+        "events": [list(row) for row in rows], "resets": [list(row) for row in info.resets], "end": float(plan.end),
+        "rtol": float(settings["rtol"]), "atol": np.broadcast_to(settings["atol"], layout.n_x).tolist(),
+        "maxStep": settings.get("max_step"), "firstStep": settings.get("first_step"), "method": method,
+    }  # fmt: skip
+
+
+def _tape(tape: Any) -> list[Any]:
+    """Code, numbers and the last instruction of a tape of one value."""
+    code, numbers, out = tape
+    return [[list(row) for row in code], [float(x) for x in numbers], int(out[0])]
+
+
+def page_text(module: BoundModel, trajectory: Any = None) -> str:
+    """The page of a module, with a recorded run where one is given."""
+    equations = module.equations
+    if equations is None:
+        raise cannot("a page is made from a model; this module comes of a generated package, which has no equations")
+    method = str(plan_run(module, None, None, None, None, None, {}, {}).title)
+    method = method if method in METHODS else "DOP853"
+    kernels = (*KERNELS, *(("jacobian",) if method == "Radau" else ()))
+    about = {"target": "web", "model_digest": module.info.model_digest, "eomgen": module.info.eomgen}
+    program = program_of(*equations.fresh(), about, False, kernels)
+    refuse(program)
+    wasm = compile_wasm(program, method)
+    motion = None
+    if trajectory is not None:
+        bound = module_of(trajectory, module, "a page")
+        motion = sample(trajectory, partial(states_at, trajectory, bound), 25.0, None)
+    scene = build_scene(module, scene_position(module) if motion is None else motion.x[: module.n_q])
+    html = getattr(equations, "_equations_html", "")
+    return page_html(module, scene, motion, (), describe_model(module, method), wasm, html)
+
+
+def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any = None) -> Path | InlinePage:
+    """Write a page in which the mechanism runs: one HTML file that needs no network.
+
+    The model runs as WebAssembly, with the steps of ``simulate``: sliders for parameters and inputs, bodies that can
+    be dragged, loops that follow, curves, and the equations of motion.
+
+    Parameters
+    ----------
+    file : Path or str, optional
+        Name that ends in ``.html``; without one, something that a notebook shows.
+    trajectory : Trajectory, optional
+        A run that the page begins with.
+
+    Returns
+    -------
+    Path or InlinePage
+
+    Raises
+    ------
+    ToolchainError
+        There is no compiler for WebAssembly (``pip install ziglang``), or it fails.
+    ModelError
+        The model cannot run in a page: it has impacts, rigid contacts or sampled states without a law.
+    UsageError
+        The model has no bodies, or the module comes of a generated package.
+    """
+    path = None if file is None else as_path("file", file)
+    text = page_text(module, trajectory)
+    if path is None:
+        return InlinePage(text)
+    write_whole(path, text)
+    return path
+
+
+def generate_web(program: Program, module: BoundModel, directory: Path, version: str) -> Path:
+    """Write ``<name>.html`` into a folder."""
+    directory.mkdir(parents=True, exist_ok=True)
+    found = page(module, directory / f"{program.name}.html")
+    assert isinstance(found, Path)
+    return found
