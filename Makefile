@@ -1,4 +1,4 @@
-# make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
+# make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png, .gif and a page, .html
 # make quick  in 20 seconds: tests without a compiler for what differs from the last commit (the table in tests/conftest.py)
 # make test   make lint, then the tests of all that users see, on all processors; fails if anything was skipped;
 #             PROGRAMS=all fails too where a program that some tests need is missing, as continuous integration does
@@ -29,6 +29,7 @@ KEEP_BYTECODE := PYTHONDONTWRITEBYTECODE=
 
 demo: $(VENV)/.installed-plot
 	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png --animate demo_output/slider_crank.gif
+	@$(BIN)/eomgen view examples/slider_crank.yaml --end 2 --out demo_output/slider_crank.html
 
 test thorough: lint
 	@$(KEEP_BYTECODE) OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \

@@ -10,6 +10,7 @@ PROGRAMS = {
     "clang": (("clang",), "clang"),
     "gcc for ARM": (("arm-none-eabi-gcc",), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
     "gcc for RISC-V": (("riscv64-linux-gnu-gcc",), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross"),
+    "node": (("node",), "nodejs"),
     "octave": (("octave-cli", "octave"), "octave"),
     "pdflatex": (("pdflatex",), "texlive-latex-recommended"),
     "qemu": (("qemu-arm",), "qemu-user"),

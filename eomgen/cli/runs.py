@@ -13,7 +13,7 @@ import numpy as np
 from ..base.limits.numbers import RESTING
 from ..base.results import ResultTable
 from ..base.texts import without_noise
-from ..errors import at_odds, bad_file, ill_shaped, incomplete
+from ..errors import ModelError, ToolchainError, at_odds, bad_file, ill_shaped, incomplete
 from ..runtime.storage import RUNS
 from .models import operations_of, summary
 from .options import (
@@ -354,7 +354,9 @@ def view(
 ) -> None:  # fmt: skip
     """Show how a mechanism moves: over a range of its coordinates, or in a run.
 
-    Without --out a page is written to the folder of temporary files and a browser opens it; it needs no network.
+    Without --out a page is written to the folder of temporary files and a browser opens it; it needs no network.  In it
+    the model itself runs, with sliders, where there is a compiler for WebAssembly (pip install ziglang) and neither
+    --range nor an option of the picture asks for a film.
     """
     import webbrowser
     from tempfile import gettempdir
@@ -381,8 +383,19 @@ def view(
             )
     look = {key: value for key, value in (("speed", speed), ("fps", fps)) if value is not None}
     with after_integration(), stage("animate"):
-        written = motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
+        film = asked or trace or plot or forces or look or work.inputs or file.suffix != ".html"
+        written = None if film else _live_page(work.bound().module, motion, file)
+        written = written or motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
     opened = out is None and webbrowser.open(Path(written).absolute().as_uri())
     show(as_json, {"name": work.module.name, "points": len(motion), "opened": opened}, files=[written])
     if not as_json and out is None and not opened:
         say("no browser was found here; open that file in one, or give --out FILE")
+
+
+def _live_page(module: Any, motion: Any, file: Path) -> Path | None:
+    """The page in which the model runs; None, and a note, where it cannot."""
+    try:
+        return Path(module.page(file, motion))
+    except (ModelError, ToolchainError) as error:
+        say(f"note: the page shows the run alone: {error}", err=True)
+        return None

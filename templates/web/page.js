@@ -672,18 +672,20 @@ class Page {
       this.clock = frames[0].clock;
       return;
     }
-    if (model.ended) {
-      this.play(false);
-      this.say(model.ended);
-      return;
-    }
-    const reached = model.advance(next, 14), t = reached ? next : model.f.web_time();
-    if (!model.ended || t > frames[this.cursor].t) {
+    const begun = performance.now(), count = Math.ceil(passed * 60 / get("speed").value);
+    for (let k = 1; k <= count; k += 1) { // no coarser than the eye sees, however slowly pages are drawn
+      const wanted = now + (passed * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
+      if (model.ended && t <= this.frames.at(-1).t) {
+        this.play(false);
+        this.say(model.ended);
+        break;
+      }
       this.keep(t, model.state(t));
       this.cursor = this.frames.length - 1;
+      this.clock = t;
+      this.slow = !reached || performance.now() - begun > 60;
+      if (this.slow) break;
     }
-    this.clock = t;
-    this.slow = !reached;
     for (const [name, time] of model.happened.splice(0)) this.event = `${name} at ${shown(time)} s`;
   }
 

@@ -41,7 +41,6 @@ SEEN = {
     "m.draw(theta=0.3)": "Axes",
     "mod.draw({'theta': 0.3}, axes=True)": "Axes",
     "mod.draw_branches(theta=0.3)": "ndarray",
-    "mod.explore()": "Explorer",
     "m.check().draw()": "Axes",
     "mod.simulate(1.0).plot('theta')": "Axes",
     "mod.simulate(1.0).plot('theta', kind='spectrum')": "Axes",
@@ -54,7 +53,11 @@ SEEN = {
     "mod.sensitivities(['l'], 1.0, rtol='1e-8')": "Sensitivities",
 }
 #: What may be several things, as a checker writes it.
-UNIONS = {"mod.simulate(1.0).plot()": ("Axes", "ndarray"), "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray")}
+UNIONS = {
+    "mod.page()": ("Path", "InlinePage"),
+    "mod.simulate(1.0).plot()": ("Axes", "ndarray"),
+    "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray"),
+}
 BEGIN = """import eomgen as eg
 import matplotlib.pyplot as plt
 m = eg.Model("pendulum", gravity=(0, -9.81, 0))

@@ -7,7 +7,6 @@ import importlib.util
 import io
 import re
 import shutil
-import time
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,7 @@ from typing import Any
 import nbformat
 import numpy as np
 import pytest
-from browser import Browser
-from children import HANGS, executed
+from children import executed
 from PIL import Image
 from refusals import refuses
 
@@ -109,12 +107,12 @@ def test_slips_are_reported_before_any_work(
 
 
 def test_a_page_holds_all_it_needs(run: Any, module: Any, tmp_path: Path) -> None:
-    pytest.importorskip("k3d")
     text = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip").read_text()
-    assert re.findall(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", text[:5000] + text[-5000:]) == []
+    assert re.findall(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", text) == []
+    assert "default-src 'none'" in text
     assert "<title>slider_crank</title>" in text
     slow = str(module.simulate(0.1).animate(speed=0.25))
-    assert '<option value="1.0" selected>x0.25</option><option value="2.0">x0.5</option>' in slow
+    assert '"pace": 0.25' in slow
     assert "t = 0.000 s" in slow
     motion = module.kinematic_analysis(theta=np.linspace(0.0, 1.0, 5))
     assert '"words": ["theta = 0.000 rad", "theta = 0.250 rad"' in str(motion.animate(plot="s"))
@@ -122,7 +120,6 @@ def test_a_page_holds_all_it_needs(run: Any, module: Any, tmp_path: Path) -> Non
 
 def test_the_longest_arrow_is_the_force_that_a_joint_bears() -> None:
     """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and 3 m g at the bottom."""
-    pytest.importorskip("k3d")
     m = eg.Model("hanging", gravity=(0, -9.81, 0))
     m.revolute("hinge", m.ground, m.body("bob", mass=2.0, com=(0, -1, 0)), coordinate="theta")
     mod = m.compile(target="numpy")
@@ -148,54 +145,6 @@ def test_the_arrow_of_a_spring_points_along_its_last_part(tmp_path: Path) -> Non
     before, after = (frame @ [65536, 256, 1] for frame in seen)
     rows, columns = np.nonzero(~np.isin(after, before) & (np.ptp(seen[1], axis=2) > 60))
     assert 10 < 2 * np.ptp(columns) < np.ptp(rows)
-
-
-@pytest.mark.needs("chromium")
-@pytest.mark.thorough
-def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:
-    page = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip", plot=["theta", "energy"], forces=True)
-    with Browser(tmp_path / "profile") as browser:
-        browser.open(page.as_uri())
-        browser.wait_for("document.getElementById('words') !== null")
-        time = "+document.getElementById('time').value"
-        browser.wait_for(f"{time} > 0.2")  # it plays of itself
-        browser.click("#play")
-        here = browser.evaluate(time)
-        pixels = browser.picture()
-        assert len(np.unique(pixels.reshape(-1, 3) // 32, axis=0)) > 8  # links of several colours, not an empty canvas
-        assert browser.evaluate(time) == here  # it stands still
-        browser.click("#time", across=0.6)
-        browser.wait_for("document.getElementById('words').textContent.startsWith('t = 0.6')")
-        there, moved = browser.evaluate(time), browser.picture()
-        above = slice(40, int(browser.place("#canvasTarget")["h"]) - 20)
-        assert (pixels[above] != moved[above]).any(axis=2).mean() > 0.005
-        cursor = browser.place("#cursor")["x"]
-        browser.click("#play")
-        browser.wait_for(f"{time} > {there}")
-        browser.wait_for(f"document.querySelector('#cursor').getBoundingClientRect().x > {cursor}")
-        assert (browser.complaints, browser.requests) == ([], [])
-
-
-@pytest.mark.needs("chromium")
-@pytest.mark.thorough
-def test_a_page_fits_a_narrow_window_and_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
-    pytest.importorskip("k3d")
-    file = run.animate(tmp_path / "run.html", names=False)
-    with Browser(tmp_path / "profile", size=(420, 760)) as browser:
-        browser.open(file.as_uri())
-        browser.wait_for("document.getElementById('words') && document.getElementById('words').textContent !== ''")
-        end = time.monotonic() + HANGS
-        while True:  # until the mechanism is drawn
-            drawn = (browser.picture()[60:600] < 200).any(axis=(0, 2))
-            if drawn.sum() > 50 and not drawn[:3].any() and not drawn[-3:].any():
-                break
-            assert time.monotonic() < end, "the mechanism reaches beyond the window"
-            time.sleep(0.5)
-        script = "HTMLCanvasElement.prototype.getContext = () => null;"
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
-        browser.open(file.as_uri())
-        browser.wait_for("document.getElementById('missing') !== null")
-        assert "needs WebGL 2" in browser.evaluate("document.getElementById('missing').textContent")
 
 
 @pytest.mark.thorough

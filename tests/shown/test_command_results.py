@@ -363,7 +363,6 @@ def test_a_range_is_shown_as_a_film_or_as_pictures(call: Call, tmp_path: Path) -
 
 
 def test_a_run_opens_in_a_browser(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("k3d")
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda url: opened.append(url) or True)
     result = call("view", FOUR_BAR, *NUMPY, "--end", "0.5", "--fps", "8", "--set", "theta=0.5")

@@ -413,29 +413,3 @@ def test_models_modules_reports_and_results_show_themselves(module: Any) -> None
     m.revolute("hinge", m.ground, m.body("rod", mass="m"))
     assert "no picture" in m._repr_html_()
     assert "parameters.m" in m._repr_html_()
-
-
-def slider_at(theta: float, r: float = 0.1, l: float = 0.35) -> float:
-    return float(r * np.cos(theta) + np.sqrt(l**2 - (r * np.sin(theta)) ** 2))
-
-
-def test_sliders_move_the_mechanism_on_its_branch_and_tell_a_gap(module: Any) -> None:
-    pytest.importorskip("ipywidgets")
-    pytest.importorskip("k3d")
-    explorer = module.explore()
-    assert list(explorer.sliders) == ["theta", "r", "l"]  # masses and the motor change nothing that is seen
-    s = module.q_names.index("s")
-    for theta in (2.9, -2.0, 0.1):  # leaps past the dead centres
-        explorer.sliders["theta"].value = theta
-        assert explorer.message == ""
-        assert explorer.q[s] == pytest.approx(slider_at(theta), abs=1e-9)
-    explorer.reset()
-    explorer.sliders["theta"].value = 0.0
-    explorer.sliders["l"].value = 0.175
-    explorer.sliders["r"].value = 0.2  # asin(0.175 / 0.2) = 1.065
-    explorer.sliders["theta"].value = 1.5
-    assert "do not close" in explorer.message
-    assert abs(explorer.q[0]) < 1.066
-    assert np.abs(explorer.module.constraints(explorer.q)).max() < 1e-9
-    explorer.reset()
-    assert explorer.q == pytest.approx(module.x0()[: module.n_q], abs=1e-9)

@@ -140,7 +140,7 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         low, high = bounds_of(info).get(name, (-np.inf, np.inf))
         ends = sorted((0.5 * value, 2.0 * value)) if value else [-1.0, 1.0]
         ranges[name] = [float(np.clip(end, low, high)) for end in ends]
-    ranges |= {name: [-max(10.0, 2.0 * abs(value)), max(10.0, 2.0 * abs(value))] for name, value in inputs.items()}
+    ranges |= {name: [-max(10.0, 2.0 * abs(u)), max(10.0, 2.0 * abs(u))] for name, u in inputs.items()}
     for k in places:
         limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
         ends = [limits.get("lower", x0[k] - reach), limits.get("upper", x0[k] + reach)]
@@ -189,8 +189,10 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
         bound = module_of(trajectory, module, "a page")
         motion = sample(trajectory, partial(states_at, trajectory, bound), 25.0, None)
     scene = build_scene(module, scene_position(module) if motion is None else motion.x[: module.n_q])
-    html = getattr(equations, "_equations_html", "")
-    return page_html(module, scene, motion, (), describe_model(module, method), wasm, html)
+    model = describe_model(module, method)
+    if motion is not None:
+        model["x0"] = motion.x[:, 0].tolist()
+    return page_html(module, scene, motion, (), model, wasm, getattr(equations, "_equations_html", ""))
 
 
 def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any = None) -> Path | InlinePage:

@@ -1,0 +1,153 @@
+"""Pages in which a mechanism runs: the numbers of simulate, closed loops, text that stays text, no request."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Browser
+
+import eomgen as eg
+
+SAME = 1e-9  #: largest difference of a state in a page from that of simulate, at the same method and tolerances
+CLOSED = 1e-9  #: m, rad
+#: In a page: the largest residual of the loops at the state shown, which is finite.
+RESIDUAL = """(() => { const f = page.frames[page.cursor];
+return f.x.every(Number.isFinite) ? page.model.residual(f.t, f.x) : Infinity; })()"""
+BOUNCER = """name: bouncer
+gravity: [0, -g, 0]
+parameters: {g: 9.81, e: 0.8}
+inputs: {push: "0.2*sin(3*t)"}
+bodies: {ball: {mass: 1.0, inertia: {zz: 0.1}, doc: "</script><script>alert(1)</script>"}}
+joints: {drop: {type: prismatic, between: [ground, ball], axis: y, coordinate: h}}
+forces: {up: {type: force, joint: drop, value: push}}
+events: {ground: {expression: h, direction: -1, reset: {h_dot: -e*h_dot}}}
+initial: {h: 1.0}
+simulation: {end: 1.5, rtol: 1e-9, atol: 1e-11}
+"""
+IN_NODE = """
+const text = require("fs").readFileSync(process.argv[1], "utf8"), times = JSON.parse(process.argv[2]);
+const data = JSON.parse(text.match(/id="data">([^<]*)<.script>/)[1]);
+require("vm").runInThisContext(text.match(/<script>([^]*?)<.script>/)[1]);
+Model.open(data.model, data.wasm).then((model) => {
+  model.begin(0, Float64Array.from(data.model.x0));
+  const states = times.map((t) => (model.advance(t), [...model.state(t)]));
+  const energies = states.map((x, k) => [...model.call("energy", times[k], x)]);
+  console.log(JSON.stringify({ states, energies, happened: model.happened }));
+});
+"""
+
+
+@cache
+def slider_crank() -> eg.Module:
+    return eg.load_example("slider_crank").compile()
+
+
+def in_node(page: Path, times: np.ndarray) -> Any:
+    """States, energies and events of a page's model at some times, by node."""
+    words = ["node", "-e", IN_NODE, str(page), json.dumps(times.tolist())]
+    return json.loads(subprocess.run(words, check=True, capture_output=True, text=True, timeout=300).stdout)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return slider_crank().page(tmp_path_factory.mktemp("pages") / "slider_crank.html")
+
+
+@pytest.fixture
+def opened(page: Path, tmp_path: Path) -> Iterator[Browser]:
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("window.page !== undefined && page.count > 2")
+        yield browser
+        assert (browser.complaints, browser.requests) == ([], [])
+
+
+@pytest.mark.needs("node")
+@pytest.mark.slow
+def test_a_page_takes_the_steps_of_simulate(page: Path) -> None:
+    times = np.linspace(0.0, 2.0, 101)
+    run = slider_crank().simulate(5.0, t_eval=times)
+    seen = in_node(page, times)
+    assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
+    assert np.abs(np.array(seen["energies"]).sum(axis=1) - run["energy"]).max() < SAME
+
+
+@pytest.mark.needs("node")
+@pytest.mark.slow
+def test_events_and_inputs_over_time_are_those_of_simulate(tmp_path: Path) -> None:
+    (tmp_path / "bouncer.yaml").write_text(BOUNCER)
+    module = eg.load(tmp_path / "bouncer.yaml").compile(target="numpy")
+    page = module.page(tmp_path / "bouncer.html")
+    assert "alert(1)</script>" not in page.read_text()
+    run = module.simulate(1.5, t_eval=np.linspace(0.0, 1.4, 50))
+    seen = in_node(page, run.t)
+    assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
+    assert [t for name, t in seen["happened"]] == pytest.approx(
+        run.t_events["ground"][: len(seen["happened"])], abs=SAME
+    )
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
+def test_sliders_and_drags_keep_loops_closed_and_a_gap_is_told(opened: Browser) -> None:
+    opened.click("#play")
+    box = "[...document.querySelectorAll('.field')].find((one) => one.textContent.startsWith('{}')).children[2]"
+
+    def put(name: str, value: float) -> str:
+        opened.evaluate(f"(() => {{ const it = {box.format(name)}; it.value = '{value}'; it.onchange(); }})()")
+        assert opened.evaluate(RESIDUAL) < CLOSED
+        return str(opened.evaluate("document.getElementById('message').textContent"))
+
+    for theta in (2.9, -2.0, 0.1):  # past the dead centres
+        assert put("theta (", theta) == ""
+        x = opened.evaluate("[...page.frames[page.cursor].x]")
+        slider = 0.1 * np.cos(theta) + np.sqrt(0.35**2 - (0.1 * np.sin(theta)) ** 2)
+        assert x[2] == pytest.approx(slider, abs=1e-9)
+    put("l (", 0.175)
+    assert put("r (", 0.17) == ""
+    put("theta (", np.pi / 2)
+    assert "do not close" in put("r (", 0.2)
+    assert put("r (", 0.1) == ""
+    for k in range(10):
+        where = opened.evaluate("page.picture.seen(place(page.picture.poses[0], [0.05, 0, 0])).slice(0, 2)")
+        top = opened.place("#over")
+        at = {"x": top["x"] + where[0], "y": top["y"] + where[1], "button": "left", "buttons": 1, "clickCount": 1}
+        opened.call("Input.dispatchMouseEvent", type="mousePressed", **at)
+        for step in (1, 2, 3):
+            move = {**at, "x": at["x"] + 15 * step * np.cos(k), "y": at["y"] + 15 * step * np.sin(k)}
+            opened.call("Input.dispatchMouseEvent", type="mouseMoved", **move)
+        opened.call("Input.dispatchMouseEvent", type="mouseReleased", **at)
+        assert opened.evaluate(RESIDUAL) < CLOSED
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
+def test_a_page_plays_steps_and_fits_a_telephone(page: Path, tmp_path: Path) -> None:
+    with Browser(tmp_path / "profile", size=(400, 760)) as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("window.page !== undefined && page.frames.length > 5")
+        pixels = browser.picture()
+        assert len(np.unique(pixels.reshape(-1, 3) // 32, axis=0)) > 8  # links of several colours
+        assert browser.evaluate("document.documentElement.scrollWidth") <= 400
+        browser.click("#play")
+        here = browser.evaluate("page.cursor")
+        browser.click("#back")
+        assert browser.evaluate("page.cursor") == here - 1
+        browser.click("#reset")
+        assert browser.evaluate("page.frames[page.cursor].t") == 0
+        assert (browser.complaints, browser.requests) == ([], [])
+
+
+def test_models_that_cannot_run_in_a_page_are_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "hard.yaml").write_text(BOUNCER.replace("reset: {h_dot: -e*h_dot}", "restitution: e"))
+    module = eg.load(tmp_path / "hard.yaml").compile(target="numpy")
+    with pytest.raises(eg.ModelError, match=r"events\.ground\.restitution: a page cannot hold an impact"):
+        module.page(tmp_path / "hard.html")
+    assert not (tmp_path / "hard.html").exists()
