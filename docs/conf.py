@@ -104,8 +104,15 @@ def copy_mathjax(app: Any, failure: Exception | None) -> None:
         shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / name, folder / name)
 
 
+def make_page(app: Any, failure: Exception | None) -> None:
+    """A page in which a mechanism runs, beside the others."""
+    if failure is None and app.builder.format == "html":
+        eomgen.load_example("slider_crank").compile().page(Path(app.outdir) / "slider_crank.html")
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("builder-inited", copy_notebooks)
     app.connect("source-read", fill_contents)
     app.connect("build-finished", copy_mathjax)
+    app.connect("build-finished", make_page)

@@ -39,7 +39,7 @@ LONGEST = 800  #: lines of a file of tests
 
 #: What runs reach beyond the folders that packages carry: texts, pictures, analyses.
 BEYOND = {
-    "module": {"analysis", "verify"},
+    "module": {"analysis", "codegen", "verify"},
     "runtime.drawing": {"show"},
     "runtime.inputs": {"model"},
     "runtime.argument_checks": {"model"},

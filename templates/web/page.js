@@ -137,16 +137,10 @@ class Model {
       this.write(at, put);
       const count = target.length, mask = this.mask([]);
       if (this.f.web_pull(t, this.spare.x, mask, body, at, at + 24, count, at + 24 + 8 * axes.length, size)) return null;
+      if (this.info.rows && !(this.f.web_close(t, this.spare.x, mask) <= CLOSED)) return null;
       now = this.read(this.spare.x, this.n);
-      if (this.info.rows) now = this.closePosition(t, now);
-      if (!now) return null;
     }
-    return this.info.rows ? this.close(t, now, this.info.independent) || now : now;
-  }
-
-  closePosition(t, x) {
-    this.write(this.spare.x, x);
-    return this.f.web_close(t, this.spare.x, this.mask([])) <= CLOSED ? this.read(this.spare.x, this.n) : null;
+    return this.info.rows ? this.close(t, now, this.info.independent) : now;
   }
 
   begin(t, x) {
@@ -414,7 +408,7 @@ class Picture {
     const { data, canvas } = this, wide = canvas.clientWidth || 1, tall = canvas.clientHeight || 1;
     const size = data.high.map((x, k) => x - data.low[k]), right = unit(cross(this.up, this.toward));
     const up = cross(this.toward, right), span = Math.hypot(...size);
-    const half = data.view ? 0.53 * Math.max(size[1], (size[0] * tall) / wide) : 0.55 * span * Math.max(1, 0.9 * tall / wide);
+    const half = data.view ? 0.53 * Math.max(size[1], (size[0] * tall) / wide) : 0.46 * span * Math.max(1, 0.9 * tall / wide);
     this.half = half / this.zoom; // half of what is seen upwards at the target
     const far = 4 * this.half + span, near = data.view ? 0 : 3.2 * this.half, aspect = tall / wide, h = this.half;
     const eye = plus(this.target, this.toward, data.view ? 0 : near);
@@ -478,7 +472,8 @@ class Picture {
 
   colored(color, alpha, dark, paper) {
     let rgb = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16) / 255);
-    if (dark && Math.max(...rgb) - Math.min(...rgb) < 0.06) rgb = rgb.map((x) => 0.95 - 0.85 * x); // greys, for the eye at night
+    const grey = Math.max(...rgb) - Math.min(...rgb) < 0.06 && (this.data.view || rgb[0] < 0.6);
+    if (dark && grey) rgb = rgb.map((x) => 0.95 - 0.85 * x);
     if (this.data.view) return [...rgb.map((x, k) => alpha * x + (1 - alpha) * paper[k]), 1];
     return [...rgb, alpha];
   }
@@ -492,6 +487,7 @@ class Picture {
     const paper = dark ? [0.09, 0.1, 0.12] : [1, 1, 1];
     gl.viewport(0, 0, wide, tall);
     gl.clearColor(...paper, 1);
+    gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     (data.view ? gl.disable : gl.enable).call(gl, gl.DEPTH_TEST);
@@ -672,9 +668,10 @@ class Page {
       this.clock = frames[0].clock;
       return;
     }
+    const { end } = model.info, stops = now < end && next >= end; // the declared run; play goes on
     const begun = performance.now(), count = Math.ceil(passed * 60 / get("speed").value);
     for (let k = 1; k <= count; k += 1) { // no coarser than the eye sees, however slowly pages are drawn
-      const wanted = now + (passed * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
+      const wanted = stops && k === count ? end : now + (passed * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
       if (model.ended && t <= this.frames.at(-1).t) {
         this.play(false);
         this.say(model.ended);
@@ -686,6 +683,7 @@ class Page {
       this.slow = !reached || performance.now() - begun > 60;
       if (this.slow) break;
     }
+    if (this.clock === end) this.play(false);
     for (const [name, time] of model.happened.splice(0)) this.event = `${name} at ${shown(time)} s`;
   }
 
@@ -783,7 +781,7 @@ class Page {
         pen.beginPath();
         for (let i = first; i <= last; i += 1) pen.lineTo(X(times[i]), Y(column[i]));
         pen.stroke();
-        if (lines.length > 1) { pen.fillStyle = pen.strokeStyle; pen.fillText(["T", "V", "T + V"][j], 58 + 34 * j, 12); }
+        if (lines.length > 1) { pen.fillStyle = pen.strokeStyle; pen.fillText(["T", "V", "T + V"][j], 120 + 34 * j, tall - 4); }
       });
       const here = this.model ? this.frames[this.cursor].t : this.data.motion.over[this.cursor];
       pen.strokeStyle = ink;

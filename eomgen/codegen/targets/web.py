@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...base.algebra import Array
 from ...base.files import as_path, write_whole
 from ...base.limits.in_c import definitions
 from ...errors import EomgenError, ModelError, Problem, ToolchainError, cannot
@@ -166,6 +168,18 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _way(module: BoundModel) -> Array:
+    """Positions of the declared run, so that all of it is in the picture; the start where it cannot be run."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = module.simulate()  # type: ignore[attr-defined]
+        picked: Array = run.q[:, np.linspace(0, len(run.t) - 1, 60).astype(int)]
+        return picked
+    except EomgenError:
+        return scene_position(module)
+
+
 def _tape(tape: Any) -> list[Any]:
     """Code, numbers and the last instruction of a tape of one value."""
     code, numbers, out = tape
@@ -188,7 +202,7 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
     if trajectory is not None:
         bound = module_of(trajectory, module, "a page")
         motion = sample(trajectory, partial(states_at, trajectory, bound), 25.0, None)
-    scene = build_scene(module, scene_position(module) if motion is None else motion.x[: module.n_q])
+    scene = build_scene(module, _way(module) if motion is None else motion.x[: module.n_q])
     model = describe_model(module, method)
     if motion is not None:
         model["x0"] = motion.x[:, 0].tolist()
