@@ -619,7 +619,10 @@ class Page {
   recorded(motion) {
     if (!motion) return;
     const { model } = this, n = model.n;
-    motion.t.forEach((t, k) => this.keep(t, new Float64Array(this.numbers.subarray(motion.states + k * n, motion.states + (k + 1) * n))));
+    motion.t.forEach((t, k) => {
+      const x = new Float64Array(this.numbers.subarray(motion.states + k * n, motion.states + (k + 1) * n));
+      this.keep(t, model.call("project", t, x) ?? x);
+    });
   }
 
   keep(t, x) {
@@ -765,7 +768,7 @@ class Page {
       const last = this.model && !this.replayed ? this.cursor : over.length - 1, values = rows.flatMap(([, v]) => v.slice(first, last + 1)).filter(Number.isFinite);
       if (!values.length) continue;
       let low = Math.min(...values), high = Math.max(...values);
-      if (high - low < 1e-9 * Math.max(1, Math.abs(high))) { low -= 0.5 * (Math.abs(low) || 1); high += 0.5 * (Math.abs(high) || 1); }
+      if (high - low < 1e-6 * Math.max(1e-3, Math.abs(high))) { low -= 0.5 * (Math.abs(low) || 1); high += 0.5 * (Math.abs(high) || 1); }
       const ink = this.dark ? "#e6e6e6" : "#222222", span = over[last] - over[first] || 1;
       const X = (t) => 52 + ((wide - 60) * (t - over[first])) / span, Y = (v) => tall - 18 - ((tall - 26) * (v - low)) / (high - low);
       pen.font = "11px system-ui, sans-serif";
