@@ -20,6 +20,24 @@ CLOSED = 1e-9  #: m, rad
 #: In a page: the largest residual of the loops at the state shown, which is finite.
 RESIDUAL = """(() => { const f = page.frames[page.cursor];
 return f.x.every(Number.isFinite) ? page.model.residual(f.t, f.x) : Infinity; })()"""
+#: 200 random moves of sliders and drags, each followed by some frames of the run: the largest residual.
+AT_RANDOM = """(async () => {
+  let seed = 1, worst = 0;
+  const random = () => { seed = (seed * 16807) % 2147483647; return seed / 2147483647; };
+  const slides = [...document.querySelectorAll('.field input[type=range]')], { clientWidth: w, clientHeight: h } = get('over');
+  for (let k = 0; k < 200; k += 1) {
+    const slide = slides[Math.floor(random() * slides.length)], grip = page.picture.pick(random() * w, random() * h);
+    if (grip && random() < 0.7) { page.grip = grip; page.drag([random() * w, random() * h]); page.grip = null; }
+    else { slide.value = +slide.min + random() * (slide.max - slide.min); slide.oninput(); }
+    page.play(random() < 0.5);
+    await new Promise(requestAnimationFrame);
+    await new Promise(requestAnimationFrame);
+    worst = Math.max(worst, RESIDUAL);
+  }
+  const before = page.count;
+  await new Promise((done) => setTimeout(done, 1000));
+  return page.count > before ? worst : Infinity;
+})()"""
 BOUNCER = """name: bouncer
 gravity: [0, -g, 0]
 parameters: {g: 9.81, e: 0.8}
@@ -151,3 +169,15 @@ def test_models_that_cannot_run_in_a_page_are_refused_by_name(tmp_path: Path) ->
     with pytest.raises(eg.ModelError, match=r"events\.ground\.restitution: a page cannot hold an impact"):
         module.page(tmp_path / "hard.html")
     assert not (tmp_path / "hard.html").exists()
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["four_bar", "excavator", "stewart_platform", "double_wishbone", "satellite"])
+def test_nothing_breaks_at_random_moves(name: str, tmp_path: Path) -> None:
+    page = eg.load_example(name).compile(target="numpy").page(tmp_path / "it.html")
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("window.page !== undefined && page.count > 2")
+        assert browser.evaluate(AT_RANDOM.replace("RESIDUAL", RESIDUAL)) < CLOSED
+        assert (browser.complaints, browser.requests) == ([], [])
