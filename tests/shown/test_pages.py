@@ -24,7 +24,8 @@ return f.x.every(Number.isFinite) ? page.model.residual(f.t, f.x) : Infinity; })
 AT_RANDOM = """(async () => {
   let worst = 0;
   const random = () => { window.seed = ((window.seed ?? 1) * 16807) % 2147483647; return window.seed / 2147483647; };
-  const slides = [...document.querySelectorAll('.field input[type=range]')], { clientWidth: w, clientHeight: h } = get('over');
+  const slides = [...document.querySelectorAll('.field input[type=range]')];
+  const { clientWidth: w, clientHeight: h } = get('over');
   for (let k = 0; k < 20; k += 1) {
     const slide = slides[Math.floor(random() * slides.length)];
     const grip = page.picture.pick(random() * w, random() * h);
