@@ -233,7 +233,7 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
 def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, analyses: bool, as_json: bool) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`.
 
-    Target fmu is one file, DIR/<name>.fmu.
+    Targets fmu and web are one file, DIR/<name>.fmu and DIR/<name>.html.
     """
     from ..api.generation import generate as write_out
     from ..toolchain.wheel import build_wheel, require_wheel

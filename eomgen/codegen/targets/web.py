@@ -8,7 +8,7 @@ import shutil
 import warnings
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -209,6 +209,10 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
     return page_html(module, scene, motion, (), model, wasm, getattr(equations, "_equations_html", ""))
 
 
+@overload
+def page(module: BoundModel, /, file: None = None, trajectory: Any = None) -> InlinePage: ...
+@overload
+def page(module: BoundModel, /, file: Path | str, trajectory: Any = None) -> Path: ...
 def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any = None) -> Path | InlinePage:
     """Write a page in which the mechanism runs: one HTML file that needs no network.
 
@@ -246,6 +250,4 @@ def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any 
 def generate_web(program: Program, module: BoundModel, directory: Path, version: str) -> Path:
     """Write ``<name>.html`` into a folder."""
     directory.mkdir(parents=True, exist_ok=True)
-    found = page(module, directory / f"{program.name}.html")
-    assert isinstance(found, Path)
-    return found
+    return page(module, directory / f"{program.name}.html")
