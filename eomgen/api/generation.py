@@ -34,7 +34,7 @@ def generate(
     fmi: str = "2.0",
     analyses: bool = False,
 ) -> Path:
-    """Write a package that stands alone into ``directory/<name>/``, or ``directory/<name>.fmu``, and return that path.
+    """Write a package that stands alone into ``directory/<name>/``, ``directory/<name>.fmu`` or ``.html``, and return that path.
 
     Files of an earlier generation that are no longer needed are removed; those of others are left alone.
 
@@ -44,7 +44,7 @@ def generate(
     directory : Path or str
     method, independent, baumgarte : optional
         As for ``Model.compile``.
-    target : {'cython', 'c', 'casadi', 'jax', 'cuda', 'fmu'}
+    target : {'cython', 'c', 'casadi', 'jax', 'cuda', 'fmu', 'web'}
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library: ``float`` is for processors whose unit knows single precision alone, and
         leaves five to six digits.

@@ -41,6 +41,7 @@ SEEN = {
     "m.draw(theta=0.3)": "Axes",
     "mod.draw({'theta': 0.3}, axes=True)": "Axes",
     "mod.draw_branches(theta=0.3)": "ndarray",
+    "mod.page()": "InlinePage",
     "m.check().draw()": "Axes",
     "mod.simulate(1.0).plot('theta')": "Axes",
     "mod.simulate(1.0).plot('theta', kind='spectrum')": "Axes",
@@ -54,7 +55,6 @@ SEEN = {
 }
 #: What may be several things, as a checker writes it.
 UNIONS = {
-    "mod.page()": ("Path", "InlinePage"),
     "mod.simulate(1.0).plot()": ("Axes", "ndarray"),
     "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray"),
 }
