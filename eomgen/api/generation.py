@@ -34,7 +34,7 @@ def generate(
     fmi: str = "2.0",
     analyses: bool = False,
 ) -> Path:
-    """Write a package that stands alone into ``directory/<name>/``, ``directory/<name>.fmu`` or ``.html``, and return that path.
+    """Write a package that stands alone into ``directory/<name>/``, or one file ``<name>.fmu`` or ``.html``; its path.
 
     Files of an earlier generation that are no longer needed are removed; those of others are left alone.
 
