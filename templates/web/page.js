@@ -36,8 +36,8 @@ class Model {
     this.setParameters(info.pValues);
     exports.web_scales();
     this.inputs = info.u.map((_, k) => (info.signals[k] ? { text: info.signals[k][0] } : { value: info.uValues[k] }));
-    for (const [k, [, code, constants, last]] of Object.entries(info.signals)) this.setTape(+k, code, constants, last);
     info.uValues.forEach((value, k) => this.setInput(k, value));
+    for (const [k, [, code, constants, last]] of Object.entries(info.signals)) this.setTape(+k, code, constants, last);
     this.atol = this.room(n);
     this.write(this.atol, info.atol);
   }
@@ -66,7 +66,6 @@ class Model {
   }
 
   setInput(k, value) {
-    if (value === null) return;
     this.f.web_signal(k, 0, 0, 0, 0);
     new Float64Array(this.f.memory.buffer, this.f.web_inputs(), this.info.u.length)[k] = value;
   }

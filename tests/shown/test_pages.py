@@ -41,12 +41,13 @@ AT_RANDOM = """(async () => {
   return page.count > before ? worst : Infinity;
 })()"""
 BOUNCER = """name: bouncer
+doc: </script><script>alert(1)</script>
 gravity: [0, -g, 0]
 parameters: {g: 9.81, e: 0.8}
-inputs: {push: "0.2*sin(3*t)"}
-bodies: {ball: {mass: 1.0, inertia: {zz: 0.1}, doc: "</script><script>alert(1)</script>"}}
+inputs: {push: {signal: 0.2*sin(3*t)}}
+bodies: {ball: {mass: 1.0, inertia: {zz: 0.1}}}
 joints: {drop: {type: prismatic, between: [ground, ball], axis: y, coordinate: h}}
-forces: {up: {type: force, joint: drop, value: push}}
+forces: {up: {type: torque, joint: drop, value: push}}
 events: {ground: {expression: h, direction: -1, reset: {h_dot: -e*h_dot}}}
 initial: {h: 1.0}
 simulation: {end: 1.5, rtol: 1e-9, atol: 1e-11}
@@ -166,7 +167,7 @@ def test_a_page_plays_steps_and_fits_a_telephone(page: Path, tmp_path: Path) -> 
 
 
 def test_models_that_cannot_run_in_a_page_are_refused_by_name(tmp_path: Path) -> None:
-    (tmp_path / "hard.yaml").write_text(BOUNCER.replace("reset: {h_dot: -e*h_dot}", "restitution: e"))
+    (tmp_path / "hard.yaml").write_text(BOUNCER.replace("reset: {h_dot: -e*h_dot}", "restitution: 0.8"))
     module = eg.load(tmp_path / "hard.yaml").compile(target="numpy")
     with pytest.raises(eg.ModelError, match=r"events\.ground\.restitution: a page cannot hold an impact"):
         module.page(tmp_path / "hard.html")
