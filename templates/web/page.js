@@ -703,15 +703,15 @@ class Page {
     } else this.cursor = Math.min(this.frames.length - 1, Math.max(0, this.cursor + by));
   }
 
-  poses() {
-    const frame = this.frames[this.cursor], { model, data } = this, found = [];
+  poses(k = this.cursor) {
+    const frame = this.frames[k], { model, data } = this, found = [];
     if (model) {
       const all = model.call("poses", frame.t, frame.x);
       if (!all) return this.picture.poses;
-      for (let k = 0; k < data.bodies.length; k += 1) found.push(all.subarray(16 * k, 16 * k + 16));
+      data.bodies.forEach((_, body) => found.push(all.subarray(16 * body, 16 * body + 16)));
     } else {
-      const at = data.motion.poses + 12 * data.bodies.length * this.cursor;
-      for (let k = 0; k < data.bodies.length; k += 1) found.push([...this.numbers.subarray(at + 12 * k, at + 12 * k + 12), 0, 0, 0, 1]);
+      const at = data.motion.poses + 12 * data.bodies.length * k;
+      data.bodies.forEach((_, body) => found.push([...this.numbers.subarray(at + 12 * body, at + 12 * body + 12), 0, 0, 0, 1]));
     }
     found[-1] = IDENTITY;
     return found;
@@ -719,7 +719,7 @@ class Page {
 
   show() {
     const frame = this.frames[this.cursor], poses = this.poses(), trace = get("trace").value;
-    if (trace) this.follow(poses, trace, frame);
+    if (trace) this.follow(trace);
     else this.picture.trace.points = [];
     this.picture.draw(poses, this.cursor, this.dark, this.names);
     const time = get("time");
@@ -732,13 +732,15 @@ class Page {
     if (this.model && this.count % 6 === 0) this.measure(frame);
   }
 
-  follow(poses, name, frame) {
-    const [, body, shape] = this.data.markers.find((one) => one[0] === name), { trace } = this.picture;
-    if (this.traced !== name || frame.t < this.tracedAt) trace.points = [];
+  // The way of a marker, through all frames since it was last drawn.
+  follow(name) {
+    const [, body, shape] = this.data.markers.find((one) => one[0] === name), { trace, points } = this.picture;
+    if (this.traced !== name || this.cursor < this.tracedAt) {
+      trace.points = [];
+      this.tracedAt = this.cursor - 1;
+    }
     this.traced = name;
-    this.tracedAt = frame.t;
-    const at = place(poses[body], this.picture.points[shape]);
-    trace.points.push(...at);
+    while (this.tracedAt < this.cursor) trace.points.push(...place(this.poses(this.tracedAt += 1)[body], points[shape]));
     if (trace.points.length > 9000) trace.points.splice(0, 3000);
   }
 
