@@ -13,9 +13,9 @@ from typing import Any, overload
 import numpy as np
 
 from ...base.algebra import Array
-from ...base.files import as_path, write_whole
+from ...base.files import as_path, open_plain, write_whole
 from ...base.limits.in_c import definitions
-from ...errors import EomgenError, ModelError, Problem, ToolchainError, cannot
+from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot
 from ...runtime.bound_model import BoundModel
 from ...runtime.drawing import module_of
 from ...runtime.layout import bounds_of
@@ -42,6 +42,7 @@ STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_st
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-mexec-model=reactor", "-s", "-DEOMGEN_LANES=0",
          "-DEOMGEN_PORTABLE", "-DEOMGEN_WITHOUT_METADATA")  # fmt: skip
 SECONDS = 1800.0  #: that the compiler may take: the first time zig builds its C library, once for all
+GENERATOR = b'<meta name="generator" content="eomgen">'  #: what a page says of itself
 BODIES = 200  #: more take too long for a page
 BRANCHES = 8  #: ways of closing the loops that are offered
 
@@ -248,6 +249,17 @@ def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any 
 
 
 def generate_web(program: Program, module: BoundModel, directory: Path, version: str) -> Path:
-    """Write ``<name>.html`` into a folder."""
+    """Write ``<name>.html`` into a folder, in the place of one that eomgen wrote before.
+
+    Raises
+    ------
+    UsageError
+        There is another file of this name.
+    """
+    where = directory / f"{program.name}.html"
+    if os.path.lexists(where):
+        with open_plain(where, follow=False) as file:
+            if GENERATOR not in file.read(2000):
+                raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")
     directory.mkdir(parents=True, exist_ok=True)
-    return page(module, directory / f"{program.name}.html")
+    return page(module, where)
