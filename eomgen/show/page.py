@@ -120,12 +120,15 @@ def _item(scene: Scene, item: Item, shape: int, numbers: Numbers) -> dict[str, A
     if item.path is not None:
         found |= {"frames": numbers.add(item.path)[0], "size": item.path[0].size}
     elif item.follow is not None:
-        kind = {Stretched: "stretch", Shifted: "shift", Rope: "rope"}[type(item.follow)]
         stops = [
             {"body": frame.body, "radius": radius, "sense": sense, "rotation": frame.rotation.tolist()}
             for frame, radius, sense in _stops(item)
         ]
-        found |= {"follow": kind, "stops": stops, "flat": getattr(item.follow, "view", None) is not None}
+        found |= {
+            "follow": type(item.follow).__name__,
+            "stops": stops,
+            "flat": getattr(item.follow, "view", None) is not None,
+        }
     return found
 
 

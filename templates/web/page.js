@@ -374,8 +374,8 @@ class Picture {
     const row = (k) => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
     const stops = item.stops.map((stop, k) => place(poses[stop.body], row(k)));
     const rest = Array.from({ length: points.length / 3 - stops.length }, (_, k) => row(k + stops.length));
-    if (item.follow === "shift") return rest.flatMap((point) => plus(stops[0], point));
-    if (item.follow === "stretch") {
+    if (item.follow === "Shifted") return rest.flatMap((point) => plus(stops[0], point));
+    if (item.follow === "Stretched") {
       const way = plus(stops[1], stops[0], -1), long = Math.hypot(...way), [stop] = item.stops;
       const axis = [stop.rotation[0][2], stop.rotation[1][2], stop.rotation[2][2]];
       const [across, other] = acrossOf(long > 0 ? scaled(way, 1 / long) : turn(poses[stop.body], axis), item.flat ? view : null);

@@ -21,7 +21,7 @@ from ...runtime.drawing import module_of
 from ...runtime.layout import bounds_of
 from ...runtime.plotting import states_at
 from ...runtime.runs.events import Events
-from ...runtime.runs.simulate import plan_run
+from ...runtime.runs.simulate import plan_run, simulate
 from ...show.build_scene import build_scene
 from ...show.frames import sample
 from ...show.page import InlinePage, page_html, scene_position
@@ -151,7 +151,7 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
     signals = {layout.u.index(name): ["as declared", *_tape(tape)] for name, tape in info.signals.items()
                if name in layout.u}  # fmt: skip
     try:
-        found = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []  # type: ignore[attr-defined]
+        found = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []
     except EomgenError:
         found = []
     settings, bounds = plan.settings, bounds_of(info)
@@ -174,7 +174,7 @@ def _way(module: BoundModel) -> Array:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            run = module.simulate()  # type: ignore[attr-defined]
+            run = simulate(module)
         picked: Array = run.q[:, np.linspace(0, len(run.t) - 1, 60).astype(int)]
         return picked
     except EomgenError:
