@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -152,7 +153,8 @@ def _rod(line: Array, radius: float) -> Mesh:
     return vertices @ _upright(along / length).T + line[0], faces
 
 
-class Stretched(NamedTuple):
+@dataclass(frozen=True)
+class Stretched:
     """Points along the way between two places that move: rows of the part of the way, and of lengths across it (m)."""
 
     start: PlacedFrame
@@ -169,7 +171,8 @@ class Stretched(NamedTuple):
         return points
 
 
-class Shifted(NamedTuple):
+@dataclass(frozen=True)
+class Shifted:
     """Points (n, 3) around a place that moves, which do not turn (m, ground axes)."""
 
     frame: PlacedFrame
@@ -435,7 +438,8 @@ def _broken(lines: Sequence[Array]) -> Array:
     return np.vstack(parts[:-1])
 
 
-class Rope(NamedTuple):
+@dataclass(frozen=True)
+class Rope:
     """A line over markers and round cylinders; 25 points a cylinder, wound where it is touched."""
 
     stops: Sequence[tuple[PlacedFrame, float | None, int | None]]
