@@ -196,7 +196,8 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
     method = method if method in METHODS else "DOP853"
     kernels = (*KERNELS, *(("jacobian",) if method == "Radau" else ()))
     about = {"target": "web", "model_digest": module.info.model_digest, "eomgen": module.info.eomgen}
-    program = program_of(*equations.fresh(), about, False, kernels)
+    kinematics, mobility, tree = equations.fresh()
+    program = program_of(kinematics, mobility, tree, about, False, kernels)
     refuse(program)
     wasm = compile_wasm(program, method)
     motion = None
