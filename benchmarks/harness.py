@@ -224,12 +224,12 @@ def write(page: Path, name: str, report: Report, machine: str) -> None:
     """Put a report into the page of results, in the place of the last one of that name."""
     heading = f"## {name}: {BENCHMARKS[name][0]}\n"
     part = f"{heading}\n{report.markdown()}\n*{date.today()}, {machine}*\n\n"
-    text = page.read_text(encoding="utf-8") if page.exists() else "# Results of the benchmarks\n\n"
-    parts = re.split(r"(?m)^(?=## )", text)
+    text = page.read_text(encoding="utf-8") if page.exists() else "# Results of the benchmarks"
+    parts = re.split(r"(?m)^(?=## )", text.rstrip() + "\n\n")
     places = [k for k, one in enumerate(parts) if one.startswith(f"## {name}: ")]
     parts[places[0] if places else len(parts) :] = [part, *(parts[places[0] + 1 :] if places else [])]
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text("".join(parts), encoding="utf-8")
+    page.write_text("".join(parts).rstrip() + "\n", encoding="utf-8")
 
 
 # -- the machine -------------------------------------------------------------------------------------------------------
