@@ -20,7 +20,7 @@ from ..base.numeric.assembly import close, closed, starts
 from ..base.numeric.projection import largest
 from ..base.operations import CHOICE, OPERATIONS
 from ..base.records import dataclass
-from ..base.texts import angle_in_degrees, fold, html_text, terminal_width
+from ..base.texts import angle_in_degrees, fold, html_table, terminal_width
 from ..elements.constraints import Driver
 from ..elements.frames import Frame, Marker
 from ..errors import MissingDependencyError, bad_file
@@ -370,6 +370,7 @@ def _finish(ax: Any, report: MechanismReport, middle: float, half: float, layers
 
 TIMED = {"holds": "for a time"}  #: of a constraint that closes and opens
 WIDTH = 110  #: of the lines of a report, at most
+ASSUMED = "some parameters have no value; random values were used to find the rank"
 LISTED = 12  #: names in one of them
 
 
@@ -475,11 +476,21 @@ class MechanismReport:
         return asdict(self)
 
     def __str__(self) -> str:
-        lines = [f"mechanism {self.name}"]
         width = min(WIDTH, terminal_width() or WIDTH)
+        lines = [f"mechanism {self.name}"]
+        for label, text in self._facts():
+            folded = fold(text.replace(" (", "\xa0("), width, f"  {label:<22}", " " * 24)
+            lines += [line.replace("\xa0", " ") for line in folded]
+        if self.assumed:
+            lines.append(f"  {ASSUMED}")
+        return "\n".join(lines + [f"  note: {note}" for note in self.notes])
+
+    def _facts(self) -> list[tuple[str, str]]:
+        """Labels and values."""
+        facts: list[tuple[str, str]] = []
 
         def say(label: str, text: str) -> None:
-            lines.extend(fold(text, width, f"  {label:<22}", " " * 24))
+            facts.append((label, text))
 
         if self.bodies:
             say("bodies", f"{len(self.bodies)}: {_list(self.bodies)}")
@@ -517,11 +528,9 @@ class MechanismReport:
             say("assembled", self._assembled())
             if self.other_branches:
                 there = " or ".join(dict.fromkeys(_values(other) for other in self.other_branches))
-                say("", f"as near is a branch with {there}; a guess of {next(iter(self.other_branches[0]))} chooses")
-        if self.assumed:
-            lines.append("  some parameters have no value; random values were used to find the rank")
-        lines += [f"  note: {note}" for note in self.notes]
-        return "\n".join(lines)
+                first = next(iter(self.other_branches[0]))
+                say("", f"another branch is equally near ({there}); guess {first} to choose")
+        return facts
 
     def _assembled(self) -> str:
         """On which branch the loops are closed."""
@@ -538,8 +547,9 @@ class MechanismReport:
         return "from the initial values, and from 0 where there are none"
 
     def _repr_html_(self) -> str:
-        text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
-        return side_by_side(picture_html(lambda: self.draw(ax=_axes(self)).figure), text) if self.bodies else text
+        notes = [("note", note) for note in ([ASSUMED] if self.assumed else []) + self.notes]
+        table = html_table(f"Mechanism {self.name}", [*self._facts(), *notes])
+        return side_by_side(picture_html(lambda: self.draw(ax=_axes(self)).figure), table) if self.bodies else table
 
 
 def _values(values: dict[str, float]) -> str:
