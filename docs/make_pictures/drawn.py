@@ -20,6 +20,7 @@ def kinematics() -> Any:
     mod = example("four_bar.yaml")
     panels = np.ravel(mod.draw_branches({mod.q_names[0]: mod.x0()[0]}))
     panels[0].figure.set_size_inches(7.2, 3.0)
+    plt.setp(panels, xlim=(-0.05, 0.17), ylim=(-0.09, 0.09))
     return panels
 
 
@@ -76,6 +77,7 @@ def constraints() -> Any:
     example("cam_follower.yaml").draw(ax=right)
     left.set_title("gear and belt", fontsize=10)
     right.set_title("cam and roller", fontsize=10)
+    right.locator_params(axis="x", nbins=4)
     return figure
 
 
@@ -119,16 +121,17 @@ def joints() -> Any:
     """Joints in a plane and in space."""
     figure = plt.figure(figsize=(7.2, 3.6), layout="constrained")
     example("slider_crank.yaml").draw({"theta": 0.9}, ax=figure.add_subplot(1, 2, 1))
-    example("double_wishbone.yaml").draw(ax=figure.add_subplot(1, 2, 2, projection="3d"))
+    space = figure.add_subplot(1, 2, 2, projection="3d")
+    example("double_wishbone.yaml").draw(ax=space)
+    space.set_box_aspect([np.ptp(limits()) for limits in (space.get_xlim, space.get_ylim, space.get_zlim)], zoom=0.85)
+    space.locator_params(axis="x", nbins=4)
     return figure
 
 
 @picture
 def model_file() -> Any:
     """The model of the page."""
-    ax = of_page("model_file", 0).draw()
-    ax.figure.set_size_inches(4.6, 4.0)
-    return ax
+    return of_page("model_file", 0).draw(ax=panels(size=(4.6, 4.0))[1])
 
 
 @picture
@@ -185,9 +188,7 @@ def generated_code() -> Any:
 @picture
 def glossary_slider_crank() -> Any:
     """Bodies and joints with their names."""
-    ax = eg.load_example("slider_crank").draw({"theta": 0.9})
-    ax.figure.set_size_inches(4.8, 3.6)
-    return ax
+    return eg.load_example("slider_crank").draw({"theta": 0.9}, ax=panels(size=(4.8, 2.8))[1])
 
 
 @picture
