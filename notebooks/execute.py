@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import base64
 import io
+import re
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -17,14 +18,18 @@ import nbformat
 from nbclient import NotebookClient
 from PIL import Image, ImageSequence
 
+INLINE = re.compile(r"(data:(image/(?:png|gif));base64,)([\w+/=]+)")
+
 
 def executed(notebook: Any, timeout: float, raw: bool) -> Any:
-    """The notebook, with the outputs of all its cells; the first unexpected error of a cell is raised."""
+    """The notebook with the outputs of all its cells; raises at an unexpected error of a cell, or if it left files."""
     with tempfile.TemporaryDirectory() as folder:
         resources = {"metadata": {"path": folder}}
         NotebookClient(
             notebook, timeout=timeout, kernel_name="python3", resources=resources, record_timing=False
         ).execute()
+        if files := sorted(path.name for path in Path(folder).iterdir()):
+            raise RuntimeError(f"the notebook left files in its folder: {', '.join(files)}")
     return notebook if raw else tidied(notebook)
 
 
@@ -35,8 +40,11 @@ def tidied(notebook: Any) -> Any:
         if cell.cell_type == "code":
             cell.outputs = joined(cell.outputs)
             for output in cell.outputs:
-                for kind in {"image/png", "image/gif"} & set(output.get("data", {})):
-                    output.data[kind] = smaller(kind, output.data[kind])
+                for kind, value in output.get("data", {}).items():
+                    if kind in ("image/png", "image/gif"):
+                        output.data[kind] = smaller(kind, value)
+                    elif kind == "text/html":
+                        output.data[kind] = INLINE.sub(lambda one: one[1] + smaller(one[2], one[3]), value)
     notebook.metadata = {
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
         "language_info": {"name": "python"},
