@@ -74,7 +74,7 @@ def regular(count: int, radius: float) -> list[tuple[float, float]]:
 
 
 def facing(first: np.ndarray, second: np.ndarray) -> list[tuple[float, float]]:
-    """How deep two convex outlines are in each other at both spots, and the part of the law that counts there.
+    """How deep two convex outlines are in each other at both contact points, and the part of the law that counts there.
 
     Heights of both edges along the mean of their normals, as functions of the place across it.
     """
@@ -116,7 +116,7 @@ def facing(first: np.ndarray, second: np.ndarray) -> list[tuple[float, float]]:
     return [(least, 1.0), (min(*ends, following - least), float(part**2 * (3 - 2 * part)))]
 
 
-def spots(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[tuple[float, float]]:
+def witnesses(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[tuple[float, float]]:
     """Depths of all places of contact, and the part of the law that counts there."""
     if {first, second} <= {"box", "polygon"}:
         return facing(placed(q1, corners_of(first)), placed(q2, corners_of(second)))
@@ -126,7 +126,7 @@ def spots(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> 
 def depths(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[float]:
     """How deep the round parts of two shapes are in the other shape, or how deep two polygons are in each other."""
     if {first, second} <= {"box", "polygon"}:
-        return [depth for depth, _ in spots(first, second, q1, q2)]
+        return [depth for depth, _ in witnesses(first, second, q1, q2)]
     found = []
     for (a, qa), (b, qb) in (((first, q1), (second, q2)), ((second, q2), (first, q1))):
         if a == "circle" == b:

@@ -35,7 +35,7 @@ class Sizes(NamedTuple):
     n_resets: int = 0  #: states that events give new values
     n_strike: int = 0  #: rows of what velocities obey where an event changes them, 0 where they just change
     n_states: int = 0  #: first-order states, the last of the n_v velocities and of the n_dof independent ones
-    n_spots: int = 0  #: numbers of the lists of pairs of shapes that are near each other
+    n_witnesses: int = 0  #: numbers of the lists of pairs of shapes that are near each other
     n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
@@ -164,11 +164,11 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,), "s until shapes may meet; depth, thickness, deepest pair"),
-    Kernel("near_pairs", ("q",), lambda s: (s.n_spots,), "of each contact: how many pairs are near, and where",
+    Kernel("near_pairs", ("q",), lambda s: (s.n_witnesses,), "of each contact: how many pairs are near, and where",
            late="rigid contact"),
-    Kernel("bias_apart", ("q", "v"), lambda s: (s.n_v if s.n_spots else 0,), "h without contacts between groups",
+    Kernel("bias_apart", ("q", "v"), lambda s: (s.n_v if s.n_witnesses else 0,), "h without contacts between groups",
            late="rigid contact"),
-    Kernel("motion_axes", ("q",), lambda s: (s.n_v if s.n_spots else 0, 6), late="rigid contact",
+    Kernel("motion_axes", ("q",), lambda s: (s.n_v if s.n_witnesses else 0, 6), late="rigid contact",
            result="angular velocity of what a velocity moves, and velocity of its point at the origin, ground axes"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )  # fmt: skip

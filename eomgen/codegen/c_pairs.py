@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..base.numeric.outline_pieces import CHOSEN, PIECE
-from ..base.numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
+from ..base.numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, WITNESS
 from ..base.numeric.polygon_edges import OTHER, OWN
 from ..expr.core import symbols_of
 from ..expr.pairs import PairFunction, PairKind, PairPart
@@ -129,7 +129,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
     parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
     parts += [("slopes", "_slope")] if used.slopes else []
     parts += [("touch", "_touch")] if used.meets else []
-    parts += [("spot", "_spot")] if used.lists else []
+    parts += [("witness", "_witness")] if used.lists else []
     tables = _tables(function)
     for k in {kind.first for kind in function.kinds if kind.lines}:
         tables[k]["lined"] = True
@@ -162,7 +162,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
                 "law": kind.law,
                 "states": kind.states,
                 "pieces": kind.corners[0] if len(kind.corners) == 1 else 0,
-                "places": len(kind.spot) // SPOT,
+                "places": len(kind.witness) // WITNESS,
                 "held": [written([(at,) for at in places]) for places in kind.held],
             }
         )
@@ -199,7 +199,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "slopes": used.slopes,
         "meets": used.meets,
         "lists": used.lists,
-        "spot": SPOT,
+        "witness": WITNESS,
         "record": RECORD,
         "room": function.room,
         "near": repr(NEAR),
@@ -297,7 +297,7 @@ def _declared(program: str, used: UsedSum, again: bool, held: bool) -> str:
     text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(plain_numbers(function)))}];\n"
     parts = {
         "sum": (used.sums, "", (n, 0, results)),
-        "spots": (used.lists, "", (n, 0, function.spots)),
+        "witnesses": (used.lists, "", (n, 0, function.witnesses)),
         "meeting": (used.meets, "const double *accelerations, ", (n, MOTION * function.bodies, MEETING)),
         "slope": (used.slopes, "const double *rates, ", (n, n, results)),
     }

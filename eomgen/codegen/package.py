@@ -102,7 +102,7 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     written = {**sources, **read_native()}
     context |= {
         "c_files": [name for name in written if name.endswith(".c")],
-        "headers": [name for name in written if name.endswith((".h", ".pxi"))],
+        "headers": [name for name in written if name.endswith(".h")],
     }
     return {
         **written,

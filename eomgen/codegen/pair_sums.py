@@ -31,7 +31,7 @@ def used_sums(program: Program) -> list[UsedSum]:
     functions = {call.function.name: call.function for call in calls}
     parts = {(call.function.name, call.part) for call in calls}
     return [
-        UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting", "spots")))
+        UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting", "witnesses")))
         for name in sorted(functions)
     ]
 
@@ -127,7 +127,7 @@ def plain_numbers(function: PairFunction) -> list[float]:
 def work_of(function: PairFunction) -> int:
     """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
     shapes = sum(len(rows) * placed_length(rows) for rows in function.tables)
-    return 2 * shapes + 2 * function.count + max(function.results, function.spots)
+    return 2 * shapes + 2 * function.count + max(function.results, function.witnesses)
 
 
 def slots_of(function: PairFunction) -> int:
@@ -162,7 +162,11 @@ class PairLists:
                 continue
             function = call.function
             self._places[i] = end
-            lengths = {"given": function.count, "meeting": MEETING + MOTION * function.bodies, "spots": function.spots}
+            lengths = {
+                "given": function.count,
+                "meeting": MEETING + MOTION * function.bodies,
+                "witnesses": function.witnesses,
+            }
             end += lengths.get(call.part, function.results)
             if call.part == "slope" and function.name not in self._rates:
                 self._rates[function.name] = end
@@ -230,8 +234,8 @@ class PairLists:
                 heads.append(f"for (int i = 0; i < {function.states}; i++) {{ w[{start + count} + i] = same(0.0); }}")
             return [*heads, *filled]
         given = self._places[operands[0]]
-        if call.part == "spots":
-            return [f"pairs_{function.name}_spots(w + {given}, w + {place}, w + {work});"]
+        if call.part == "witnesses":
+            return [f"pairs_{function.name}_witnesses(w + {given}, w + {place}, w + {work});"]
         if call.part == "sum":
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
         if call.part == "meeting":

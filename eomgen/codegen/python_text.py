@@ -95,8 +95,8 @@ def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
         return f"{name}({operands[0]})"
     if call.part == "slope":
         return f"{name}.slope_along({operands[0]}, {call.numbers}, [{', '.join(operands[1:])}])"
-    if call.part == "spots":
-        return f"{name}.spots({operands[0]})"
+    if call.part == "witnesses":
+        return f"{name}.witnesses({operands[0]})"
     if call.part == "meeting":
         return f"{name}.meeting({operands[0]}, [{', '.join(operands[1:])}])"
     return f"{operands[0]}[{call.numbers[0]}]"
@@ -108,7 +108,7 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
     for kind in function.kinds:
         names = []
         parts: list[tuple[PairPart, str]] = [("outputs", ""), ("slopes", "_slope")]
-        parts += [("touch", "_touch"), ("spot", "_spot")]
+        parts += [("touch", "_touch"), ("witness", "_witness")]
         for part, ending in parts:
             name = f"_pairs_{function.name}_{kind.name}{ending}"
             outputs = kind.expressions(part)

@@ -46,7 +46,7 @@ class SystemTerms:
         self, kinematics: Kinematics, mobility: Mobility, equations: TreeEquations, *, in_c: bool = True
     ) -> None:
         k, c, loop, mechanism = kinematics, kinematics.constraints, kinematics.loop_coordinates, kinematics.mechanism
-        #: (n_spots,) of q: the lists of pairs of shapes that are near each other
+        #: (n_witnesses,) of q: the lists of pairs of shapes that are near each other
         self.near_pairs: Row = tuple(near_pairs(k))
         states = k.state_names
         recursive = equations.accelerations or (c.labels and equations.constrained and in_c and not states)
@@ -219,7 +219,7 @@ class SystemTerms:
             # of models whose events change velocities that impulses or constraints rule
             n_strike=2 * self.n_v + self.n_c + len(self.events) + n_held // 2 if ruled else 0,
             n_states=self.n_states,
-            n_spots=len(self.near_pairs),
+            n_witnesses=len(self.near_pairs),
             n_dae=len(self.q) + self.n_v + self.n_c + len(self.constraints),
         )
 

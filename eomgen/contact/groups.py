@@ -19,7 +19,7 @@ from ..elements.frames import Frame, Marker
 from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
-from ..expr.pairs import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
+from ..expr.pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, PairLaw, meet, pair_kind
 from .point import CURVED
@@ -201,7 +201,7 @@ class ContactGroups(Force):
         if isinstance(self.normal_law, SoilPressure):
             return []  # soil yields
         _, function, operands = self._operands(view, "", still=True)
-        return pair_spots(view.graph, function, operands)
+        return pair_witnesses(view.graph, function, operands)
 
     @property
     def met_bodies(self) -> list[int]:

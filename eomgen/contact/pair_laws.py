@@ -62,7 +62,7 @@ def touching(
     markers: tuple[Marker, Marker],
     sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
     law: Contact,
-    spot: int = 0,
+    witness: int = 0,
     field: HeightField | None = None,
 ) -> Contact:
     """The contact of one feature with another at one of its places; ``law`` has the laws."""
@@ -77,7 +77,7 @@ def touching(
     if kinds[0] == "round":
         return RoundRound(*laws, (first[0], radius))
     if part_of(kinds[1]) == POLYGON:
-        return PolygonPolygon(*laws, first, sizes[1], spot)
+        return PolygonPolygon(*laws, first, sizes[1], witness)
     if kinds[1] == "ellipsoid":
         x, y, z = sizes[1]
         if field is not None:
@@ -99,7 +99,7 @@ def touching(
     if kinds[0] in (BLOCK, CORE):
         x, y, z, edge = first
         return BlockRound(*laws, (x, y, z), edge, radius)
-    if kinds[0] == "brim":
+    if kinds[0] == "rounded_edge":
         return EdgeRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
     if kinds[1] == "rod":
         return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
@@ -127,7 +127,7 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
         return sizes[-1]  # of the numbers that matter, see PolygonPolygon
     if kind == SOLE:
         return sizes[0]
-    return sizes[0] + sizes[1] if kind in ("rod", "brim", "spine") else graph.zero
+    return sizes[0] + sizes[1] if kind in ("rod", "rounded_edge", "spine") else graph.zero
 
 
 # -- laws --------------------------------------------------------------------------------------------------------------
@@ -277,9 +277,9 @@ def pair_kind(
     exerted: list[list[Expr]] = []
     held: list[Expr] = []
     rates: list[Expr] = []
-    spots: list[Expr] = []
+    witnesses: list[Expr] = []
     touch: list[Expr] = []
-    for spot in range(places_of(kinds)):
+    for witness in range(places_of(kinds)):
         states = tuple(graph.symbol(f"s{len(held) + k}") for k in range(law.slots))
         held += states
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
@@ -288,7 +288,7 @@ def pair_kind(
         if on_cell:
             contact: Contact = cell_of(bare, given[1], given[0][0], kinds[1], pair.height() if flat else None)
         else:
-            contact = touching(kinds, markers, (given[0], given[1]), bare, spot, field)
+            contact = touching(kinds, markers, (given[0], given[1]), bare, witness, field)
         if flat and not on_cell:
             contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
         if kinds[1] == "rim" and not on_cell:
@@ -311,17 +311,17 @@ def pair_kind(
             away = -NOWHERE if inside or kinds[0] in HOLLOWS else graph.apply("min", depth, 0.0)
             touch[3] = where(owned, depth, away)
             depth = where(owned, depth, -NOWHERE)
-        spots += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
+        witnesses += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
     results = [*(reduce(add, found) for found in zip(*exerted, strict=True)), *rates]
     names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
     names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
     seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
-    counts = [len(found) for found in (results, results, touch, spots)]
-    every = pair.unsettled([*results, *jvp(results, seeds), *touch, *spots])
+    counts = [len(found) for found in (results, results, touch, witnesses)]
+    every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses])
     starts = [0, *itertools.accumulate(counts)]
-    results, slopes, touch, spots = (every[a:b] for a, b in itertools.pairwise(starts))
-    nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spots])
-    ids, seen, met = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spots))
+    results, slopes, touch, witnesses = (every[a:b] for a, b in itertools.pairwise(starts))
+    nodes, renamed = _kept(graph, [*results, *slopes, *touch, *witnesses])
+    ids, seen, met = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, witnesses))
     return PairKind(
         f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
         *tables,

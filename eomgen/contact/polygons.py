@@ -1,17 +1,17 @@
-"""Force elements, contact of two convex polygons in the plane: the two edges that face each other -> up to two spots.
+"""Force elements, contact of two convex polygons in the plane: edges that face each other -> up to two contact points.
 
 The edges are chosen as for manifolds of contact (Gregorius, Contact manifolds, Game Developers Conference 2015): the
 edge along whose normal the polygons overlap least (the separating axis theorem), and of the other polygon the edge that
-faces it most.  Spots lie at both ends of the part in which the edges lie beside each other; each is a corner of one
-polygon against the line of the other's edge.  Places are compared along the mean of both directions, so that both
-depths are equal where one corner takes the place of another, and it does not matter which polygon is the first.
+faces it most.  Contact points lie at both ends of the part in which the edges lie beside each other; each is a corner
+of one polygon against the line of the other's edge.  Places are compared along the mean of both directions, so that
+both depths are equal where one corner takes the place of another, and it does not matter which polygon is the first.
 
 The energy is E(D) + y E(min(d, O - D)): D is the least overlap along a normal (the separating axis theorem), which is
-the depth of the deeper spot, d the depth of the other, and O the least overlap along the normals of all other edges.
+the depth of the deeper point, d the depth of the other, and O the least overlap along the normals of all other edges.
 The part y is 1 where the edges are nearly parallel and goes to 0 where a neighbour faces the other edge as much.  So
-the second spot counts nothing where other edges take over, be it because the overlap along them is as little (O = D)
+the second point counts nothing where other edges take over, be it because the overlap along them is as little (O = D)
 or because they face each other as much (y = 0), and the energy is continuous.  Forces are its slopes: where O - D is
-the lesser, the second spot lies at the edge of O and the deeper spot pushes so much less; y gives a couple.
+the lesser, the second point lies at the edge of O and the deeper point pushes so much less; y gives a couple.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class _Edge(NamedTuple):
     bend: Expr
 
 
-class _Spot(NamedTuple):
+class _Witness(NamedTuple):
     """A corner against the line of an edge: the corner, the normal from the first polygon to the second, the depth."""
 
     place: Point
@@ -64,9 +64,9 @@ def _either(condition: Expr, yes: Point, no: Point) -> Point:
     return where(condition, yes[0], no[0]), where(condition, yes[1], no[1])
 
 
-def _spot_of(condition: Expr, a: _Spot, b: _Spot) -> _Spot:
+def _witness_of(condition: Expr, a: _Witness, b: _Witness) -> _Witness:
     place, normal = _either(condition, a.place, b.place), _either(condition, a.normal, b.normal)
-    return _Spot(place, normal, where(condition, a.own, b.own), where(condition, a.depth, b.depth))
+    return _Witness(place, normal, where(condition, a.own, b.own), where(condition, a.depth, b.depth))
 
 
 class _Matter(NamedTuple):
@@ -88,34 +88,35 @@ def _matter(sizes: Sequence[Expr]) -> _Matter:
 
 
 class _Facing(NamedTuple):
-    """Two edges that face each other; how far the polygons overlap, at which spot, and the edge of the next overlap."""
+    """Two edges that face each other; how far the polygons overlap, where, and the edge of the next overlap."""
 
     first: _Edge
     second: _Edge
-    least: _Spot
-    next: _Spot
+    least: _Witness
+    next: _Witness
 
 
 class _Parts(NamedTuple):
-    """One of two spots as it counts."""
+    """One of two contact points as it counts."""
 
-    spot: _Spot
+    witness: _Witness
     share: Expr  #: the part of its law
     change: Expr  #: slope of that part by the cosine of the angle of both edges
-    relief: Expr  #: the depth that this spot carries less
+    relief: Expr  #: the depth that this point carries less
     relieved: Expr  #: the part of the law of that depth
 
 
 @dataclass(frozen=True)
 class PolygonPolygon(Contact):
-    """A convex polygon about the second marker on one about the first, in whose x-y plane both lie: one of two spots.
+    """A convex polygon about the second marker on one about the first, in its x-y plane: one of two contact points.
 
-    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.base.numeric.polygon_edges`); ``spot`` is 0 or 1.
+    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.base.numeric.polygon_edges`);
+    ``witness`` is 0 or 1.
     """
 
     edges: tuple[Expr, ...]
     others: tuple[Expr, ...]
-    spot: int
+    witness: int
 
     def touch(self, view: View) -> Touch:
         graph, R = view.graph, view.rotation(self.first)
@@ -139,7 +140,7 @@ class PolygonPolygon(Contact):
 
     def couple(self, view: View) -> Vec3 | None:
         graph, parts = view.graph, self._parts(view)
-        energy = self.normal_law.energy(parts.spot.depth)
+        energy = self.normal_law.energy(parts.witness.depth)
         if energy.is_zero:
             return None
         a, b = self._facing(view)[:2]
@@ -154,29 +155,29 @@ class PolygonPolygon(Contact):
         way = (normal_b[1] - normal_a[1], normal_a[0] - normal_b[0])  # the first edge goes along it, the second back
         low = graph.apply("lt", dot(way, b.end), dot(way, a.start))
         high = graph.apply("lt", dot(way, a.end), dot(way, b.start))
-        spots = []
+        witnesses = []
         for own, one, two in ((low, a.start, b.end), (high, a.end, b.start)):
             place = _either(own, one, two)
             normal = _either(own, times(normal_b, -graph.one), normal_a)
             depth = where(own, dot(normal_b, minus(b.start, place)), dot(normal_a, minus(a.start, place)))
-            spots.append(_Spot(place, normal, own, depth))
-        beside = graph.apply("lt", dot(way, spots[0].place), dot(way, spots[1].place))
-        deeper = graph.apply("lt", spots[0].depth, spots[1].depth)  # whether the second is
-        main = deeper if self.spot else 1.0 - deeper
+            witnesses.append(_Witness(place, normal, own, depth))
+        beside = graph.apply("lt", dot(way, witnesses[0].place), dot(way, witnesses[1].place))
+        deeper = graph.apply("lt", witnesses[0].depth, witnesses[1].depth)  # whether the second is
+        main = deeper if self.witness else 1.0 - deeper
         share, slope = self._share(a, b)
         meets, faces = graph.apply("lt", 0.0, least.depth), graph.apply("lt", 0.0, share)
-        # the deeper spot: that of the least overlap, which it is as long as the edges face each other
-        deep = _spot_of(faces, spots[self.spot], least)
+        # the deeper point: that of the least overlap, which it is as long as the edges face each other
+        deep = _witness_of(faces, witnesses[self.witness], least)
         # the other: up to the next overlap
-        room, mine = other.depth - least.depth, spots[self.spot]
-        short = [graph.apply("lt", room, spot.depth) for spot in spots]
-        limited = _spot_of(short[self.spot], other._replace(depth=room), mine)
+        room, mine = other.depth - least.depth, witnesses[self.witness]
+        short = [graph.apply("lt", room, witness.depth) for witness in witnesses]
+        limited = _witness_of(short[self.witness], other._replace(depth=room), mine)
         limited = limited._replace(depth=where(faces, limited.depth, -NOWHERE))
-        engaged = _spot_of(main, deep, limited)
+        engaged = _witness_of(main, deep, limited)
         apart = mine._replace(depth=where(beside, mine.depth, -NOWHERE))
-        relieved = where(meets, where(short[1 - self.spot], where(main, share, 0.0), 0.0), 0.0)
+        relieved = where(meets, where(short[1 - self.witness], where(main, share, 0.0), 0.0), 0.0)
         return _Parts(
-            _spot_of(meets, engaged, apart),
+            _witness_of(meets, engaged, apart),
             where(meets, where(main, 1.0, share), 1.0),
             where(meets, where(main, 0.0, slope), 0.0),
             room,
@@ -184,7 +185,7 @@ class PolygonPolygon(Contact):
         )
 
     def _share(self, a: _Edge, b: _Edge) -> tuple[Expr, Expr]:
-        """The part of the second spot, 1 near parallel edges, and its slope by the cosine of the angle of the edges."""
+        """The part of the second point, 1 near parallel edges, and its slope by the cosine of the edges' angle."""
         graph = a.bend.graph
         apart = _plus(a.normal, b.normal)  # its square is 4 sin^2(angle / 2)
         cosine = sqrt(0.5 + 0.5 * graph.apply("max", a.bend, b.bend))  # of half the angle to a neighbour
@@ -214,15 +215,17 @@ class PolygonPolygon(Contact):
         )
         flags = self.edges[FACING + 8 : OWN]
 
-        def spot(told: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]) -> _Spot:
+        def witness(
+            told: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]
+        ) -> _Witness:
             """Of the edge of the first polygon or the second, by start and normal, the deepest corner of the other."""
             of_second = graph.apply("lt", 0.5, told)
             place = _either(of_second, *corners)
             normal = _either(of_second, times(unit(two[1]), -graph.one), one[1])
             depths = dot(two[1], minus(two[0], corners[0])), dot(one[1], minus(one[0], corners[1]))
-            return _Spot(place, normal, of_second, where(of_second, *depths))
+            return _Witness(place, normal, of_second, where(of_second, *depths))
 
-        least = spot(flags[0], (a.start, a.normal), (b.start, b.normal), (own.corner, placed(other.corner)))
+        least = witness(flags[0], (a.start, a.normal), (b.start, b.normal), (own.corner, placed(other.corner)))
         next_b = placed(other.next_start), turned(other.next_normal)
         corners = own.next_corner, placed(other.next_corner)
-        return _Facing(a, b, least, spot(flags[1], (own.next_start, own.next_normal), next_b, corners))
+        return _Facing(a, b, least, witness(flags[1], (own.next_start, own.next_normal), next_b, corners))

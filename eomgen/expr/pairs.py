@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import Any, Literal
 
 from ..base.numeric.outline_pieces import nearest
-from ..base.numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
+from ..base.numeric.pair_sums import MEETING, MOTION, POSE, RECORD, WITNESS, PairSum, pairs_of_rows
 from ..base.numeric.polygon_edges import facing
 from ..base.records import dataclass
 from ..errors import cannot
@@ -18,7 +18,7 @@ from .functions import Function
 # -- pair kinds --------------------------------------------------------------------------------------------------------
 
 
-PairPart = Literal["outputs", "slopes", "touch", "spot"]
+PairPart = Literal["outputs", "slopes", "touch", "witness"]
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class PairKind:
     touch : tuple of int
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
-    spot : tuple of int
-        Where they touch: :data:`~eomgen.base.numeric.pair_sums.SPOT` nodes for each place.
+    witness : tuple of int
+        Where they touch: :data:`~eomgen.base.numeric.pair_sums.WITNESS` nodes for each place.
     held : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
@@ -75,7 +75,7 @@ class PairKind:
     outputs: tuple[int, ...]
     slopes: tuple[int, ...]
     touch: tuple[int, ...]
-    spot: tuple[int, ...]
+    witness: tuple[int, ...]
     held: tuple[tuple[int, ...], ...] = ()
     states: int = 0
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
@@ -117,7 +117,7 @@ class PairKind:
 # with the number of pairs. ``pairs <name>(given)`` holds the operands, ``pairs <name>(sum)`` and ``pairs
 # <name>(slope)`` are lists of results and of their directional derivatives, ``pairs <name>(k)`` is one entry of such a
 # list. ``pairs <name>(meeting)`` is a list of when shapes that are apart may meet, and of the deepest two, ``pairs
-# <name>(spots)`` one of the pairs that are near.
+# <name>(witnesses)`` one of the pairs that are near.
 
 
 #: Pairs that a list of near ones has room for: so many, and so many for each part of a shape, in the plane (heaps of
@@ -189,14 +189,14 @@ class PairFunction:
     def room(self) -> int:
         """How many pairs a list of near ones has room for: all, or some for each shape."""
         pairs = sum(
-            len(self.tables[kind.first]) * len(self.tables[kind.second]) * (len(kind.spot) // SPOT)
+            len(self.tables[kind.first]) * len(self.tables[kind.second]) * (len(kind.witness) // WITNESS)
             for kind in self.kinds
         )
         each = IN_PLANE if any(kind.planar for kind in self.kinds) else IN_SPACE
         return min(pairs, SPARE + each * sum(map(len, self.tables)))
 
     @property
-    def spots(self) -> int:
+    def witnesses(self) -> int:
         """How many numbers such a list has."""
         return 1 + RECORD * self.room
 
@@ -217,7 +217,7 @@ class PairFunction:
         kinds = [
             (
                 *(k.first, k.second, k.extent, k.law),
-                *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "spot")),
+                *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "witness")),
                 *k.beside,
             )
             for k in self.kinds
@@ -252,7 +252,7 @@ class PairCall:
     Attributes
     ----------
     function : PairFunction
-    part : {'given', 'sum', 'slope', 'meeting', 'spots', 'item'}
+    part : {'given', 'sum', 'slope', 'meeting', 'witnesses', 'item'}
     numbers : tuple of int
         Of a slope the operands that have rates; of an item its place.
     """
@@ -287,7 +287,7 @@ class PairCall:
             return loops.meeting(flat[0], flat[1:])
 
         made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
-        made["spots"] = loops.spots
+        made["witnesses"] = loops.witnesses
         return made[self.part] if self.part in made else itemgetter(self.numbers[0])
 
 
@@ -354,11 +354,11 @@ def pair_meeting(
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
 
 
-def pair_spots(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
-    """Pairs that are near: see :meth:`~eomgen.base.numeric.pair_sums.PairSum.spots`."""
+def pair_witnesses(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
+    """Pairs that are near: see :meth:`~eomgen.base.numeric.pair_sums.PairSum.witnesses`."""
     given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
-    listed = _node(graph, PairCall(function, "spots"), f"pairs {function.name}(spots)", [given])
-    return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.spots)]
+    listed = _node(graph, PairCall(function, "witnesses"), f"pairs {function.name}(witnesses)", [given])
+    return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.witnesses)]
 
 
 def without_pairs(outputs: Sequence[Expr], listed: Sequence[Expr]) -> list[Expr]:
@@ -397,7 +397,7 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         return _item(graph, function, slope, call.numbers[0]) if _acts(function, moving, call.numbers[0]) else None
     if call.part == "given":
         return None
-    if call.part in ("meeting", "spots"):
+    if call.part in ("meeting", "witnesses"):
         raise cannot(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
     if call.part == "slope":
         raise cannot(

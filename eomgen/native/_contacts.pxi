@@ -41,7 +41,7 @@ cdef extern from "eomgen_contacts.h" nogil:
         EOMGEN_MORE_ROOM
         EOMGEN_NO_INPUT
     ctypedef struct eomgen_rigid:
-        int n_q, n_v, n_u, n_rows, n_c, n_h, n_plain, n_balls, n_lists, n_shapes, n_spots, m, most, begins, wide, room, needed
+        int n_q, n_v, n_u, n_rows, n_c, n_h, n_plain, n_balls, n_lists, n_shapes, n_witnesses, m, most, begins, wide, room, needed
         int known, missed, iterations, contacts, status, list
         const_ints rows, plain, balls, lists
         const signed char *moved
@@ -106,7 +106,7 @@ cdef class RigidStepper:
     n_work : int
         Numbers that these work on.
     facts : dict of str to int
-        n_rows, n_c, n_h, n_spots.
+        n_rows, n_c, n_h, n_witnesses.
     tables : dict of str to sequences of int
         rows, plain, balls, lists, moved.
     tolerance, most : float, int
@@ -134,7 +134,7 @@ cdef class RigidStepper:
         cdef cnp.npy_intp length
         self.held, self.forcing, self.raised = [context, kept, sources], forcing, None
         s.n_q, s.n_v, s.n_u = model.n_q, model.n_v, model.table.n_u
-        s.n_rows, s.n_c, s.n_h, s.n_spots = facts["n_rows"], facts["n_c"], facts["n_h"], facts["n_spots"]
+        s.n_rows, s.n_c, s.n_h, s.n_witnesses = facts["n_rows"], facts["n_c"], facts["n_h"], facts["n_witnesses"]
         s.n_plain, s.n_balls = kept["plain"].size // 2, kept["balls"].size // 2
         s.n_lists, s.n_shapes = kept["lists"].size // 2, len(kept["moved"])
         s.rows, s.plain = <const int *>pointer(kept["rows"]), <const int *>pointer(kept["plain"])

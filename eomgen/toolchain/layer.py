@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cache
 
@@ -14,7 +15,6 @@ STEPPERS = (
     *("control", "plain", "rk4", "products", "lu", "lu_large", "newton", "radau"),
     *("taylor_terms", "taylor", "events", "loop"),
 )
-CYTHON = ("arguments", "model", "kernel", "runs", "integrators", "ensembles", "contacts")
 
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
 SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_straight.h")
@@ -25,7 +25,6 @@ SOLVERS = ("linear_algebra", "projection", "embedding", "systems", "singular", "
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_native.pyx": ("_native.pyx",),
-    **{f"_{name}.pxi": (f"_{name}.pxi",) for name in CYTHON},
     "eomgen_steppers.h": ("steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("steppers/eomgen_loop.h",),
     "eomgen_methods.h": ("steppers/dop853.c", "steppers/rk45.c"),
@@ -53,6 +52,7 @@ HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h", *SOLVER_HEADERS)
 def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
     texts = {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+    texts["_native.pyx"] = re.sub(r'include "(\w+\.pxi)"\n', lambda part: _read(part[1]), texts["_native.pyx"])
     texts["eomgen_steppers.c"] = tape_rows() + texts["eomgen_steppers.c"]
     for width in (2, 4, 8):
         texts[f"eomgen_runs{width}.c"] = f"#define LANES {width}\n" + texts[f"eomgen_runs{width}.c"]

@@ -80,7 +80,7 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
         q[3:5] = q[:2] + rng.uniform(0.1, 0.25) * np.array([np.cos(way), np.sin(way)])
         q[5] = rng.uniform(-3, 3)
         x = np.concatenate([q, np.zeros(6)])
-        wanted = sum(part * 2e4 * max(d, 0.0) ** 2.5 / 2.5 for d, part in scenes.spots(*kinds, q[:3], q[3:]))
+        wanted = sum(part * 2e4 * max(d, 0.0) ** 2.5 / 2.5 for d, part in scenes.witnesses(*kinds, q[:3], q[3:]))
         assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-9, abs=1e-15)
         force = -mod.bias(0.0, x)
         if wanted < 1e-3:
@@ -369,11 +369,11 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
     k, n = 1e7, 1.5
     mod, compiled = (touching(name, {"stiffness": k, "exponent": n}, False, target) for target in ("numpy", "cython"))
     first, second = (np.array(points) for points in PAIRS[name])
-    second_spots = kinks = 0
+    second_witnesses = kinks = 0
     for q, depth in poses(name, np.random.default_rng(12), 60):
         x = np.concatenate([q, np.zeros(6)])
         found = scenes.facing(first, scenes.placed(q[3:], second))
-        second_spots += found[1][0] > 0.0 and found[1][1] > 0.0
+        second_witnesses += found[1][0] > 0.0 and found[1][1] > 0.0
         wanted = sum(part * k * max(d, 0.0) ** (n + 1) / (n + 1) for d, part in found)
         assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
         assert compiled.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
@@ -390,5 +390,5 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
             kinks += 1
             continue
         assert np.all(np.abs(force - slopes) < 1e-4 * scale), (q, depth)
-    assert second_spots >= 4
+    assert second_witnesses >= 4
     assert kinks < 10

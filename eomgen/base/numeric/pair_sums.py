@@ -68,9 +68,9 @@ MOTION = 6
 MEETING = 5
 #: Numbers that say where two shapes are near each other: normal, penetration, point, direction out of the plane of
 #: shapes in the plane (0 in space), coefficient of friction, restitution.
-SPOT = 12
+WITNESS = 12
 #: The same in a list, behind the numbers of both shapes.
-RECORD = 2 + SPOT
+RECORD = 2 + WITNESS
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 COLUMNS = 2  #: distances count beside columns
 NEVER = 1e300  #: (s) where no shapes come towards each other
@@ -86,15 +86,15 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch, spot), and of pairs with states (states, held)
+    kinds : sequence of (first, second, planar, law, value, slope, touch, witness), with states (states, held) too
         Tables of the first and the second shape; in which directions distances count (0 all, 1 across z of the first, 2
         beside columns that reach down along y of the first without end); places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
         the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
-        turning radius of the pair; the ``SPOT`` numbers of :meth:`spots`; how many states a pair has, and the numbers
-        of the rows of both tables whose sum is the place of its states.
+        turning radius of the pair; the ``WITNESS`` numbers of :meth:`witnesses`; how many states a pair has, and the
+        numbers of the rows of both tables whose sum is the place of its states.
     room : int
-        How many pairs :meth:`spots` has room for.
+        How many pairs :meth:`witnesses` has room for.
     states : int, optional
         How many states all pairs have; they are the last of the data, and their rates the last of the results.
     """
@@ -208,7 +208,7 @@ class PairSum:
         found = [least, *deepest]
         return [x if np.ndim(x) else float(x) for x in found]
 
-    def spots(self, given: Sequence[Any]) -> list[Any]:
+    def witnesses(self, given: Sequence[Any]) -> list[Any]:
         """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
 
         Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where
@@ -218,18 +218,18 @@ class PairSum:
         out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
         for column in np.ndindex(data.shape[1:]):
             place = (slice(None), *column)
-            rows = self._spots(data[place])
+            rows = self._witnesses(data[place])
             out[(0, *column)] = len(rows)
             kept = rows[: self.room].ravel()
             out[(slice(1, 1 + kept.size), *column)] = kept
         return list(out.tolist()) if out.ndim == 1 else list(out)
 
-    def _spots(self, data: np.ndarray) -> np.ndarray:
+    def _witnesses(self, data: np.ndarray) -> np.ndarray:
         """Records of one state."""
         placed = [self._place(table, data, None)[0] for table in self.tables]
         starts = np.cumsum([0, *map(len, self.tables)])
         found = [np.zeros((0, RECORD))]
-        for first, second, planar, law, _, _, _, spot, i, j in self.kinds:
+        for first, second, planar, law, _, _, _, witness, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             thick = data[tables[0][:, -1]], data[tables[1][:, -1]]
             if not len(i):
@@ -242,8 +242,8 @@ class PairSum:
             if not len(i):
                 continue
             numbers = [*a[i].T, *b[j].T, *data[list(law)][:, None]]
-            values = _table(spot(numbers), len(i), data)
-            places = [values[k : k + SPOT] for k in range(0, len(values), SPOT)]
+            values = _table(witness(numbers), len(i), data)
+            places = [values[k : k + WITNESS] for k in range(0, len(values), WITNESS)]
             rows = np.stack([np.concatenate([[starts[first] + i, starts[second] + j], one]).T for one in places], 1)
             found.append(rows[np.stack([one[3] for one in places], 1) > -margin[:, None]])
         return np.concatenate(found)

@@ -183,9 +183,9 @@ static void find_ways(const double *record, double ways[9])
 
 /* Gather the lists into records whose shapes are numbered over all, in place; how many there are, or
    -EOMGEN_TOO_MANY, -EOMGEN_NO_LAW. */
-static int gather(eomgen_rigid *s, double *spots)
+static int gather(eomgen_rigid *s, double *witnesses)
 {
-    const double *from = spots;
+    const double *from = witnesses;
     int count = 0, shapes = 0;
     for (int l = 0; l < s->n_lists; l++) {
         const int numbers = s->lists[2*l], listed = (int)from[0];
@@ -195,7 +195,7 @@ static int gather(eomgen_rigid *s, double *spots)
             return -EOMGEN_TOO_MANY;
         }
         for (int k = 0; k < listed; k++, count++) {
-            double *const record = spots + RECORD_OF*count;
+            double *const record = witnesses + RECORD_OF*count;
             memmove(record, from + 1 + RECORD_OF*k, RECORD_OF*sizeof(double));
             record[0] += shapes, record[1] += shapes;
             if (!(record[12] >= 0.0) || !(record[13] >= 0.0 && record[13] <= 1.0)) {

@@ -60,7 +60,7 @@ enum { EOMGEN_STEPPED, EOMGEN_TOO_LONG, EOMGEN_FAILED, EOMGEN_MORE_ROOM, EOMGEN_
 
 typedef struct {
     int n_q, n_v, n_u, n_rows, n_c, n_h; /* all constraint rows, those that are independent, and holonomic among these */
-    int n_plain, n_balls, n_lists, n_shapes, n_spots, d, m;
+    int n_plain, n_balls, n_lists, n_shapes, n_witnesses, d, m;
     const int *rows, *plain, *balls;     /* independent rows; first places in q and v of coordinates, and of quaternions */
     const int *lists;                    /* numbers and shapes of each list of contacts */
     const signed char *moved;            /* n_shapes x n_v: whether a velocity moves a shape */

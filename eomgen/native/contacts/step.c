@@ -90,14 +90,14 @@ static void fall(const inertia *at, const double *C, const int *rows, const doub
 }
 
 /* Contacts near the middle that may act: their rows, what they see and their compliance. */
-static int find_contacts(eomgen_rigid *s, double t, const inertia *held, double h, const double *free, double *spots,
+static int find_contacts(eomgen_rigid *s, double t, const inertia *held, double h, const double *free, double *witnesses,
                          double *axes, meeting *at, int *keys, eomgen_rigid *told)
 {
     const int n_v = s->n_v;
     double fastest;
-    int failed = call(s, &s->near, t, s->x_m, spots), count, kept = 0;
+    int failed = call(s, &s->near, t, s->x_m, witnesses), count, kept = 0;
     at->m = at->n = 0;
-    count = failed ? -failed : gather(s, spots);
+    count = failed ? -failed : gather(s, witnesses);
     if (count < 0) {
         return -count;
     }
@@ -110,25 +110,25 @@ static int find_contacts(eomgen_rigid *s, double t, const inertia *held, double 
     }
     s->d = 2;
     for (int c = 0; c < count; c++) {
-        s->d = is_planar(spots + RECORD_OF*c) ? s->d : 3;
-        told->depth = fmax(told->depth, spots[RECORD_OF*c + 5]);
+        s->d = is_planar(witnesses + RECORD_OF*c) ? s->d : 3;
+        told->depth = fmax(told->depth, witnesses[RECORD_OF*c + 5]);
     }
     if (call(s, &s->axes, t, s->x_m, axes)) {
         return EOMGEN_FAILED;
     }
-    find_columns(s, count, spots, axes, at->J);
+    find_columns(s, count, witnesses, axes, at->J);
     across(n_v, count*s->d, at->J, s->x + s->n_q, at->before);
     across(n_v, count*s->d, at->J, free, at->undisturbed);
     fastest = fmax(largest_of(count*s->d, at->before, 1), largest_of(count*s->d, at->undisturbed, 1));
     for (int c = 0; c < count; c++) {
-        if (-spots[RECORD_OF*c + 5] <= 2.0*h*fastest) {
-            memmove(spots + RECORD_OF*kept, spots + RECORD_OF*c, RECORD_OF*sizeof(double));
-            at->friction[kept] = spots[RECORD_OF*kept + 12];
+        if (-witnesses[RECORD_OF*c + 5] <= 2.0*h*fastest) {
+            memmove(witnesses + RECORD_OF*kept, witnesses + RECORD_OF*c, RECORD_OF*sizeof(double));
+            at->friction[kept] = witnesses[RECORD_OF*kept + 12];
             at->numbers[kept++] = c;
         }
     }
     choose_columns(n_v, s->d, count, at->numbers, kept, at->J);
-    at->m = kept, at->n = kept*s->d, at->records = spots;
+    at->m = kept, at->n = kept*s->d, at->records = witnesses;
     if (kept) {
         across(n_v, at->n, at->J, s->x + s->n_q, at->before);
         memcpy(at->X, at->J, (size_t)n_v*(size_t)at->n*sizeof(double));
@@ -240,13 +240,13 @@ static long sum_of(const long *sizes, int count)
 }
 
 /* Places of all that a step needs, whatever its contacts. */
-enum { OF_L, OF_Q, OF_R, OF_C, OF_SIZES, OF_DRIFT, OF_BIAS, OF_AGAIN, OF_FREE, OF_NEW, OF_AWAY, OF_WORK, OF_SPOTS, OF_AXES, OF_AIM,
+enum { OF_L, OF_Q, OF_R, OF_C, OF_SIZES, OF_DRIFT, OF_BIAS, OF_AGAIN, OF_FREE, OF_NEW, OF_AWAY, OF_WORK, OF_WITNESSES, OF_AXES, OF_AIM,
        OF_SEEN, OF_INPUTS, FIXED };
 
 static void fixed_sizes(const eomgen_rigid *s, long sizes[FIXED])
 {
     const long n = s->n_v, n_c = s->n_c, wide = n + s->n_rows;
-    const long found[FIXED] = {n*n, n_c*n, n_c*n_c, s->n_rows*n, wide, n_c, n, n, n, n, n, 2*wide, s->n_spots, 6*n, n_c, n_c,
+    const long found[FIXED] = {n*n, n_c*n, n_c*n_c, s->n_rows*n, wide, n_c, n, n, n, n, n, 2*wide, s->n_witnesses, 6*n, n_c, n_c,
                                 s->n_u};
     memcpy(sizes, found, sizeof found);
 }
@@ -317,7 +317,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     }
     memcpy(part[OF_INPUTS], s->u, (size_t)s->n_u*sizeof(double));
     fall(&held, part[OF_C], s->rows, part[OF_AIM], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
-    failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
+    failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_WITNESSES], part[OF_AXES], &at, keys, &told);
     for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_FREE][i]); }
     failed = failed ? failed : call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
     /* forces that do not change with velocities need one solution, which then is the one that counts */

@@ -340,7 +340,7 @@ class RigidSteps:
             "n_rows": layout.n_c,
             "n_c": len(layout.rows),
             "n_h": int(np.count_nonzero(layout.rows < layout.n_h)),
-            "n_spots": sum(numbers for _, numbers, _ in self.lists),
+            "n_witnesses": sum(numbers for _, numbers, _ in self.lists),
         }
         sources, n_work = self._sources()
         signals, outside = ([], forcing) if forcing.foreign else (forcing.encode(), None)
