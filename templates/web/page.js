@@ -671,9 +671,10 @@ class Page {
       return;
     }
     const { end } = model.info, stops = now < end && next >= end; // the declared run; play goes on
+    const span = stops ? end - now : passed;
     const begun = performance.now(), count = Math.ceil(passed * 60 / get("speed").value);
     for (let k = 1; k <= count; k += 1) { // no coarser than the eye sees, however slowly pages are drawn
-      const wanted = stops && k === count ? end : now + (passed * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
+      const wanted = stops && k === count ? end : now + (span * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
       if (model.ended && t <= this.frames.at(-1).t) {
         this.play(false);
         this.say(model.ended);
