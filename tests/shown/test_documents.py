@@ -316,6 +316,7 @@ def test_a_stored_notebook_is_a_lesson_that_can_be_handed_out(path: Path) -> Non
     assert [cell.execution_count for cell in code(notebook)] == list(range(1, len(code(notebook)) + 1))
     first, last = notebook.cells[0], notebook.cells[-1]
     assert first.cell_type == last.cell_type == "markdown"
+    assert len(notebook.cells) < 12
     assert last.source.startswith("## Exercise")
     checked, images = 0, 0
     for cell in code(notebook):
