@@ -19,10 +19,13 @@ from .runtime.bound_model import BoundModel
 if TYPE_CHECKING:
     from .analysis.base_parameters import base_parameters as _base_parameters
     from .analysis.consistent import consistent as _consistent
-    from .analysis.coordinate_range import motion_range as _motion_range
     from .analysis.drive import actuator_forces as _actuator_forces
     from .analysis.equilibrium import equilibrium as _equilibrium
     from .analysis.fit import fit as _fit
+    from .analysis.impact import impact as _impact
+    from .analysis.impact import simulate_impacts as _simulate_impacts
+    from .analysis.kinematic import kinematic_analysis as _kinematic_analysis
+    from .analysis.kinematic import motion_range as _motion_range
     from .analysis.linear import linearize as _linearize
     from .analysis.modes import modes as _modes
     from .analysis.reactions import driving_forces as _driving_forces
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
     from .analysis.regressor import inertial_remainder as _inertial_remainder
     from .analysis.regressor import regressor as _regressor
     from .analysis.regressor import standard_parameters as _standard_parameters
-    from .codegen.targets.web import page as _page
+    from .analysis.sensitivities import sensitivities as _sensitivities
     from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
     from .runtime.drawing import draw as _draw
@@ -41,11 +44,7 @@ if TYPE_CHECKING:
     from .runtime.minimal import Minimal
     from .runtime.runs.compiled import step as _step
     from .runtime.runs.dae_solution import Dae
-    from .runtime.runs.impact import impact as _impact
-    from .runtime.runs.impact_run import simulate_impacts as _simulate_impacts
     from .runtime.runs.integrator import integrator as _integrator
-    from .runtime.runs.kinematic import kinematic_analysis as _kinematic_analysis
-    from .runtime.runs.sensitivities import sensitivities as _sensitivities
     from .runtime.runs.simulate import simulate as _simulate
     from .verify.verify import verify as _verify
 
@@ -60,7 +59,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "linearize": "analysis.linear",
     "modes": "analysis.modes",
     "equilibrium": "analysis.equilibrium",
-    "sensitivities": "runtime.runs.sensitivities",
+    "sensitivities": "analysis.sensitivities",
     "fit": "analysis.fit",
     "standard_parameters": "analysis.regressor",
     "regressor": "analysis.regressor",
@@ -71,11 +70,11 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "undetermined_reactions": "analysis.reactions",
     "driving_forces": "analysis.reactions",
     "actuator_forces": "analysis.drive",
-    "impact": "runtime.runs.impact",
-    "simulate_impacts": "runtime.runs.impact_run",
+    "impact": "analysis.impact",
+    "simulate_impacts": "analysis.impact",
     "consistent": "analysis.consistent",
-    "kinematic_analysis": "runtime.runs.kinematic",
-    "motion_range": "analysis.coordinate_range",
+    "kinematic_analysis": "analysis.kinematic",
+    "motion_range": "analysis.kinematic",
     "report": "runtime.drawing",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",

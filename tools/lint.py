@@ -199,7 +199,7 @@ def keywords() -> Iterator[str]:
     for known, those in {
         "BuildOptions": arguments("toolchain.compiler", "Options"),
         "StepOptions": bound | set(import_module("eomgen.runtime.ensembles.simulate_many").OPTIONS),
-        "ReducedOptions": bound | set(import_module("eomgen.runtime.runs.sensitivities").OPTIONS),
+        "ReducedOptions": bound | set(import_module("eomgen.analysis.sensitivities").OPTIONS),
         "RobotKeywords": arguments("importers", "RobotOptions", "check_inertia"),
         "LoadOptions": arguments("api.loading", "load", "path", "robot") | robot,
         "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 # of Gauss's formula of order 8 (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993,
 # section II.7), all Jacobians come from one call and all steps from one set of linear systems. The same formula applied
 # to the run itself tells whether the steps are short enough; where they are not, and for loops, events and laws of
-# inputs that depend on the state, :mod:`..runtime.runs.sensitivities` integrates the derivatives beside the motion.
+# inputs that depend on the state, :mod:`.sensitivities` integrates the derivatives beside the motion.
 
 
 #: Nodes and weights of Gauss's formula with four nodes on [0, 1], its matrix by the conditions C(4):
@@ -357,7 +357,7 @@ class Fit(Result):
 # -- the fit -----------------------------------------------------------------------------------------------------------
 
 # Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of :mod:`.fit`,
-# or of :mod:`..runtime.runs.sensitivities` for loops, events and inputs that depend on the state. Covariance of the
+# or of :mod:`.sensitivities` for loops, events and inputs that depend on the state. Covariance of the
 # estimates: (J^T J)^-1 of the weighted residuals (Y. Bard, Nonlinear Parameter Estimation, 1974, section 7.5).
 
 
@@ -551,7 +551,7 @@ class _Problem:
 
     def jacobian(self, values: Array) -> Array:
         """Derivatives of the residuals by the values."""
-        from ..runtime.runs.sensitivities import sensitivities
+        from .sensitivities import sensitivities
 
         parts = []
         for one in self.experiments:

@@ -244,7 +244,7 @@ def impact(
     as_json: bool,
 ) -> None:
     """Find the state after an impact at the initial state, without friction unless it is given."""
-    from ..runtime.runs.impact import check_friction, check_gaps
+    from ..analysis.impact import check_friction, check_gaps
 
     if not gap and not stop:
         raise incomplete("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")

@@ -39,10 +39,10 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
 #: Calls of every package, and those of one with analyses.
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", *DERIVATIVES, "sensitivities",
-           "kinematic_analysis", "multipliers", "impact", "simulate_impacts")  # fmt: skip
-ANALYSES = ("motion_range", "linearize", "modes", "equilibrium", "reactions", "undetermined_reactions",
-            "driving_forces", "actuator_forces", "consistent")  # fmt: skip
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", *DERIVATIVES, "multipliers")
+ANALYSES = ("sensitivities", "kinematic_analysis", "motion_range", "impact", "simulate_impacts", "linearize", "modes",
+            "equilibrium", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces",
+            "consistent")  # fmt: skip
 #: What packages in Python carry of eomgen, unchanged: whatever runs need, and the analyses if asked for.
 CARRIED = ("errors.py", "module.py", "base", "runtime")
 CARRIED_ANALYSES = ("analysis",)

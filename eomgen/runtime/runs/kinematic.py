@@ -8,17 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.algebra import Array
-from ...base.limits.analyses import ALIGNED, SINGULAR, SLACK
-from ...base.limits.constraints import CONTRADICTION, EXACT, UNMOVED
+from ...base.limits.analyses import SINGULAR, SLACK
+from ...base.limits.constraints import CONTRADICTION, UNMOVED
 from ...base.numeric.assembly import close
 from ...base.numeric.projection import largest
-from ...base.texts import shown
 from ...errors import (
     TO_BE_FINITE,
     AssemblyError,
@@ -28,15 +27,11 @@ from ...errors import (
     ill_chosen,
     ill_placed,
     ill_shaped,
-    incomplete,
-    no_number,
     no_such,
-    too_large,
 )
-from ..argument_checks import read_flag, read_number, read_numbers, require_room, unknown
+from ..argument_checks import read_number, read_numbers
 from ..columns import Columns, Residuals, describe
 from ..inputs import Forcing
-from ..refusals import require_support
 from ..trajectory import Span, Start, Trajectory, last_state
 from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
@@ -207,43 +202,6 @@ def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
     return Residuals(position, largest(rate), position, largest(rate))
 
 
-# -- what is known of the range ----------------------------------------------------------------------------------------
-
-
-class KnownRange:
-    """What of a range to and fro on one line was followed already.
-
-    Parameters
-    ----------
-    t : (n,) array
-    y : (k, n) array
-        Led values.
-    """
-
-    def __init__(self, t: Array, y: Array) -> None:
-        moving = [row for row in (t, *y) if np.ptp(row)]
-        #: values of the only coordinate that moves, or of the time, or None
-        self.values = moving[0] if len(moving) == 1 else None
-        self.low = self.high = 0.0 if self.values is None else float(self.values[0])
-
-    def known(self, first: int, last: int) -> float:
-        """The part of the way between two points, from the first on, that was followed and is smooth."""
-        if self.values is None or not self.low <= self.values[first] <= self.high:
-            return 0.0
-        start, end = float(self.values[first]), float(self.values[last])
-        inside = min(max(end, self.low), self.high) - start
-        return inside / (end - start) if end != start else 0.0
-
-    def note(self, first: int, last: int, smooth: bool) -> None:
-        """Take note of a way; after one that is not smooth nothing is known any more."""
-        if self.values is None:
-            return
-        ends = float(self.values[first]), float(self.values[last])
-        self.low, self.high = min(self.low, *ends), max(self.high, *ends)
-        if not smooth:
-            self.values = None
-
-
 # -- where the loops do not close --------------------------------------------------------------------------------------
 
 
@@ -286,155 +244,6 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
 
 
 # -- the analysis ------------------------------------------------------------------------------------------------------
-
-
-LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 turns
-
-
-class Range(NamedTuple):
-    """What is asked for: n points."""
-
-    t: Array  #: (n,)
-    names: tuple[str, ...]  #: of the led coordinates
-    y: Array  #: (n_led, n)
-    y1: Array  #: their rates
-    y2: Array
-
-
-def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
-    """Sort names into led coordinates, their rates and accelerations.
-
-    Raises
-    ------
-    UsageError
-    """
-    layout = module.layout
-    coordinates = layout.q + layout.loops
-    known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
-    for name in named:
-        if name not in known:
-            raise unknown("coordinate or rate", name, known)
-    names = tuple(name for name in named if name in coordinates)
-    for name in named:
-        base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)
-        if name not in names and base not in names:
-            raise incomplete(f"{name} is given without values of {base}; give both")
-    arrays = {name: _column(name, value) for name, value in named.items()}
-    if t is not None:
-        arrays["t"] = _column("t", t)
-    sizes = {name: x.size for name, x in arrays.items() if x.ndim}
-    if not sizes:
-        raise incomplete("there is no range: give times t, or values of a coordinate, as an array")
-    if len(set(sizes.values())) > 1:
-        raise ill_shaped(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
-    n = next(iter(sizes.values()))
-    require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
-
-    def stack(suffix: str) -> Array:
-        rows = [np.broadcast_to(arrays.get(name + suffix, np.zeros(())), n) for name in names]
-        return np.array(rows, dtype=float).reshape(len(names), n)
-
-    times = np.broadcast_to(arrays.get("t", np.zeros(())), n)
-    y, y1 = stack(""), stack("_dot")
-    for k, name in enumerate(names):
-        if np.ptp(times) and np.ptp(y[k]) and name + "_dot" not in named:
-            raise incomplete(f"{name} varies with t: give {name}_dot too (and {name}_ddot, unless it is 0)")
-    return Range(np.array(times), names, y, y1, stack("_ddot"))
-
-
-def _column(name: str, value: Any) -> Array:
-    array = read_numbers(name, value)
-    require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
-    if array.ndim > 1 or not array.size or not np.isfinite(array).all():
-        raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
-    return array
-
-
-def kinematic_analysis(
-    module: BoundModel,
-    /,
-    t: ArrayLike | None = None,
-    initial: Start = None,
-    parameters: Any = None,
-    inputs: Any = None,
-    *,
-    partial: bool = False,
-    **led: ArrayLike,
-) -> KinematicAnalysis:
-    """Compute positions, velocities and accelerations over a range of time or of coordinates, without forces.
-
-    The range is followed from the initial position in small steps, so the mechanism stays on its branch, even through
-    change points, where branches meet.
-
-    Parameters
-    ----------
-    t : (n,) array or float, optional
-        Times (s), for drivers; 0 by default.
-    initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
-        Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
-        declared initial position at t = 0 by default, from where it is followed to the first point; if that is a
-        dead centre of the led coordinates, the branch is the one found next to it.
-    parameters, inputs : optional
-        As for :meth:`bind`.
-    partial : bool
-        Return the part of the range that can be reached instead of raising an error.
-    **led : (n,) arrays or floats
-        Values of the prescribed coordinates, of the tree or of cut joints, at most as many as degrees of freedom;
-        the others stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
-
-    Returns
-    -------
-    KinematicAnalysis
-
-    Raises
-    ------
-    PartitionError
-        The range cannot be followed to its end (``.reached`` holds the part before), or its start is singular.
-    AssemblyError
-        The initial values do not fit the loops and drivers.
-    UsageError
-        Unknown names, wrong shapes, too many coordinates led.
-    """
-    require_support(module.layout, "kinematic_analysis")
-    asked = read_range(module, t, led)
-    if parameters is not None or inputs is not None:
-        module = module.bind(parameters, inputs)
-    return analyse(module, asked, initial, partial)
-
-
-def analyse(module: BoundModel, asked: Range, initial: Start, partial: bool) -> KinematicAnalysis:
-    """Follow the range from the initial position."""
-    if module.layout.n_h < module.layout.n_c:
-        module.layout.require_minimal_form()
-    partial = read_flag("partial", partial)
-    t0, y0 = float(asked.t[0]), asked.y[:, 0]
-    start_t, q = start_from(module, initial, t0)
-    try:
-        names = complete(module, q, start_t, asked.names)
-    except PartitionError:
-        if initial is not None or not asked.names:
-            raise
-        # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
-        start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
-        names = complete(module, q, start_t, asked.names)
-    driven = DrivenCoordinates(module, names)
-    further = driven.led_values(q, start_t)[len(asked.names) :]
-    start_y = driven.led_values(q, start_t)
-    led = len(asked.names)
-    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as asked for
-        start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
-    rest = np.repeat(further[:, None], len(asked.t), axis=1)
-    still = np.zeros_like(rest)
-    asked = Range(
-        asked.t,
-        names,
-        np.concatenate([asked.y, rest]),
-        np.concatenate([asked.y1, still]),
-        np.concatenate([asked.y2, still]),
-    )
-    _refuse_long_ways(driven, names, np.column_stack([start_y, asked.y]))
-    q = follow_to_start(driven, q, (start_t, start_y), (t0, asked.y[:, 0]))
-    return follow_range(driven, asked, q, partial, led)
 
 
 def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Array]:
@@ -512,18 +321,6 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     return result
 
 
-def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
-    """Ways of more than LONGEST are not followed: they take hours, and positions repeat."""
-    ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / driven.led_scales
-    k = int(ways.argmax()) if ways.size else 0
-    if ways.size and ways[k] > LONGEST:
-        raise too_large(
-            f"the path of {names[k]} from the initial position to the end of the range is {ways[k]:.6g} rad or length "
-            f"scales long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are allowed; positions repeat "
-            "after a turn, so give angles within one turn, or an initial position near the first point"
-        )
-
-
 def _freedom(module: BoundModel, q: Array, t: float) -> str:
     """Why no more coordinates can be led."""
     n = module.n_dof
@@ -561,82 +358,6 @@ def follow_to_start(
             q,
         )
     return followed.position(length)
-
-
-def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
-    """Straight pieces one after the other."""
-    n = len(asked.t)
-    pieces = _pieces(driven, asked)
-    columns: list[tuple[Array, Array, Array]] = []
-    found: list[Singular] = []
-    stop: Singular | None = None
-    known_range = KnownRange(asked.t, asked.y)
-    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
-    count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
-    for first, last in pieces:
-        t, y = float(asked.t[first]), asked.y[:, first]
-        dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
-        length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
-        path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
-        along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
-        extent = extents[0] if dt[-1] else extents[1]
-        followed = FollowedPath(path, q, length, known_range.known(first, last) * length, extent)
-        known_range.note(first, last, followed.smooth)
-        new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
-        reach = np.array([followed.holds(s) for s in along])
-        taken = np.arange(len(along))[new][reach[new]]
-        index = first + taken
-        columns.append(followed.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
-        count += len(taken)
-        points += [(done + p.s, path.at(p.s)[0], p.q) for p in followed.continuation.points if followed.holds(p.s)]
-        places.append(done + along[taken])
-        done += length
-        found += followed.singular
-        if followed.stop is not None:
-            stop = followed.stop
-            found.append(followed.stop)
-            break
-        q = columns[-1][0][:, -1] if len(taken) else q
-    along_all, times, positions = (np.array(part) for part in zip(*points, strict=True))
-    x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
-    order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
-    passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
-    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led], passed=passed)
-    if count < n and not partial:
-        gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
-        error = PartitionError(
-            f"the range cannot be followed to its end: {stop}; {gap}give partial=True for the part that can be reached "
-            f"({count} of {n} points)",
-            None if stop is None else stop.t,
-            None if stop is None else stop.q,
-        )
-        error.reached = result  # type: ignore[attr-defined]
-        raise error
-    return result
-
-
-def _pieces(driven: DrivenCoordinates, asked: Range) -> list[tuple[int, int]]:
-    """First and last indices of straight pieces of the range."""
-    scaled = np.concatenate([asked.t[None, :], asked.y / driven.led_scales[:, None]])
-    steps = np.diff(scaled, axis=1)
-    sizes = np.abs(steps).max(axis=0) if steps.size else np.empty(0)
-    pieces: list[tuple[int, int]] = []
-    first, direction = 0, None
-    for k in range(len(sizes)):
-        if sizes[k] <= UNMOVED:
-            continue
-        here = steps[:, k] / sizes[k]
-        if (
-            direction is not None
-            and np.abs(here - direction).max() > ALIGNED + EXACT * np.abs(scaled[:, k]).max() / sizes[k]
-        ):
-            pieces.append((first, k))
-            first = k
-            direction = here
-        elif direction is None:
-            direction = here
-    pieces.append((first, len(asked.t) - 1))
-    return pieces
 
 
 # -- runs of mechanisms that drivers move entirely ---------------------------------------------------------------------

@@ -20,23 +20,187 @@ essential tool for linearizing hybrid dynamical systems, Proc. IEEE 112 (2024), 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...base import algebra
-from ...base.algebra import Array
-from ...base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH, TOUCHING
-from ...base.numeric.projection import minimum_norm
-from ...errors import NoDerivativeError, cannot
-from ..constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
-from ..inputs import Forcing
-from .events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
-from .sensitivity_start import Differentiated, EventSlopes, InputSlopes, SlopesNow, assembly_rows, keep_consistent
+from ..base import algebra
+from ..base.algebra import Array
+from ..base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH, TOUCHING
+from ..base.numeric.projection import minimum_norm
+from ..errors import NoDerivativeError, cannot
+from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
+from ..runtime.inputs import Forcing, Table, rate_places
+from ..runtime.layout import Layout
+from ..runtime.runs.events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
 
 if TYPE_CHECKING:
-    from ..bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
+
+
+# -- what is differentiated by, and inputs -----------------------------------------------------------------------------
+
+
+class EventSlopes(NamedTuple):
+    """What happened at one event, and its derivatives by the k names.
+
+    The states' derivatives go with the event: they are those of the state at the event, whenever that is, as a
+    Poincare section takes them.  Those at a fixed time are in ``Sensitivities.dx``.
+    """
+
+    name: str
+    t: float  #: time (s)
+    before: Array  #: (n_x,) state right before
+    after: Array  #: (n_x,) state right after, the same without a reset
+    dt: Array  #: (k,) of the time
+    d_before: Array  #: (n_x, k)
+    d_after: Array  #: (n_x, k)
+
+
+class SlopesNow(NamedTuple):
+    """Derivatives of all inputs at a time and state."""
+
+    by_t: Array  #: (n_u,)
+    by_x: Array  #: (n_u, n_x)
+    by_p: Array  #: (n_u, n_p)
+
+
+class InputSlopes:
+    """Derivatives of the inputs of one run.
+
+    An expression is differentiated on the graph, a table piece by piece.  A Python function is called without the
+    state from here on: one that reads it has derivatives that nobody knows.
+
+    Parameters
+    ----------
+    layout : Layout
+    forcing : Forcing
+        Attached to the module of the run.
+    p : (n_p,) array
+    """
+
+    def __init__(self, layout: Layout, forcing: Forcing, p: Array) -> None:
+        self.layout = layout
+        self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
+        self.forcing = forcing
+        self.rates = rate_places(layout)
+        self.tables: dict[int, Table] = {}
+        self.functions: set[int] = set()
+        for i, signal in forcing.varying.items():
+            if i in self.formulas:
+                continue
+            if isinstance(signal, Table):
+                self.tables[i] = signal.derivative()
+            else:
+                self.functions.add(i)
+                forcing.varying[i] = AtOneState(layout.u[i], signal)
+
+    @property
+    def by_state_or_parameters(self) -> bool:
+        """Whether an input may depend on more than time."""
+        return bool(self.formulas)
+
+    def __call__(self, t: float, x: Array) -> SlopesNow:
+        """The derivatives; NaN by time for a Python function, unless its rate is an input too."""
+        n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
+        every = np.zeros((n_u, 1 + n_x + n_p))
+        for i, slopes in self.formulas.items():
+            every[i] = slopes(t, x)
+        within = self.forcing.within
+        for i, table in self.tables.items():
+            every[i, 0] = table.beside(t, t if within is None else min(max(t, within[0]), within[1]))
+        for i in self.functions:
+            rate = self.rates.get(i)
+            every[i, 0] = np.nan if rate is None else self.forcing(t, x)[rate]
+        return SlopesNow(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
+
+
+class AtOneState:
+    """A user's function f(t, x) as one of time alone.
+
+    Parameters
+    ----------
+    name : str
+        Of the input.
+    function : callable f(t, x)
+    """
+
+    def __init__(self, name: str, function: Callable[[float, Any], float]) -> None:
+        self.name, self.function = name, function
+
+    def __call__(self, t: float, x: Array) -> float:
+        """The value, without the state.
+
+        Raises
+        ------
+        UsageError
+            The function reads the state.
+        """
+        try:
+            return self.function(t, None)
+        except Exception:
+            self.function(t, x)  # a fault of its own comes out as it is
+        raise cannot(
+            f"input {self.name} is a Python function of the state, and its derivatives are not known; give it as an "
+            'expression in a text, such as "-k*theta", or as a function of time alone'
+        )
+
+
+class Differentiated(NamedTuple):
+    """What a trajectory is differentiated by: k names, each a parameter, an input or an initial value."""
+
+    names: tuple[str, ...]
+    parameters: tuple[tuple[int, int], ...]  #: (column, index of the parameter)
+    inputs: tuple[tuple[int, int], ...]  #: (column, index of the input)
+    initial: tuple[tuple[int, str], ...]  #: (column, name of the coordinate or rate)
+
+    def spread(self, by_parameters: Array, by_inputs: Array) -> Array:
+        """Derivatives (rows, k) from those by all parameters and all inputs; zero for initial values."""
+        result = np.zeros((len(by_parameters), len(self.names)))
+        for column, index in self.parameters:
+            result[:, column] = by_parameters[:, index]
+        for column, index in self.inputs:
+            result[:, column] = by_inputs[:, index]
+        return result
+
+
+def assembly_rows(module: BoundModel, t: float, x: Array, inputs: SlopesNow | None) -> Array:
+    """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
+    layout, E = module.layout, module.kernels.assembly_jacobian(x, t=t)
+    if inputs is not None:
+        by_u = E[:, layout.n_x : layout.n_x + layout.n_u]
+        by_x, by_p = E[:, : layout.n_x], E[:, layout.n_x + layout.n_u :]
+        E = np.hstack([by_x + by_u @ inputs.by_x, by_u, by_p + by_u @ inputs.by_p])
+    return E
+
+
+def keep_consistent(
+    module: BoundModel,
+    t: float,
+    x: Array,
+    S: Array,
+    columns: Differentiated,
+    inputs: SlopesNow | None = None,
+) -> Array:
+    """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them.
+
+    ``inputs`` are the derivatives of the inputs there.
+    """
+    layout, scales = module.layout, module.layout.scales
+    n_q, n_x, n_h, n_c = layout.n_q, layout.n_x, layout.n_h, layout.n_c
+    if not n_c:
+        return S
+    E = assembly_rows(module, t, x, inputs)
+    other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
+    N = scales.rates(x[:n_q], np.eye(layout.n_v))
+    dq, dv = S[:n_q], S[n_q:]
+    if n_h:
+        C_q = E[:n_h, :n_q]
+        dq = dq - scales.rates(x[:n_q], minimum_norm(C_q @ N, C_q @ dq + other[:n_h], scales))
+    lines = slice(n_h, n_h + n_c)
+    gap = E[lines, :n_q] @ dq + E[lines, n_q:n_x] @ dv + other[lines]
+    return np.vstack([dq, dv - minimum_norm(E[lines, n_q:n_x], gap, scales)])
 
 
 # -- between events ----------------------------------------------------------------------------------------------------

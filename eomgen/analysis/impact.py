@@ -1,4 +1,4 @@
-"""A run in which every closing gap is an event whose reset is an impact -> a trajectory with impacts."""
+"""A Module, a state and gaps that close -> impulses and the state after; runs in which closing gaps are impacts."""
 
 from __future__ import annotations
 
@@ -8,32 +8,279 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...base.algebra import Array
-from ...base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
-from ...base.value_rules import read_count
-from ...errors import SimulationError, cannot, no_such, off_range
-from ..columns import Columns, Residuals, describe
-from ..inputs import Forcing
-from ..refusals import require_support
-from ..storage import Stored
-from ..trajectory import Span, Start, Trajectory
-from .events import WAIT, Events, RunEvent
-from .impact import Gaps, Impact, Rough, allowance, check_friction, check_gaps, strike_run
-from .integrate import header_of
-from .run_arguments import find_state, set_up
-from .simulate import simulate
+from ..base.algebra import Array
+from ..base.limits.constraints import MEASURED
+from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
+from ..base.names import hint, joined
+from ..base.value_rules import read_count
+from ..errors import (
+    SimulationError,
+    UsageError,
+    at_odds,
+    cannot,
+    ill_typed,
+    incomplete,
+    no_such,
+    off_range,
+)
+from ..runtime.argument_checks import read_flag, read_number, without_dots
+from ..runtime.columns import Columns, Residuals, describe
+from ..runtime.constrained import ProjectedStates
+from ..runtime.inputs import Forcing
+from ..runtime.layout import Layout
+from ..runtime.refusals import require_support
+from ..runtime.runs.events import WAIT, Events, RunEvent
+from ..runtime.runs.impact import SI, Gaps, Impact, Rough, allowance, apply, find_sliding, one_state
+from ..runtime.runs.integrate import header_of
+from ..runtime.runs.run_arguments import find_state, set_up
+from ..runtime.runs.simulate import simulate
+from ..runtime.storage import Stored
+from ..runtime.trajectory import Span, Start, Trajectory
 
 if TYPE_CHECKING:
-    from ..bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.inputs import Forcing
+
+# -- what is given -----------------------------------------------------------------------------------------------------
+
+
+def check_gaps(
+    layout: Layout, gaps: Any = None, lock: Any = (), words: tuple[str, str] = ("gaps", "lock")
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Gaps with their restitutions and the names that are locked, if all of them are there and can be.
+
+    Parameters
+    ----------
+    layout : Layout
+    gaps, lock
+        As a user gives them.
+    words : (str, str)
+        What these are called where the user gives them.
+
+    Raises
+    ------
+    UsageError
+    """
+    word, other = words
+    if gaps is not None and not isinstance(gaps, Mapping):
+        raise ill_typed(f"{word} must be a mapping of names to restitutions, {{name: 0.5}}, not {gaps!r}")
+    locked = (lock,) if isinstance(lock, str) else lock
+    if not isinstance(locked, Sequence) or not all(isinstance(name, str) for name in locked):
+        raise ill_typed(f"{other} must be a list of coordinates, not {lock!r}")
+    if not gaps and not locked:
+        raise incomplete("an impact needs gaps={name: restitution} or lock=[coordinates]")
+    if layout.given_rates:
+        raise cannot("impacts need a model with q' = v, and the rates of this model's coordinates are given")
+    gaps, locked = without_dots(gaps or {}, layout.instances), [layout.plain(name) for name in locked]
+    coordinates = [*layout.velocity_labels, *layout.loops]
+    placed = [name for name in coordinates if name in layout.q + layout.loops]
+    for what, names, allowed in ((word, gaps, [*placed, *layout.y]), (other, locked, coordinates)):
+        for name in names:
+            if name not in allowed:
+                near = joined(hint(name, allowed), f"there are {', '.join(allowed) or 'none'}")
+                raise no_such(f"{what}: no coordinate or output {name!r}; {near}")
+    found: dict[str, float] = {}
+    for name, e in (gaps or {}).items():
+        found[name] = read_number(f"{word}: the restitution of {name}", e)
+        if not 0.0 <= found[name] <= 1.0:
+            raise off_range(f"{word}: the restitution of {name} must be between 0 and 1, not {e}")
+    return found, tuple(locked)
+
+
+def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], word: str = "friction") -> Rough:
+    """Coefficients of friction of gaps and what slides there, if all of it is there and can be.
+
+    Parameters
+    ----------
+    layout : Layout
+    friction
+        As a user gives it: {gap: (coefficient, name or two names)}.
+    gaps : mapping of str to float
+        The gaps of the call.
+    word : str
+        What it is called where the user gives it.
+
+    Raises
+    ------
+    UsageError
+    """
+    if friction is None:
+        return {}
+    if not isinstance(friction, Mapping):
+        raise ill_typed(f"{word} must be a mapping {{gap: (coefficient, sliding velocity)}}, not {friction!r}")
+    found: dict[str, tuple[float, tuple[str, ...]]] = {}
+    placed = [name for name in (*layout.velocity_labels, *layout.loops) if name in layout.q + layout.loops]
+    allowed = [*placed, *layout.y]
+    for gap, given in without_dots(friction, layout.instances).items():
+        if gap not in gaps:
+            raise no_such(f"{word}: {gap!r} is no gap of this call; {joined(hint(gap, gaps), _listed(gaps))}")
+        if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
+            raise ill_typed(
+                f"{word}: of gap {gap} give the coefficient and the output that is its sliding velocity, "
+                f"(0.3, 'slide'), not {given!r}"
+            )
+        mu = read_number(f"{word}: the coefficient of {gap}", given[0])
+        if not mu >= 0.0:
+            raise off_range(f"{word}: the coefficient of {gap} must be 0 or greater, not {given[0]}")
+        names = (given[1],) if isinstance(given[1], str) else tuple(given[1])
+        if not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
+            raise ill_typed(
+                f"{word}: of gap {gap} give one sliding velocity, or two at right angles in space, not {given[1]!r}"
+            )
+        names = tuple(layout.plain(name) for name in names)
+        for name in names:
+            if name not in allowed:
+                near = joined(hint(name, allowed), _listed(allowed))
+                raise no_such(f"{word}: no coordinate or output {name!r} for the sliding of {gap}; {near}")
+        for name in (gap, *names):
+            if layout.unit(name) not in SI:
+                raise UsageError(
+                    f"{word}: the output {name} is in {layout.unit(name)}, and friction at {gap} needs SI units: give "
+                    "another output without a unit",
+                    code="EG-UNIT",
+                )
+        found[gap] = mu, names
+    return found
+
+
+def _listed(names: Any) -> str:
+    return f"there are {', '.join(names) or 'none'}"
+
+
+# -- one impact --------------------------------------------------------------------------------------------------------
+
+
+@np.errstate(all="ignore")
+def impact(
+    module: BoundModel,
+    /,
+    t: float,
+    x: ArrayLike,
+    gaps: Mapping[str, float] | None = None,
+    *,
+    lock: Sequence[str] = (),
+    closed: bool = False,
+    friction: Mapping[str, tuple[float, str | Sequence[str]]] | None = None,
+    p: Any = None,
+    u: Any = None,
+) -> Impact:
+    """Compute the state after an impact, or after coordinates are locked suddenly.
+
+    Parameters
+    ----------
+    t : float
+    x : (n_x,) array
+        The state right before; projected onto the constraints first.
+    gaps : mapping of str to float
+        Gaps and their coefficients of restitution, 0 to 1.  A gap is a coordinate or an output (a function of
+        positions) that is 0 now and must not become negative.  Gaps that open have no impact.
+    lock : sequence of str
+        Coordinates that stop (plastic, whatever the sign of the impulse).
+    closed : bool
+        Treat the gaps as closed at any value, as for a stop that is placed where a coordinate is now.
+    friction : mapping of str to (float, str or two str), optional
+        Coulomb friction of gaps: the coefficient, and the output or coordinate that is the sliding velocity, linear in
+        the velocities (of a place its rate counts); in space two of them, at right angles.
+    p, u : optional
+        As for ``bind``.
+
+    Returns
+    -------
+    Impact
+        ``x`` after it, ``impulses`` by name, ``rates_before``, ``rates_after``, ``constraint_impulses``,
+        ``energy_lost``.
+
+    Raises
+    ------
+    UsageError
+        A name is unknown; a gap is not 0 (within 1e-6 lengths of the model, or rad); no impulses satisfy the laws;
+        drivers close a gap; or friction is given beside lock.
+
+    Notes
+    -----
+    Without friction: Newton's law of restitution with complementarity, for all gaps at once that close or are at
+    rest: each impulse is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and
+    Glocker, Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
+    opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
+    from gaps that move in time and, with friction, from belts.  Springs, dampers and other finite forces have no
+    part in it.  Velocities after the impact are unique; impulses are not where gaps depend on each other, and the law
+    itself is a choice: momentum and energy alone do not determine what several bodies that touch do.
+
+    With friction, one gap with one sliding velocity follows Routh's method with Poisson's restitution: sliding,
+    sticking and sliding back within the impact are exact (Wang and Mason 1992).  In space, and where gaps that move
+    each other are closed together, impulses obey Newton's and Coulomb's laws for the velocities after the impact; where
+    that would bring in energy, restitutions are multiplied by the largest factor with which it does not.
+    """
+    module = module if p is None and u is None else module.bind(p, u)
+    found, locked = check_gaps(module.layout, gaps, lock)
+    rough = check_friction(module.layout, friction, found)
+    if rough and locked:
+        raise at_odds("an impact has friction= or lock=, not both: lock the coordinates in a call before or after it")
+    states = one_state(module, read_number("t", t), x)
+    watched = Gaps(module, tuple(found))
+    rows = watched.normals(float(states.t[0]), states.x[:, 0])
+    if not read_flag("closed", closed):
+        _require_closed(watched, states)
+    return _strike_gaps(states, watched, rows, found, locked, rough)
+
+
+def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float], rough: Rough) -> Impact:
+    """The impact of some gaps of a run, with inputs as they are then."""
+    u = gaps.inputs(t, x)
+    module = gaps.module if u is None else gaps.module.bind(None, u)
+    own, states = Gaps(module, tuple(restitutions), gaps.forcing), one_state(module, t, x)
+    return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, (), rough)
+
+
+def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
+    values = gaps.values(float(states.t[0]), states.x[:, 0])
+    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, MEASURED), strict=True):
+        if abs(value) > limit:
+            how = "open" if value > 0.0 else "closed too far"
+            unit = gaps.layout.unit(name)
+            raise UsageError(
+                f"gap {name} is {value:.6g}{' ' * bool(unit)}{unit} ({how}); an impact needs a gap of 0, up to "
+                f"{limit:.2g}; give a state where the gap is 0, or treat any gap as closed (closed=True, --closed)",
+                code="EG-EVENT",
+            )
+
+
+def _strike_gaps(
+    states: ProjectedStates,
+    gaps: Gaps,
+    rows: Array,
+    restitutions: Mapping[str, float],
+    locked: tuple[str, ...],
+    rough: Rough,
+) -> Impact:
+    t, x = float(states.t[0]), states.x[:, 0]
+    rates = gaps.rates(t, x, rows)
+    sliding = find_sliding(gaps.module, rough, gaps.names, t, x, gaps.forcing)
+    if locked:
+        held = _locks(states, locked)
+        rows, rates = np.vstack([rows, held]), np.concatenate([rates, held @ states.v[:, 0]])
+    return apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked), sliding)
+
+
+def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
+    layout = states.module.layout
+    rows = np.zeros((len(names), layout.n_v))
+    for i, name in enumerate(names):
+        if name in layout.velocity_labels:
+            rows[i, layout.velocity_labels.index(name)] = 1.0
+        else:
+            every = states.evaluate(states.module.kernels.loop_coordinate_jacobian, states.q)
+            rows[i] = every[layout.loops.index(name), :, 0]
+    return rows
 
 
 # -- the trajectory ----------------------------------------------------------------------------------------------------
 
 
 class ImpactRun(Trajectory):
-    """A motion with impacts: a :class:`~..trajectory.Trajectory` that has two points at each impact.
+    """A motion with impacts: a :class:`~..runtime.trajectory.Trajectory` that has two points at each impact.
 
     Attributes
     ----------
@@ -97,7 +344,7 @@ class GapEvents(Events):
     gaps : Gaps
     restitutions : mapping of str to float
     rough : mapping
-        As from :func:`~.impact.check_friction`.
+        As from :func:`check_friction`.
     most : int
         Impacts after which the run ends.
     end : float

@@ -1,52 +1,52 @@
-"""How an assembled initial state changes with parameters and values; the result of sensitivities."""
+"""A run -> the run and its derivatives by parameters, inputs and initial values.
+
+Forward sensitivities: S' = J S + df/dp beside x' = f (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
+Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...base import algebra
-from ...base.algebra import Array
-from ...base.files import whole_file
-from ...base.limits.constraints import CONTRADICTION, PASSED, STATE
-from ...base.limits.impacts import OPENS
-from ...base.names import place_of_marker
-from ...base.numeric.projection import minimum_norm
-from ...base.results import Result, ResultTable, plain, same_keys
-from ...errors import NoDerivativeError, at_odds, cannot, ill_placed, ill_typed, incomplete, untrue
-from ..argument_checks import plain_name, read_names, unknown
-from ..change_points import scaled_jacobians
-from ..columns import Named
-from ..initial import Initial
-from ..inputs import Forcing, Table, rate_places
-from ..layout import Layout
-from ..storage import table_path
+from ..base import algebra
+from ..base.algebra import Array, Indices
+from ..base.files import whole_file
+from ..base.limits.analyses import SINGULAR
+from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
+from ..base.limits.impacts import OPENS
+from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
+from ..base.names import place_of_marker
+from ..base.results import Result, ResultTable, plain, same_keys
+from ..errors import NoDerivativeError, SimulationError, at_odds, ill_placed, ill_typed, incomplete, untrue
+from ..runtime.argument_checks import check_names, read_names, read_number, require_steps, unknown
+from ..runtime.change_points import scaled_jacobians, singular_values
+from ..runtime.columns import Named
+from ..runtime.failure import place
+from ..runtime.initial import Initial
+from ..runtime.inputs import Forcing
+from ..runtime.layout import Layout, start_slopes
+from ..runtime.refusals import require_support
+from ..runtime.runs.bound_run import Crawling, StallCheck, describe_crawl
+from ..runtime.runs.events import Events, told_by_the_caller
+from ..runtime.runs.integrate import Solution, choose_solver, integrate, record, require_end
+from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
+from ..runtime.runs.simulate import simulate
+from ..runtime.storage import table_path
+from ..runtime.trajectory import Span, Start
+from .saltation import Differentiated, EventSlopes, Saltation, SlopesNow, Variational, assembly_rows
 
 if TYPE_CHECKING:
-    from ..bound_model import BoundModel
-    from ..trajectory import Trajectory
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.option_types import Number, ReducedOptions
+    from ..runtime.trajectory import Trajectory
 
 # -- the result --------------------------------------------------------------------------------------------------------
-
-
-class EventSlopes(NamedTuple):
-    """What happened at one event, and its derivatives by the k names.
-
-    The states' derivatives go with the event: they are those of the state at the event, whenever that is, as a
-    Poincare section takes them.  Those at a fixed time are in ``Sensitivities.dx``.
-    """
-
-    name: str
-    t: float  #: time (s)
-    before: Array  #: (n_x,) state right before
-    after: Array  #: (n_x,) state right after, the same without a reset
-    dt: Array  #: (k,) of the time
-    d_before: Array  #: (n_x, k)
-    d_after: Array  #: (n_x, k)
 
 
 class Sensitivities(Result):
@@ -173,116 +173,6 @@ class Sensitivities(Result):
 # smooth function of p.
 
 
-# -- inputs ------------------------------------------------------------------------------------------------------------
-
-
-class SlopesNow(NamedTuple):
-    """Derivatives of all inputs at a time and state."""
-
-    by_t: Array  #: (n_u,)
-    by_x: Array  #: (n_u, n_x)
-    by_p: Array  #: (n_u, n_p)
-
-
-class InputSlopes:
-    """Derivatives of the inputs of one run.
-
-    An expression is differentiated on the graph, a table piece by piece.  A Python function is called without the
-    state from here on: one that reads it has derivatives that nobody knows.
-
-    Parameters
-    ----------
-    layout : Layout
-    forcing : Forcing
-        Attached to the module of the run.
-    p : (n_p,) array
-    """
-
-    def __init__(self, layout: Layout, forcing: Forcing, p: Array) -> None:
-        self.layout = layout
-        self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
-        self.forcing = forcing
-        self.rates = rate_places(layout)
-        self.tables: dict[int, Table] = {}
-        self.functions: set[int] = set()
-        for i, signal in forcing.varying.items():
-            if i in self.formulas:
-                continue
-            if isinstance(signal, Table):
-                self.tables[i] = signal.derivative()
-            else:
-                self.functions.add(i)
-                forcing.varying[i] = AtOneState(layout.u[i], signal)
-
-    @property
-    def by_state_or_parameters(self) -> bool:
-        """Whether an input may depend on more than time."""
-        return bool(self.formulas)
-
-    def __call__(self, t: float, x: Array) -> SlopesNow:
-        """The derivatives; NaN by time for a Python function, unless its rate is an input too."""
-        n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
-        every = np.zeros((n_u, 1 + n_x + n_p))
-        for i, slopes in self.formulas.items():
-            every[i] = slopes(t, x)
-        within = self.forcing.within
-        for i, table in self.tables.items():
-            every[i, 0] = table.beside(t, t if within is None else min(max(t, within[0]), within[1]))
-        for i in self.functions:
-            rate = self.rates.get(i)
-            every[i, 0] = np.nan if rate is None else self.forcing(t, x)[rate]
-        return SlopesNow(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
-
-
-class AtOneState:
-    """A user's function f(t, x) as one of time alone.
-
-    Parameters
-    ----------
-    name : str
-        Of the input.
-    function : callable f(t, x)
-    """
-
-    def __init__(self, name: str, function: Callable[[float, Any], float]) -> None:
-        self.name, self.function = name, function
-
-    def __call__(self, t: float, x: Array) -> float:
-        """The value, without the state.
-
-        Raises
-        ------
-        UsageError
-            The function reads the state.
-        """
-        try:
-            return self.function(t, None)
-        except Exception:
-            self.function(t, x)  # a fault of its own comes out as it is
-        raise cannot(
-            f"input {self.name} is a Python function of the state, and its derivatives are not known; give it as an "
-            'expression in a text, such as "-k*theta", or as a function of time alone'
-        )
-
-
-class Differentiated(NamedTuple):
-    """What a trajectory is differentiated by: k names, each a parameter, an input or an initial value."""
-
-    names: tuple[str, ...]
-    parameters: tuple[tuple[int, int], ...]  #: (column, index of the parameter)
-    inputs: tuple[tuple[int, int], ...]  #: (column, index of the input)
-    initial: tuple[tuple[int, str], ...]  #: (column, name of the coordinate or rate)
-
-    def spread(self, by_parameters: Array, by_inputs: Array) -> Array:
-        """Derivatives (rows, k) from those by all parameters and all inputs; zero for initial values."""
-        result = np.zeros((len(by_parameters), len(self.names)))
-        for column, index in self.parameters:
-            result[:, column] = by_parameters[:, index]
-        for column, index in self.inputs:
-            result[:, column] = by_inputs[:, index]
-        return result
-
-
 def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Differentiated:
     """Sort names into parameters, inputs and held initial values.
 
@@ -337,16 +227,6 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
         soft = initial.compatible(q, first, {n: x for n, x in wanted.items() if n not in first}, positions=positions)
         found += [*first, *soft]
     return found
-
-
-def assembly_rows(module: BoundModel, t: float, x: Array, inputs: SlopesNow | None) -> Array:
-    """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
-    layout, E = module.layout, module.kernels.assembly_jacobian(x, t=t)
-    if inputs is not None:
-        by_u = E[:, layout.n_x : layout.n_x + layout.n_u]
-        by_x, by_p = E[:, : layout.n_x], E[:, layout.n_x + layout.n_u :]
-        E = np.hstack([by_x + by_u @ inputs.by_x, by_u, by_p + by_u @ inputs.by_p])
-    return E
 
 
 def start_sensitivity(
@@ -439,34 +319,6 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     return np.asarray(found)
 
 
-def keep_consistent(
-    module: BoundModel,
-    t: float,
-    x: Array,
-    S: Array,
-    columns: Differentiated,
-    inputs: SlopesNow | None = None,
-) -> Array:
-    """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them.
-
-    ``inputs`` are the derivatives of the inputs there.
-    """
-    layout, scales = module.layout, module.layout.scales
-    n_q, n_x, n_h, n_c = layout.n_q, layout.n_x, layout.n_h, layout.n_c
-    if not n_c:
-        return S
-    E = assembly_rows(module, t, x, inputs)
-    other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
-    N = scales.rates(x[:n_q], np.eye(layout.n_v))
-    dq, dv = S[:n_q], S[n_q:]
-    if n_h:
-        C_q = E[:n_h, :n_q]
-        dq = dq - scales.rates(x[:n_q], minimum_norm(C_q @ N, C_q @ dq + other[:n_h], scales))
-    lines = slice(n_h, n_h + n_c)
-    gap = E[lines, :n_q] @ dq + E[lines, n_q:n_x] @ dv + other[lines]
-    return np.vstack([dq, dv - minimum_norm(E[lines, n_q:n_x], gap, scales)])
-
-
 # -- branches that a change leaves -------------------------------------------------------------------------------------
 
 
@@ -504,3 +356,185 @@ def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, 
 
 def _named(columns: Differentiated, pairs: tuple[tuple[int, int], ...]) -> list[tuple[str, int]]:
     return [(columns.names[column], index) for column, index in pairs]
+
+
+# -- the run -----------------------------------------------------------------------------------------------------------
+
+
+OPTIONS = ("max_step", "first_step", "min_step")  #: of solvers, besides tolerances
+
+
+def sensitivities(
+    module: BoundModel,
+    /,
+    names: Sequence[str],
+    span: Span = None,
+    initial: Start = None,
+    parameters: Any = None,
+    inputs: Mapping[str, Any] | None = None,
+    *,
+    hold: Sequence[str] | None = None,
+    method: Any = "DOP853",
+    rtol: Number = SENSITIVITY_RTOL,
+    atol: Number | ArrayLike = SENSITIVITY_ATOL,
+    t_eval: ArrayLike | None = None,
+    events: Any = None,
+    **options: Unpack[ReducedOptions],
+) -> Sensitivities:
+    """Integrate a run together with its derivatives by parameters, inputs and initial values.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What to differentiate by: parameters, inputs (a constant added to each) and initial values that are held.
+    span, initial, parameters, inputs : optional
+        As for ``simulate``.
+    hold : sequence of str, optional
+        Coordinates and rates that keep their initial values when something else changes; the constraints give the
+        rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
+        declared ones, then the independent ones, while they leave each other room; declared ones that are
+        expressions of parameters follow these then, as a run with other parameters does.
+    method : str or OdeSolver subclass, optional
+        Of SciPy.
+    rtol, atol, t_eval, events : optional
+        As for ``simulate``.
+    **options
+        max_step, first_step, as for ``simulate``.
+
+    Returns
+    -------
+    Sensitivities
+        ``s["theta", "k"]``, ``s.dx`` (n_x, k, n_t), ``s.dy`` (n_y, k, n_t), ``s.trajectory``.
+
+    Raises
+    ------
+    UsageError
+        An unknown name, or one that is not held.
+    SimulationError, AssemblyError, MissingDependencyError
+        As for ``simulate``.
+    """
+    require_support(module.layout, "sensitivities")
+    check_names("option of sensitivities", options, OPTIONS, ("method", "rtol", "atol", "t_eval", "events"))
+    bound, forcing, start, stop = set_up(module, span, parameters, inputs)
+    layout = bound.layout
+    corners = forcing.corners(start, stop)
+    nodes = [start, *corners, stop]
+    forcing.enter(*nodes[:2])
+    x0 = find_state(bound, initial, start, forcing)
+    here = bound.bind(u=forcing(start, x0))
+    given = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
+    held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
+    columns = split_columns(layout, read_names("names", names), held)
+    run = Variational(bound, forcing, columns)
+    watched = Events(layout, events)
+    chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
+    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **chosen})
+    require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
+    alone = None
+    if watched:
+        with told_by_the_caller():
+            alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
+    bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
+    follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
+    follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
+    S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
+    solver = choose_solver(method)
+    width = layout.n_x * (1 + len(columns.names))
+    if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
+        settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
+    times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
+    z0 = run.joined(x0, S0)
+    salts = Saltation(run, watched, (start, stop), (settings["rtol"], settings["atol"]), corners)
+    fail, title = bound.kernels.fail, solver.__name__
+    longest = float(settings.get("max_step", np.inf))
+    numbers = len(z0) if times is None else 0
+    troubled = lambda t, x: fail.trouble(x, t) is not None  # noqa: E731
+    rates = lambda t, x: bound.rhs(t, x, u=forcing(t, x))  # noqa: E731
+    stall_check = StallCheck(start, stop, x0, layout.n_q, longest, troubled, rates, numbers)
+    try:
+        solution, _, raised = integrate(
+            bound, forcing, nodes, z0, solver, times, False, settings, salts, None, stall_check.look, run
+        )
+        if raised is not None:
+            raise raised
+    except Crawling as crawl:
+        _refuse_change_point(bound, forcing, crawl.t, crawl.x)
+        trouble = "; ".join(fail.trouble(crawl.x, crawl.t) or ())
+        raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
+    if solution.status < 0 or not np.isfinite(solution.x).all():
+        failure = run.rhs.failure or run.tangent.failure
+        cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)
+        raise SimulationError(f"{title} stopped: {solution.message} {cause or ''}".strip()) from cause
+    require_end(solution, stop)
+    if solution.status == 1:
+        _note_end(salts, solution)
+    n, k = layout.n_x, len(columns.names)
+    kept = _distinct(solution)
+    steps = None if solution.steps is None else (solution.steps[0], solution.steps[1][:n])
+    states = solution._replace(
+        t=solution.t[kept], x=solution.x[:n, kept], x_events=[found[:n] for found in solution.x_events], steps=steps
+    )
+    raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
+    trajectory = record(bound, forcing, states, title, settings, watched.names)
+    if alone is not None:
+        _require_same(trajectory, alone)
+    refuse_lost_branches(bound, forcing, trajectory, columns)
+    dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
+    for j, time in enumerate(trajectory.t):
+        t, x = float(time), trajectory.x[:, j]
+        dx[..., j] = run.consistent(t, x, raw[..., j])
+        if layout.n_y:
+            dy[..., j] = run.outputs(t, x, dx[..., j])
+    return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
+
+
+def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:
+    """Tell of a loss of rank at the state where the derivatives grow without bound.
+
+    Raises
+    ------
+    NoDerivativeError
+    """
+    if not module.layout.rank:
+        return
+    u = forcing(t, x)[:, None] if module.layout.constraint_inputs else None
+    if singular_values(module, np.array([t]), x[:, None], u)[0, module.layout.rank - 1] < SINGULAR:
+        raise NoDerivativeError(
+            f"the run passes a change point at t = {t:.6g} s{place(module.layout.x, x)}: the mobility changes there, "
+            "and a small change of a parameter can close or open the branch, so there is no derivative; end the run "
+            "before it"
+        )
+
+
+def _require_same(found: Trajectory, alone: Trajectory) -> None:
+    """Refuse a run that passes over events which the run by itself finds."""
+    for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
+        if len(ours) != len(theirs):
+            raise SimulationError(
+                f"event {name} is found {len(theirs)} times by simulate, but {len(ours)} times together with the "
+                "derivatives, because it comes and goes within one step of the solver; give max_step",
+                code="EG-EVENT",
+            )
+
+
+def _note_end(salts: Saltation, solution: Solution) -> None:
+    """Note the event that ended the run, the last one that can."""
+    ending = [k for k, event in enumerate(salts.every) if event.terminal and len(solution.t_events[k])]
+    last = max(ending, key=lambda k: abs(float(solution.t_events[k][-1] - solution.ends[0])))
+    salts.stop(float(solution.t_events[last][-1]), solution.x_events[last][:, -1], last)
+
+
+def _distinct(solution: Solution) -> Indices:
+    """Points other than those that repeat the one before, as where an event changes nothing."""
+    same = (np.diff(solution.t) == 0.0) & (np.diff(solution.x, axis=1) == 0.0).all(axis=0)
+    return np.flatnonzero(np.concatenate([[True], ~same]))
+
+
+def _checked(module: BoundModel, hold: Sequence[str]) -> list[str]:
+    layout = module.layout
+    allowed = (*layout.q, *layout.v, *layout.loops, *layout.loop_rates)
+    names = read_names("hold", hold)
+    for name in names:
+        if name not in allowed:
+            raise unknown("coordinate or rate", name, allowed)
+    return list(names)
