@@ -36,40 +36,6 @@ if TYPE_CHECKING:
 # -- a range -----------------------------------------------------------------------------------------------------------
 
 
-class KnownRange:
-    """What of a range to and fro on one line was followed already.
-
-    Parameters
-    ----------
-    t : (n,) array
-    y : (k, n) array
-        Led values.
-    """
-
-    def __init__(self, t: Array, y: Array) -> None:
-        moving = [row for row in (t, *y) if np.ptp(row)]
-        #: values of the only coordinate that moves, or of the time, or None
-        self.values = moving[0] if len(moving) == 1 else None
-        self.low = self.high = 0.0 if self.values is None else float(self.values[0])
-
-    def known(self, first: int, last: int) -> float:
-        """The part of the way between two points, from the first on, that was followed and is smooth."""
-        if self.values is None or not self.low <= self.values[first] <= self.high:
-            return 0.0
-        start, end = float(self.values[first]), float(self.values[last])
-        inside = min(max(end, self.low), self.high) - start
-        return inside / (end - start) if end != start else 0.0
-
-    def note(self, first: int, last: int, smooth: bool) -> None:
-        """Take note of a way; after one that is not smooth nothing is known any more."""
-        if self.values is None:
-            return
-        ends = float(self.values[first]), float(self.values[last])
-        self.low, self.high = min(self.low, *ends), max(self.high, *ends)
-        if not smooth:
-            self.values = None
-
-
 LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 turns
 
 
@@ -238,7 +204,6 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
     columns: list[tuple[Array, Array, Array]] = []
     found: list[Singular] = []
     stop: Singular | None = None
-    known_range = KnownRange(asked.t, asked.y)
     extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
     count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
     for first, last in pieces:
@@ -248,8 +213,7 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
         path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
         extent = extents[0] if dt[-1] else extents[1]
-        followed = FollowedPath(path, q, length, known_range.known(first, last) * length, extent)
-        known_range.note(first, last, followed.smooth)
+        followed = FollowedPath(path, q, length, extent)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([followed.holds(s) for s in along])
         taken = np.arange(len(along))[new][reach[new]]

@@ -112,17 +112,14 @@ class Continuation:
         rate = largest(self.points[0].tangent.rate / self.scales.q)
         self.step = FIRST / rate if rate > 0.0 else 1.0
 
-    def to(self, end: float, known: float = 0.0, steps: int = STEPS) -> bool:
-        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
-
-        Up to s = ``known`` the way was followed before and is smooth, so that only the motion limits the steps.
-        """
+    def to(self, end: float, steps: int = STEPS) -> bool:
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before."""
         for _ in range(steps):
             here = self.points[-1]
             left = end - here.s
             if left <= 0.0:
                 return True
-            longest = max(end / self.fewest, self.extent / self.fewest, known - here.s)
+            longest = max(end, self.extent) / self.fewest
             rate = largest(here.tangent.rate / self.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)

@@ -16,10 +16,10 @@ stop: a dead centre of theirs, the end of the mechanism's reach).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from ...base import algebra
 from ...base.algebra import Array
@@ -239,7 +239,7 @@ REACH = 0.05  #: scaled motion from the middle of an interpolant to its inner su
 
 
 class ChangePointInterpolant:
-    """A polynomial through points of a continuation.
+    """The polynomial through points of a continuation and their directions.
 
     Parameters
     ----------
@@ -250,47 +250,28 @@ class ChangePointInterpolant:
 
     def __init__(self, supports: Sequence[Point], scales: Scales) -> None:
         self.supports, self.scales = supports, scales
-        self.nodes = np.repeat([p.s for p in supports], 2)
-        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in supports])
-        self.coefficients = divided(self.nodes, np.repeat([p.q for p in supports], 2, axis=0), slopes)
+        first, last = supports[0].s, supports[-1].s
+        self.middle, self.half = 0.5 * (first + last), 0.5 * (last - first)
+        x, unit = self._place(np.array([p.s for p in supports])), np.eye(2 * len(supports))
+        rows = np.concatenate([polynomial.polyval(x, unit).T, polynomial.polyval(x, polynomial.polyder(unit)).T])
+        slopes = [self.half * scales.rates(p.q, p.tangent.rate) for p in supports]
+        value = algebra.solve(rows, np.array([*(p.q for p in supports), *slopes]))
+        self.orders = value, polynomial.polyder(value) / self.half, polynomial.polyder(value, 2) / self.half**2
+
+    def _place(self, s: Any) -> Any:
+        return (s - self.middle) / self.half
 
     def covers(self, s: float) -> bool:
         """Whether s lies between the outer supports."""
-        return bool(self.nodes[0] <= s <= self.nodes[-1])
+        return bool(self.supports[0].s <= s <= self.supports[-1].s)
 
     def at(self, s: float) -> tuple[Array, Array, Array]:
         """q (n_q,), dq/ds and its derivative as velocities (n_v,)."""
-        q, first, second = newton(self.nodes, self.coefficients, s)
+        q, first, second = (polynomial.polyval(self._place(s), order) for order in self.orders)
         space = self.scales.space
         if space is None:
             return q, first, second
         return space.normalised(q), space.velocities(q, first), space.velocities(q, second)
-
-
-def divided(nodes: Array, values: Array, slopes: Array) -> Array:
-    """Divided differences of values at nodes, each of which comes twice and has one slope."""
-    table = np.array(values, dtype=float)
-    result = [table[0]]
-    for order in range(1, len(nodes)):
-        gap = nodes[order:] - nodes[:-order]
-        fresh = np.empty((len(gap), table.shape[1]))
-        for i, width in enumerate(gap):
-            fresh[i] = slopes[i // 2] if width == 0.0 else (table[i + 1] - table[i]) / width
-        table = fresh
-        result.append(table[0])
-    return np.array(result)
-
-
-def newton(nodes: Array, coefficients: Array, s: float) -> tuple[Array, Array, Array]:
-    """Newton's form by Horner's rule: value, first and second derivative."""
-    value = np.array(coefficients[-1])
-    first, second = np.zeros_like(value), np.zeros_like(value)
-    for k in range(len(coefficients) - 2, -1, -1):
-        x = s - nodes[k]
-        second = second * x + 2.0 * first
-        first = first * x + value
-        value = value * x + coefficients[k]
-    return value, first, second
 
 
 def build_interpolant(
@@ -337,7 +318,6 @@ def _guess_along(continuation: DrivenContinuation, rough: ChangePointInterpolant
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
-NARROW = 0.02  #: scaled motion to which a change of sign is narrowed by steps
 
 
 class Singular(NamedTuple):
@@ -398,22 +378,8 @@ def find_singular(
 
     There det K changes its sign, or the quality has a minimum.
     """
-    path, scales = continuation.curve, continuation.scales
-    for _ in range(60):
-        if largest(scales.distance(after.q, before.q)) <= NARROW:
-            break
-        rough, third = ChangePointInterpolant([before, after], scales), (after.s - before.s) / 3.0
-        one, other = (path.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third))
-        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
-            break
-        signs = [p.tangent.sign for p in (before, one, other, after)]
-        if signs[0] != signs[3]:
-            before, after = next(
-                (a, b) for a, b in pairwise((before, one, other, after)) if a.tangent.sign != b.tangent.sign
-            )
-        else:
-            before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
-    rough = ChangePointInterpolant([before, after], scales)
+    path = continuation.curve
+    rough = ChangePointInterpolant([before, after], continuation.scales)
     interpolant = build_interpolant(continuation, before, after, _most_singular(path, rough, before.s, after.s))
     if interpolant is None:
         return None
@@ -503,7 +469,7 @@ def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
 
 
 class FollowedPath:
-    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is known to be smooth.
+    """A continuation from s = 0 to ``end``, or as far as it goes.
 
     ``extent`` is that of :class:`~...base.numeric.continuation.Continuation`.
 
@@ -517,11 +483,11 @@ class FollowedPath:
         Change points on the way.
     """
 
-    def __init__(self, path: DrivenPath, start: Array, end: float, known: float = 0.0, extent: float = 0.0) -> None:
+    def __init__(self, path: DrivenPath, start: Array, end: float, extent: float = 0.0) -> None:
         self.path, self.end = path, end
         self.driven = driven = path.driven
         self.continuation = continuation = DrivenContinuation(path, start, extent)
-        whole = continuation.to(end, known)
+        whole = continuation.to(end)
         self.interpolants, self.singular = find_change_points(continuation)
         self.stop: Singular | None = None
         self.reached = end
@@ -530,11 +496,6 @@ class FollowedPath:
             self.reached = last.s
             self.stop = name_singular(driven, "stop", path.at(last.s)[0], last.q, last.tangent)
         self.nodes = np.array([p.s for p in continuation.points])
-
-    @property
-    def smooth(self) -> bool:
-        """Whether it came to its end without a stop, a change point or a leap."""
-        return not (self.stop or self.singular or self.interpolants or self.continuation.leaps)
 
     def holds(self, s: float) -> bool:
         """Whether s can be reached."""
