@@ -99,6 +99,23 @@ def test_a_run_into_a_pole_ends(method: str) -> None:
     assert time.process_time() - begun < 10  # some 0.5 s
 
 
+def test_a_damped_run_backwards_ends() -> None:
+    """The dampers of the governor make a motion grow tenfold every 0.3 ms backwards."""
+    module, begun = eg.load_example("flyball_governor").compile(target="numpy"), time.process_time()
+    refuses("EG-STALLED backwards -1", module.simulate, -1.0)
+    assert time.process_time() - begun < 10  # some 1 s
+
+
+def test_a_floor_without_rebound_is_no_accumulation() -> None:
+    """A ball that falls 1 m stays on the floor from its first impact on, at sqrt(2/g)."""
+    m = eg.Model("ball", gravity=(0, 0, -9.81))
+    m.prismatic("z", m.ground, m.body("ball", mass=1), axis="z", coordinate="h")
+    m.event("floor", "h", restitution=0)
+    with refused(f"EG-ZENO floor {np.sqrt(2 / 9.81):.6g}") as caught:
+        m.compile(target="numpy").simulate(2.0, {"h": 1.0})
+    assert "Zeno" not in str(caught.value)
+
+
 @pytest.mark.parametrize("method", ["DOP853", "RK45"])
 def test_no_absolute_tolerance_of_a_state_that_is_0(method: str) -> None:
     """x'' = -x from x = 1 at rest, where every error is infinite in parts of the velocity; the run is x = cos(t)."""

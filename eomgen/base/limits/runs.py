@@ -44,6 +44,7 @@ SHORT = 5e-9  #: mean step relative to the span below which a run does not get o
 STILL = 1e-4  #: change of the state in a window of steps, relative to the largest yet, below which nothing happens
 NOTICED = 1e-12  #: part of a state below which its change is rounding of the steps
 STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrator
+GROWN = 1e6  #: of states over those at the start, of 1 at least, beyond which a run backwards is lost to damping
 
 # -- size of a run ---------------------------------------------------------------------------------------------------
 MOST_STEPS = 10**8  #: steps of limited size

@@ -18,6 +18,7 @@ from ...base.limits.runs import (
     ENDLESS,
     ENOUGH,
     FEW,
+    GROWN,
     HOPELESS,
     MOST_NUMBERS,
     MOST_STEPS,
@@ -217,7 +218,7 @@ class StallCheck:
         self.limit, self.shortest = SHORT * abs(end - start), 0.1 * max_step
         self.troubled, self.rhs = troubled, rhs
         self.steps = self.slow = 0
-        self.t, self.x = start, x
+        self.t, self.x, self.most = start, x, GROWN * max(1.0, np.abs(x).max(initial=0.0))
         self.largest: Array | None = None  #: magnitude of each state at the windows before
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
@@ -232,6 +233,11 @@ class StallCheck:
         largest = np.abs(self.x) if self.largest is None else self.largest
         time = abs(t - self.t)
         self.t, self.x, self.steps = t, np.array(x), 0
+        if self.end < self.start and np.abs(x).max(initial=0.0) > self.most:
+            raise SimulationError(
+                f"the motion grows without bound backwards in time, to {np.abs(x).max():.3g} at t = {t:.6g} s of "
+                f"{self.end:.6g} s, as damped motions do; run forwards from an earlier start"
+            )
         self.largest = np.fmax(largest, np.abs(self.x))
         if step > self.shortest or abs(self.end - t) < MANY * step:
             return

@@ -202,15 +202,16 @@ class Events:
 
     def crowded(self, t: float, count: int) -> SimulationError:
         """The error for resets that never end."""
-        return self.crowded_near(t, count, [event.name for event in self.model if event.action != GO_ON])
-
-    @staticmethod
-    def crowded_near(t: float, count: int, names: Sequence[str]) -> ZenoError:
-        """The same, of named events."""
+        names = ", ".join(event.name for event in self.model if event.action != GO_ON)
+        how = f"happen again at once after a reset at t = {t:.6g} s, as where a gap stays closed"
+        if count > 1:
+            how = (
+                f"follow each other faster and faster near t = {t:.6g} s, after {count} resets (Zeno), or a reset "
+                "repeats without an end"
+            )
         return ZenoError(
-            f"the events {', '.join(names)} follow each other faster and faster near t = {t:.6g} s, after {count} "
-            "resets (Zeno), or a reset repeats without an end; end the run there (terminal: a number of events), use a "
-            "contact force for a body that comes to rest, or change the reset"
+            f"the events {names} {how}; end the run there (terminal: a number of events), use a contact force for a "
+            "body that comes to rest, or change the reset"
         )
 
 
