@@ -476,13 +476,14 @@ def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move:
 GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
 
 
-class Saltation:
-    """Carries the derivatives of one run through its events.
+class Saltation(Events):
+    """The events of one run, through which it carries its derivatives.
 
     Parameters
     ----------
     run : Variational
-    events : Events
+    given : None, or one event or several
+        As for :class:`~..runtime.runs.events.Events`.
     span : (float, float)
     tolerances : (float, array or float)
         rtol and atol of the run.
@@ -491,26 +492,23 @@ class Saltation:
     """
 
     def __init__(
-        self, run: Variational, events: Events, span: tuple[float, float], tolerances: tuple[float, Any],
+        self, run: Variational, given: Any, span: tuple[float, float], tolerances: tuple[float, Any],
         corners: Sequence[float],
     ) -> None:  # fmt: skip
-        if events.functions:
+        super().__init__(run.module.layout, given)
+        if self.functions:
             raise cannot(
-                f"event {events.functions[0].name} is a Python function, and its derivatives are not known; give its "
+                f"event {self.functions[0].name} is a Python function, and its derivatives are not known; give its "
                 "expression as a text"
             )
-        self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
-        self.module, self.n, self.names = run.module, run.module.n_x, events.names
-        self.every, self.crowded, self.over = events.every, events.crowded, False
-        self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
+        self.run, self.span, self.tolerances, self.corners = run, span, tolerances, corners
+        self.module, self.n = run.module, run.module.n_x
+        self.slopes = [formula.slopes(self.module.p) for _, formula in self.formulas]
         self.found: list[EventSlopes] = []
-
-    def __len__(self) -> int:
-        return len(self.every)
 
     def encode(self) -> dict[str, Any] | None:
         """The events, at each of which the loop stops, whatever it does: rates may jump there."""
-        encoded = self.events.encode()
+        encoded = super().encode()
         actions = [PAUSE if event.action == GO_ON else event.action for event in self.every]
         return encoded and {**encoded, "action": actions, "resets": []}
 
@@ -544,7 +542,7 @@ class Saltation:
             return z
         x_after, d_after = x, move.x
         if event.action != GO_ON:
-            x_after = self.events.reset(self.module, forcing, t, x, [index])
+            x_after = super().reset(self.module, forcing, t, x, [index])
             d_after = self._after(t, x, move, x_after, index)
             after = self._sides(t, x_after)[1]
         self.found.append(EventSlopes(name, t, x, x_after, dt, move.x, d_after))
@@ -562,11 +560,11 @@ class Saltation:
 
     def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
         forcing, here = self.run.forcing, self.run.at(t, x)
-        if self.events.model[index].action == RESET:
+        if self.model[index].action == RESET:
             found = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
             self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
             return found
-        declared = self.events.declared
+        declared = self.declared
         values = self.module.kernels.kernel("events", nan=True)(t, x, u=forcing(t, x))
         near = TOUCHING * max(1.0, self.module.layout.length)
         gaps = [j for j, other in enumerate(declared) if other.get("restitution") is not None]
@@ -588,7 +586,7 @@ class Saltation:
         for j in np.flatnonzero(by_u):
             if j in self.run.forcing.varying and layout.u[j] not in layout.input_rates:
                 raise NoDerivativeError(
-                    f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
+                    f"event {self.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
                     "derivative of such an impact is not available; write the motion into the gap's expression"
                 )
 
@@ -603,19 +601,19 @@ class Saltation:
 
     def _gradient(self, t: float, x: Array, index: int) -> Array:
         """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
-        first = len(self.events.model)
+        first = len(self.model)
         if index < first:
             return self.module.kernels.rows("event_derivatives", [index], t, x, self.run.forcing(t, x))
-        every, n_u = self.formulas[index - first](t, x), self.module.layout.n_u
+        every, n_u = self.slopes[index - first](t, x), self.module.layout.n_u
         return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
 
     def _value(self, t: float, x: Array, index: int) -> float:
         """An event's value."""
-        first = len(self.events.model)
+        first = len(self.model)
         if index < first:
             kernel = self.module.kernels.kernel("events", nan=True)
             return float(kernel(t, x, u=self.run.forcing(t, x) if self.run.forcing else None)[index])
-        return float(self.events.formulas[index - first][1].function(self.module.p)(t, x))
+        return float(self.formulas[index - first][1].function(self.module.p)(t, x))
 
     def _rate(self, t: float, x: Array, index: int, f: Array) -> float:
         """How fast an event's value changes along rates f (n_x,)."""
@@ -730,7 +728,7 @@ class Saltation:
             least = CONTRADICTS * float(np.abs(d[1][:, column]).max())
             if np.minimum(np.abs(slopes[1] - slopes[0]), np.abs(slopes[1])).max() > least:
                 raise NoDerivativeError(
-                    f"event {self.events.declared[index]['name']} gives positions at t = {t:.6g} s that contradict "
+                    f"event {self.declared[index]['name']} gives positions at t = {t:.6g} s that contradict "
                     f"what is closed ({', '.join(rows[k][0] for k in closed)}) as soon as {name} changes, so there is "
                     "no derivative; give positions that obey it for all values"
                 )

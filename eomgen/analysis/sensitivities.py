@@ -33,7 +33,7 @@ from ..runtime.inputs import Forcing
 from ..runtime.layout import Layout, start_slopes
 from ..runtime.refusals import require_support
 from ..runtime.runs.bound_run import Crawling, StallCheck, describe_crawl
-from ..runtime.runs.events import Events, told_by_the_caller
+from ..runtime.runs.events import told_by_the_caller
 from ..runtime.runs.integrate import Solution, choose_solver, integrate, record, require_end
 from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
 from ..runtime.runs.simulate import simulate
@@ -426,12 +426,12 @@ def sensitivities(
     held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
-    watched = Events(layout, events)
     chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
     settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **chosen})
     require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
+    salts = Saltation(run, events, (start, stop), (settings["rtol"], settings["atol"]), corners)
     alone = None
-    if watched:
+    if salts:
         with told_by_the_caller():
             alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
@@ -444,7 +444,6 @@ def sensitivities(
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
-    salts = Saltation(run, watched, (start, stop), (settings["rtol"], settings["atol"]), corners)
     fail, title = bound.kernels.fail, solver.__name__
     longest = float(settings.get("max_step", np.inf))
     numbers = len(z0) if times is None else 0
@@ -475,7 +474,7 @@ def sensitivities(
         t=solution.t[kept], x=solution.x[:n, kept], x_events=[found[:n] for found in solution.x_events], steps=steps
     )
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
-    trajectory = record(bound, forcing, states, title, settings, watched.names)
+    trajectory = record(bound, forcing, states, title, settings, salts.names)
     if alone is not None:
         _require_same(trajectory, alone)
     refuse_lost_branches(bound, forcing, trajectory, columns)

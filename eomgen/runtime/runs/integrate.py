@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from .events import is_told_by_the_caller, warn_of_unknown
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
     from .bound_run import Progress
+    from .events import Events
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -123,24 +124,6 @@ MESSAGES = {
 }
 
 
-class Watched(Protocol):
-    """Events of a run, as :class:`~.events.Events` has them."""
-
-    names: list[str]
-    over: bool  #: whether the last reset ended the run
-
-    def __len__(self) -> int: ...
-
-    def encode(self) -> dict[str, Any] | None:
-        """As the loop takes them."""
-
-    def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
-        """The state after events that happened at time t."""
-
-    def crowded(self, t: float, count: int) -> SimulationError:
-        """The error for resets that never end."""
-
-
 def integrate(
     module: BoundModel,
     forcing: Forcing,
@@ -150,7 +133,7 @@ def integrate(
     t_eval: Array | None,
     dense: bool,
     options: Mapping[str, Any],
-    events: Watched | None = None,
+    events: Events | None = None,
     watch: Progress | None = None,
     look: Callable[[float, Array, int], None] | None = None,
     rates: Callable[[float, Array], Array] | None = None,
