@@ -32,7 +32,7 @@ from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing
 from ..runtime.layout import Layout, start_slopes
 from ..runtime.refusals import require_support
-from ..runtime.runs.bound_run import Crawling, StallCheck, describe_crawl
+from ..runtime.runs.bound_run import Crawling, Run
 from ..runtime.runs.events import told_by_the_caller
 from ..runtime.runs.integrate import Solution, choose_solver, integrate, record, require_end
 from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
@@ -444,22 +444,17 @@ def sensitivities(
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
-    fail, title = bound.kernels.fail, solver.__name__
-    longest = float(settings.get("max_step", np.inf))
-    numbers = len(z0) if times is None else 0
-    troubled = lambda t, x: fail.trouble(x, t) is not None  # noqa: E731
-    rates = lambda t, x: bound.rhs(t, x, u=forcing(t, x))  # noqa: E731
-    stall_check = StallCheck(start, stop, x0, layout.n_q, longest, troubled, rates, numbers)
+    title, watch = solver.__name__, Run(bound, forcing)
+    watch.begin(start, stop, x0, float(settings.get("max_step", np.inf)), len(z0) if times is None else 0)
     try:
         solution, _, raised = integrate(
-            bound, forcing, nodes, z0, solver, times, False, settings, salts, None, stall_check.look, run
+            bound, forcing, nodes, z0, solver, times, False, settings, salts, None, watch.look, run
         )
         if raised is not None:
             raise raised
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x)
-        trouble = "; ".join(fail.trouble(crawl.x, crawl.t) or ())
-        raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
+        raise watch.gave_up(crawl, stop, title, {"atol": np.max(settings["atol"])}) from None
     if solution.status < 0 or not np.isfinite(solution.x).all():
         failure = run.rhs.failure or run.tangent.failure
         cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)

@@ -340,15 +340,6 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
     return words
 
 
-def describe_crawl(crawl: Crawling, names: tuple[str, ...], end: float, method: str, steep: str) -> str:
-    """The message of a run that crawls."""
-    why = f": {steep}" if steep else ""
-    return (
-        f"{method} stopped at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: with steps "
-        f"of {crawl.step:.1e} s on average it makes no progress{why}; {REMEDY}"
-    )
-
-
 # -- the end of such a run ---------------------------------------------------------------------------------------------
 
 
@@ -467,10 +458,13 @@ class Run:
         """The error for a run whose steps led nowhere."""
         if self.troubled(crawl.t, crawl.x):
             return self.ended(crawl.t, end, method, "", crawl.x)
-
+        names = self.module.x_names
         with np.errstate(all="ignore"):
-            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", SCIPY_ATOL))
-        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
+            steep = steepest(self.watched(None), crawl, names, options.get("atol", SCIPY_ATOL))
+        return SimulationError(
+            f"{method} stopped at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: with steps "
+            f"of {crawl.step:.1e} s on average it makes no progress{steep and ': '}{steep}; {REMEDY}"
+        )
 
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
