@@ -125,12 +125,6 @@ def fit_base(
     Returns
     -------
     BaseFit
-
-    Raises
-    ------
-    UsageError
-        A wrong shape, an unknown name, a parameter in which the forces are not linear, fewer values than unknowns, or
-        a mechanism with loops.
     """
     module = base.module
     if module.layout.n_c:

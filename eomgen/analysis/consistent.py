@@ -140,12 +140,7 @@ def _metric(
 def _positions(
     module: BoundModel, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
 ) -> Array:
-    """The q nearest to the start with C(q, t) = 0.
-
-    Raises
-    ------
-    ProjectionError
-    """
+    """The q nearest to the start with C(q, t) = 0."""
     layout = module.layout
     start = start if layout.space is None else layout.space.normalised(start)
     free = np.array([name not in held for name in layout.velocity_labels])
@@ -198,12 +193,7 @@ def _positions(
 def _velocities(
     module: BoundModel, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
 ) -> Array:
-    """The v nearest to the given ones that the constraints allow.
-
-    Raises
-    ------
-    ProjectionError
-    """
+    """The v nearest to the given ones that the constraints allow."""
     layout, scales = module.layout, module.layout.scales
     free = np.array([name not in held for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]

@@ -182,12 +182,7 @@ def _solve(A: Array, want: Array, weights: Array) -> Array:
 def _check_inputs(
     states: ProjectedStates, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
 ) -> None:
-    """The forces found, applied all at once, must make the motion: inputs may multiply each other.
-
-    Raises
-    ------
-    UsageError
-    """
+    """The forces found, applied all at once, must make the motion: inputs may multiply each other."""
     module, layout = states.module, states.module.layout
     inputs = [(i, layout.u.index(name)) for i, name in enumerate(names) if name in layout.u]
     if len(inputs) < 2:
@@ -217,12 +212,7 @@ def _size(layout: Layout, name: str) -> float:
 
 
 def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
-    """Coordinates or inputs by name.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Coordinates or inputs by name."""
     if actuated is None:
         return tuple(layout.velocity_labels[i] for i in layout.independent)
     names = read_names("actuated", actuated)
@@ -249,13 +239,7 @@ def _basis(J: Array, layout: Layout) -> Array:
 
 
 def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: Any) -> Array:
-    """Accelerations that the constraints allow, (n_v, k).
-
-    Raises
-    ------
-    UsageError
-        Unknown names, a wrong shape, or accelerations that break the constraints.
-    """
+    """Accelerations that the constraints allow, (n_v, k)."""
     layout = states.module.layout
     count = free.shape[1]
     if a is None or isinstance(a, Mapping):

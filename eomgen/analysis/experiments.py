@@ -41,13 +41,7 @@ class Experiment:
 
 
 def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -> list[Experiment]:
-    """All experiments of a call of ``fit``.
-
-    Raises
-    ------
-    UsageError
-        Says all that is wrong with the data.
-    """
+    """All experiments of a call of ``fit``."""
     several = isinstance(data, list | tuple)
     given = list(data) if several else [data]
     if not given:
@@ -171,12 +165,7 @@ def _in_own_unit(given: Any, own: str) -> float:
 
 
 def read_sigma(given: Any, names: Sequence[str]) -> dict[str, float] | None:
-    """Standard deviations of the columns, one for each; None where the fit is to find them.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Standard deviations of the columns, one for each; None where the fit is to find them."""
     if given is None:
         return None
     table = dict(given) if isinstance(given, Mapping) else dict.fromkeys(names, given)

@@ -58,10 +58,6 @@ def check_gaps(
         As a user gives them.
     words : (str, str)
         What these are called where the user gives them.
-
-    Raises
-    ------
-    UsageError
     """
     word, other = words
     if gaps is not None and not isinstance(gaps, Mapping):
@@ -101,10 +97,6 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
         The gaps of the call.
     word : str
         What it is called where the user gives it.
-
-    Raises
-    ------
-    UsageError
     """
     if friction is None:
         return {}

@@ -50,12 +50,7 @@ class Range(NamedTuple):
 
 
 def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
-    """Sort names into led coordinates, their rates and accelerations.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Sort names into led coordinates, their rates and accelerations."""
     layout = module.layout
     coordinates = layout.q + layout.loops
     known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]

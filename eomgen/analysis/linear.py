@@ -44,13 +44,6 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     -------
     TangentSpace
         ``positions`` are indices of coordinates; Z is (n_q, n_z).
-
-    Raises
-    ------
-    PartitionError
-        The chosen ones cannot move the mechanism.
-    UsageError
-        An unknown name, or a wrong number of them.
     """
     layout = module.layout
     n_q, n_h, n_c = layout.n_q, layout.n_h, layout.n_c
@@ -96,12 +89,7 @@ def _basis(J: Array, count: int, preferred: tuple[Indices, bool] | None, s: Arra
 
 
 def refuse_inputs(layout: Layout) -> None:
-    """Refuse inputs beside given rates.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse inputs beside given rates."""
     if layout.n_u:
         raise cannot(
             f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; derivatives "

@@ -42,13 +42,7 @@ class Geometry(NamedTuple):
 
 
 def joint_table(module: BoundModel) -> Mapping[str, Any]:
-    """What the model's metadata says of its joints.
-
-    Raises
-    ------
-    UsageError
-        There are no bodies, or the model was generated without these kernels.
-    """
+    """What the model's metadata says of its joints."""
     table = module.info.wrenches
     if table is None:
         raise cannot(

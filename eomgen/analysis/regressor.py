@@ -91,13 +91,7 @@ CHUNK = 4_000_000  #: numbers held at once
 
 
 def standard_names(module: BoundModel) -> tuple[str, ...]:
-    """Names of the columns: ``m(link)``, ``mx(link)``, ..., ``Iyz(link)``, body by body.
-
-    Raises
-    ------
-    UsageError
-        A model without bodies.
-    """
+    """Names of the columns: ``m(link)``, ``mx(link)``, ..., ``Iyz(link)``, body by body."""
     if not module.n_bodies:
         raise cannot(f"model {module.name!r} has no bodies, hence no inertial parameters")
     return tuple(f"{which}({body})" for body in module.body_names for which in STANDARD)

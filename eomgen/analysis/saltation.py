@@ -130,13 +130,7 @@ class AtOneState:
         self.name, self.function = name, function
 
     def __call__(self, t: float, x: Array) -> float:
-        """The value, without the state.
-
-        Raises
-        ------
-        UsageError
-            The function reads the state.
-        """
+        """The value, without the state."""
         try:
             return self.function(t, None)
         except Exception:
@@ -215,13 +209,7 @@ class Move(NamedTuple):
     p: Array  #: (n_p, k)
 
     def along(self, slopes: Array, what: str, names: tuple[str, ...]) -> Array:
-        """The changes (m, k) of a law from its derivatives (m, ...) by x, t, u and p.
-
-        Raises
-        ------
-        UsageError
-            It depends on the rate of an input that is a Python function.
-        """
+        """The changes (m, k) of a law from its derivatives (m, ...) by x, t, u and p."""
         n_x, n_u = len(self.x), len(self.u)
         by_u = slopes[:, n_x + 1 : n_x + 1 + n_u]
         for j in np.flatnonzero(by_u.any(axis=0) & ~np.isfinite(self.u).all(axis=1)):

@@ -523,10 +523,6 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
     leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what damped steps down the
     residual find.
-
-    Raises
-    ------
-    EquilibriumError
     """
     start = search.start(q)
     first, steps, found = newton(search, start, reach=REACH)

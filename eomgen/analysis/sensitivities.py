@@ -174,13 +174,7 @@ class Sensitivities(Result):
 
 
 def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Differentiated:
-    """Sort names into parameters, inputs and held initial values.
-
-    Raises
-    ------
-    UsageError
-        A name is none of them.
-    """
+    """Sort names into parameters, inputs and held initial values."""
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []
     for column, name in enumerate(names):
@@ -241,11 +235,6 @@ def start_sensitivity(
     """dx0 (n_x, k) of an assembled state, with the derivatives of the inputs there.
 
     ``slopes`` are those (n_p,) of held values that follow from parameters, by name.
-
-    Raises
-    ------
-    UsageError
-        The held values cannot all stay when a parameter changes.
     """
     layout, scales = module.layout, module.layout.scales
     n_q, n_v, n_x, n_h, n_c = layout.n_q, layout.n_v, layout.n_x, layout.n_h, layout.n_c
@@ -323,13 +312,7 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
 
 
 def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, columns: Differentiated) -> None:
-    """Refuse parameters and inputs whose change opens a crossing that the run passes.
-
-    Raises
-    ------
-    NoDerivativeError
-        Names the parameter or input, and the time.
-    """
+    """Refuse parameters and inputs whose change opens a crossing that the run passes."""
     layout = module.layout
     by = [(name, layout.n_x + layout.n_u + i) for name, i in _named(columns, columns.parameters)]
     by += [(name, layout.n_x + i) for name, i in _named(columns, columns.inputs)]
@@ -483,12 +466,7 @@ def sensitivities(
 
 
 def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:
-    """Tell of a loss of rank at the state where the derivatives grow without bound.
-
-    Raises
-    ------
-    NoDerivativeError
-    """
+    """Tell of a loss of rank at the state where the derivatives grow without bound."""
     if not module.layout.rank:
         return
     u = forcing(t, x)[:, None] if module.layout.constraint_inputs else None

@@ -113,12 +113,7 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
 
 
 def read_vector(what: str, given: Any, n: int, error: Callable[[str], Exception] = ill_shaped) -> Array:
-    """An array of n floats.
-
-    Raises
-    ------
-    error
-    """
+    """An array of n floats."""
     found = as_real(given)
     if found is None:
         raise error(f"{what} must hold real numbers, ({n},), not {shown(given)}")
@@ -167,12 +162,7 @@ def read_number(what: str, given: Any) -> float:
 
 
 def read_plain(what: str, given: Any) -> float:
-    """One finite real number, as compiled code takes it, which reads no texts.
-
-    Raises
-    ------
-    UsageError
-    """
+    """One finite real number, as compiled code takes it, which reads no texts."""
     if type(given) is float:
         result = given
     else:
@@ -186,13 +176,7 @@ def read_plain(what: str, given: Any) -> float:
 
 
 def read_text(what: str, given: str) -> float:
-    """The value of an expression of numbers as text: ``"10*pi/180"``.
-
-    Raises
-    ------
-    UsageError
-        Texts are read where eomgen is: a generated package has no parser.
-    """
+    """The value of an expression of numbers as text: ``"10*pi/180"``."""
     try:
         from ..model.expressions import constant
     except ImportError:
@@ -214,12 +198,7 @@ def with_numbers(what: str, given: Any, depth: int = 0) -> Any:
 
 
 def read_flag(what: str, given: Any) -> bool:
-    """True or False.
-
-    Raises
-    ------
-    UsageError
-    """
+    """True or False."""
     if not isinstance(given, (bool, np.bool_)):
         raise ill_typed(f"{what} must be True or False, not {shown(given)}")
     return bool(given)
@@ -283,11 +262,6 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
 
     Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
-
-    Raises
-    ------
-    UnavailableError
-        With near misses, an AttributeError too; a property that raised one raises its own again.
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
@@ -319,12 +293,7 @@ def check_names(
 
 
 def read_names(what: str, given: Any) -> tuple[str, ...]:
-    """One name or several as a tuple of texts.
-
-    Raises
-    ------
-    UsageError
-    """
+    """One name or several as a tuple of texts."""
     if isinstance(given, str):
         return (given,)
     try:
@@ -377,13 +346,7 @@ PAIRS = (("p", "parameters"), ("u", "inputs"), ("parameters", "p"), ("inputs", "
 
 
 def both_names(function: Function) -> Function:
-    """The same function, which takes each argument of PAIRS under either name.
-
-    Raises
-    ------
-    UsageError
-        A call gives both.
-    """
+    """The same function, which takes each argument of PAIRS under either name."""
     taken = signature(function).parameters
     others = {other: name for name, other in PAIRS if name in taken and other not in taken}
     place = {name: k for k, name in enumerate(taken)}

@@ -354,13 +354,7 @@ class BoundModel:
         return initial, initial.sort(numbers)
 
     def _initial(self, t: float, p: Any, u: Any, names: Iterable[str] = ()) -> Initial:
-        """The assembly of this model with other parameters and inputs, if given, to values of these names.
-
-        Raises
-        ------
-        UsageError
-            A number where parameters or inputs are meant, since a coordinate bears the name p or u.
-        """
+        """The assembly of this model with other parameters and inputs, if given, to values of these names."""
         layout = self.layout
         for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
             scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)

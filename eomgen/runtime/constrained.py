@@ -96,15 +96,7 @@ def _all_rows(module: BoundModel) -> Any:
 
 
 def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:
-    """Check and project states.
-
-    Raises
-    ------
-    UsageError
-        A wrong shape.
-    ProjectionError
-        The constraints cannot be met near a state.
-    """
+    """Check and project states."""
     layout = module.layout
     if isinstance(p, Mapping):
         p = layout.values("parameter", layout.p, p, module.p)

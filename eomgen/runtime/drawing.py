@@ -39,13 +39,7 @@ PARTS = {
 
 
 def load_show(part: str) -> ModuleType:
-    """A file of ``eomgen.show``.
-
-    Raises
-    ------
-    MissingDependencyError
-        In a generated package, which has no pictures.
-    """
+    """A file of ``eomgen.show``."""
     package = __package__.rpartition(".")[0]
     try:
         return import_module(f"{package}.{PARTS[part]}")
@@ -145,13 +139,7 @@ def trajectory_facts(trajectory: Any) -> tuple[str, list[tuple[str, str]]]:
 
 
 def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundModel:
-    """The module of a run with its parameters bound.
-
-    Raises
-    ------
-    UsageError
-        The trajectory was read from a file or a pickle and no model is given, or one of other coordinates.
-    """
+    """The module of a run with its parameters bound."""
     if model is not None:
         if not hasattr(model, "x_names"):
             raise ill_typed(f"model must be a module, as Model.compile() returns, not {shown(model)}")

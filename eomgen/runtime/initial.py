@@ -193,13 +193,7 @@ class StartBranch:
         return np.asarray(self.lost.T @ (ends[0] - ends[1]) / (2.0 * h * speed**2))
 
     def complete(self, v: Array) -> Array:
-        """The velocities (n,) of the only branch that has the given ones.
-
-        Raises
-        ------
-        AssemblyError
-            No branch has them, or several.
-        """
+        """The velocities (n,) of the only branch that has the given ones."""
         heard = np.abs(self.lost).max(axis=1, initial=0.0) > GONE
         speed = float(self.scales.row_speeds(v)[heard].max(initial=0.0))
         if not speed > ACCEPTED * self.scales.speed(v):
@@ -404,11 +398,6 @@ class Initial:
         Time; matters for driven constraints only.
     names : iterable of str, optional
         Of values that may be held; outputs and places of markers can be among them, and those declared are held too.
-
-    Raises
-    ------
-    UsageError
-        An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
     """
 
     def __init__(self, kernels: Kernels, t: float = 0.0, names: Iterable[str] | None = None) -> None:

@@ -238,15 +238,7 @@ def of_time(function: Callable[..., Any], rate: bool = False) -> Callable[..., A
 
 
 def read_text(layout: Layout, text: str, what: str) -> Expression:
-    """An expression as text, where there is a parser.
-
-    Raises
-    ------
-    MissingDependencyError
-        In a generated package, which has none.
-    UsageError
-        It is no expression, or has a name that the model does not know.
-    """
+    """An expression as text, where there is a parser."""
     try:
         reader = import_module("..model.input_texts", __package__)
     except ImportError:
@@ -585,11 +577,6 @@ def fill_rates(
         Inputs of a run, by name.
     derive : callable
         As :func:`derive`.
-
-    Raises
-    ------
-    UsageError
-        A rate is given of an input that is held.
     """
     found: dict[str, tuple[str, int, Any]] = {}
     signals = layout.info.signals
@@ -612,13 +599,7 @@ def fill_rates(
 
 
 def derive(name: str, rate: str, value: Any) -> Any:
-    """The rate of an input given as a number, expression, Signal or function.
-
-    Raises
-    ------
-    UsageError
-        It is a function that knows none, or would need accelerations.
-    """
+    """The rate of an input given as a number, expression, Signal or function."""
     if isinstance(value, float):
         return 0.0
     if isinstance(value, Expression) and value.rate is not None:

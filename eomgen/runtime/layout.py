@@ -135,13 +135,7 @@ class ModelInfo:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> ModelInfo:
-        """Read what model.json holds.
-
-        Raises
-        ------
-        UsageError
-            It is one of another layout, or lacks entries.
-        """
+        """Read what model.json holds."""
         if data.get("abi") != ABI:
             raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
         try:

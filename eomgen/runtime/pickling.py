@@ -25,13 +25,7 @@ Late = tuple[tuple[str, ...], dict[str, tuple[str, str]]]
 
 
 def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-    """What pickle stores: how to make the module again.
-
-    Raises
-    ------
-    TypeError
-        The code has no file of its own: a hand-made core, or one that calls Python twins of native functions.
-    """
+    """What pickle stores: how to make the module again."""
     core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
     if not file or _find_loaded(name) is not core:
@@ -47,13 +41,7 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
 
 
 def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> Any:
-    """The module of a pickle, with the rarer kernels where they had been made.
-
-    Raises
-    ------
-    ToolchainError
-        The file of its code is gone or damaged, or another user could have written it.
-    """
+    """The module of a pickle, with the rarer kernels where they had been made."""
     core: Any = _find_core(name, file)
     if late is None:
         return kind(core, p, u)

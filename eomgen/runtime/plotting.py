@@ -195,13 +195,7 @@ def choose(
     y: str | Sequence[str] | None,
     kind: str,
 ) -> tuple[list[Curves], str]:
-    """Panels of what is asked for, and the label of their horizontal axis.
-
-    Raises
-    ------
-    UsageError
-        Unknown names, or wishes that do not go together.
-    """
+    """Panels of what is asked for, and the label of their horizontal axis."""
     known = ("t", *trajectory.names)
     asked = [one for name in given for one in read_names("a column", name)]  # a list of names is taken too
     instances = trajectory.metadata.get("instances", {})

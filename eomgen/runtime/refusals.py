@@ -109,14 +109,7 @@ def require_switched(layout: Layout, states: Array) -> None:
 
 
 def refuse_closed(layout: Layout, states: Array, what: str) -> None:
-    """Refuse first-order states (n_s,) with which constraints that close and open are closed.
-
-    Raises
-    ------
-    UnavailableError
-    UsageError
-        Such a state is neither 0 nor 1.
-    """
+    """Refuse first-order states (n_s,) with which constraints that close and open are closed."""
     require_switched(layout, states)
     given = dict(zip(layout.states, states, strict=True))
     names = [name for name, state in layout.switches.items() if given[state] > 0.5]

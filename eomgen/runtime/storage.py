@@ -63,14 +63,6 @@ def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str,
         Whether its members may be; without, they take no more memory than the file has bytes.
     key : str
         What it was sealed with.
-
-    Raises
-    ------
-    FileNotFoundError
-    UsageError
-        It is not a plain file.
-    ValueError
-        It is damaged, or is none of ours.
     """
     with open_plain(path) as file:
         try:
@@ -151,13 +143,7 @@ class Stored:
 
 
 def table_path(path: str | Path, what: str, endings: tuple[str, ...] = TABLES) -> Path:
-    """Where a table is written: an ending of ``.npz`` is added if there is none.
-
-    Raises
-    ------
-    UsageError
-        Another ending than those allowed; a folder, as a name that ends in a slash.
-    """
+    """Where a table is written: an ending of ``.npz`` is added if there is none."""
     target = as_path("path", path)
     if as_name("path", path).endswith(("/", os.sep)):
         raise bad_file(f"{path} is a folder; name a file in it")

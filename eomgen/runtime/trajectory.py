@@ -475,13 +475,7 @@ Start: TypeAlias = Mapping[str, float | str] | ArrayLike | Trajectory | None
 
 
 def last_state(given: Any, names: Sequence[str]) -> Any:
-    """The last state (n_x,) of a run; anything else as it is.
-
-    Raises
-    ------
-    UsageError
-        The run is one of other states.
-    """
+    """The last state (n_x,) of a run; anything else as it is."""
     if not isinstance(given, Trajectory):
         return given
     if tuple(given.x_names) != tuple(names):

@@ -424,11 +424,6 @@ class ConstraintSystem(NamedTuple):
         -------
         Assembly
             The first closed position found without flipped axes; from a good guess the nearest one.
-
-        Raises
-        ------
-        AssemblyError
-            With the rows that stay open, what was held, and whether leaving the given values free helps.
         """
         system, guess = self.closure(held), self.with_values(guess, held)
         best, least, flipped = guess, np.inf, False
@@ -589,11 +584,6 @@ def assemble_velocity(
     Returns
     -------
     (n,) or (n, m) array
-
-    Raises
-    ------
-    AssemblyError
-        The given velocities contradict the constraints or each other.
     """
     v = np.zeros(C_q.shape[1]) if guess is None else np.array(guess, dtype=float)
     free = np.ones(len(v), dtype=bool)

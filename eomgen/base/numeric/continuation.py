@@ -267,12 +267,6 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
     """Move held values, and the time, from where they are to others; the rest follows.
 
     See :class:`HeldPath` for the parameters.  Returns the position (n_q,) at the end.
-
-    Raises
-    ------
-    AssemblyError
-        The way is blocked (a dead centre of what is held), longer than 200 rad or length scales, or too winding for
-        the number of steps allowed, as the many turns of a fine thread are.
     """
     path = HeldPath(system, start, held, end)
     if not path.length <= LONGEST:

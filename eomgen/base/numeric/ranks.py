@@ -441,11 +441,6 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     Returns
     -------
     Partition
-
-    Raises
-    ------
-    PartitionError
-        Fewer than `rank` good pivots: below STATE of the largest entry, or CHOSEN if `strict`.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)

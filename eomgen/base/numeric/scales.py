@@ -120,11 +120,6 @@ def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, floa
     names, kinds : sequences of str
         Coordinates; the kind of Euler parameters, which come in fours, is ``"parameter"``.
     values : mapping of str to float
-
-    Raises
-    ------
-    AssemblyError
-        They have another length.
     """
     result = dict(values)
     parameters = [name for name, kind in zip(names, kinds, strict=True) if kind == "parameter"]

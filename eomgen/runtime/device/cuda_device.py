@@ -160,12 +160,7 @@ def best_architecture(capability: tuple[int, int]) -> str:
 
 
 def load_nvrtc() -> Any:
-    """The module ``cuda.bindings.nvrtc`` with its library.
-
-    Raises
-    ------
-    MissingDependencyError
-    """
+    """The module ``cuda.bindings.nvrtc`` with its library."""
     try:
         from cuda.bindings import nvrtc
 
@@ -203,13 +198,6 @@ class CudaDevice:
     ----------
     number : int, optional
         Which one.
-
-    Raises
-    ------
-    MissingDependencyError
-        cuda-core is not installed, or there is no driver.
-    UsageError
-        There is no such GPU.
     """
 
     def __init__(self, number: int = 0) -> None:
@@ -324,11 +312,6 @@ def require_plain(shape: Sequence[int], dtype: Any, strides: Sequence[int] | Non
     shape, dtype
     strides : sequence of int, optional
         In numbers, not in bytes; in C order if None.
-
-    Raises
-    ------
-    UsageError
-        It holds other numbers than float64, or not in C order.
     """
     if dtype != np.float64:
         raise ill_typed(f"an array on the GPU must hold float64 (double), not {dtype}")

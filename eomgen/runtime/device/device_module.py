@@ -69,13 +69,7 @@ class DeviceFunctions:
         return self._kernels[name]
 
     def columns(self, label: str, given: Any, length: int, count: int | None = None) -> tuple[DeviceArray, int | None]:
-        """Numbers (length,) or (length, k) on the device, and k, or None where they are one column.
-
-        Raises
-        ------
-        UsageError
-            Another shape, or another number of columns than `count`.
-        """
+        """Numbers (length,) or (length, k) on the device, and k, or None where they are one column."""
         found: DeviceArray | Array | None = self.device.view(given)
         if found is None:
             try:
@@ -122,13 +116,7 @@ class BatchCall:
         self.labels = ["t", *labels, "p", "u"] if name in TIMED_ON_DEVICE else [*labels, "p", "u", "t"]
 
     def __call__(self, *given: Any, status: bool = False, **named: Any) -> Any:
-        """Evaluate at one state or many.
-
-        Raises
-        ------
-        UsageError
-            Missing arguments, wrong shapes.
-        """
+        """Evaluate at one state or many."""
         module, device = self.module, self.module.device
         values = self._values(given, named)
         found, count, batch = [], 1, False

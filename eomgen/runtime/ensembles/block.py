@@ -88,13 +88,7 @@ class Runs:
 
     @property
     def events(self) -> Events:
-        """The events that are watched.
-
-        Raises
-        ------
-        UsageError
-            One that only a single run can watch.
-        """
+        """The events that are watched."""
         events = Events(self.module.layout, self.plan.events)
         for event in (*events.functions, *(event for event in events.model if event.action == WAIT)):
             what = "is an impact" if event.action == WAIT else "is a function"
@@ -515,11 +509,6 @@ class Store:
         Made if it is not there.
     identity : dict
         What the results depend on, JSON-like.
-
-    Raises
-    ------
-    UsageError
-        The folder belongs to another ensemble, or holds something else.
     """
 
     def __init__(self, folder: str | Path, identity: dict[str, Any]) -> None:

@@ -53,13 +53,7 @@ class Handle(NamedTuple):
 
 
 def describe(module: BoundModel) -> Handle:
-    """How workers get a module.
-
-    Raises
-    ------
-    UsageError
-        Its code has no file of its own.
-    """
+    """How workers get a module."""
     core: Any = eager(module.core)
     file = Path(str(getattr(core, "__file__", "") or ""))
     if not file.is_file():
@@ -131,11 +125,6 @@ def open_client(cluster: Any) -> Iterator[Any]:
     cluster : True or 'local', int, str, or Client
         A cluster on this machine with a worker for each processor, or with so many; the address of a scheduler; a
         client, which stays open.
-
-    Raises
-    ------
-    MissingDependencyError
-        dask.distributed is not installed.
     """
     distributed: Any = require("distributed", "eomgen[cluster]", "cluster=")
     if isinstance(cluster, distributed.Client):

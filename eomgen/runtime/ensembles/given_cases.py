@@ -47,11 +47,6 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
         Values by the name of a parameter, an input, a coordinate, a rate or an output: a list, or (low, high, count).
     groups : tuple
         Initial values, parameters and inputs beside the grid, by name.
-
-    Raises
-    ------
-    UsageError
-        A name that is not there, or given twice; a group that is an array.
     """
     require_mapping("grid", grid)
     grid = without_dots(grid, module.layout.instances)

@@ -28,13 +28,7 @@ OPTIONS = ("rtol", "atol", "max_step", "first_step")
 
 
 def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
-    """Whether a run needs nothing but the module's own steppers.
-
-    Raises
-    ------
-    UsageError
-        Method Taylor where it cannot be: nobody else has it.
-    """
+    """Whether a run needs nothing but the module's own steppers."""
     core: Any = module.core
     there = isinstance(method, str) and method in core.methods
     if isinstance(method, str) and method == "Taylor":

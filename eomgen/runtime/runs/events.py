@@ -91,13 +91,7 @@ class RunEvent:
         self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
 
     def __call__(self, t: float, x: Array, for_slope: bool = False) -> float:
-        """The value of the user's function at time t and state x.
-
-        Raises
-        ------
-        UsageError
-            It is no number, or one that is not finite, unless it is ``for_slope``: off the path.
-        """
+        """The value of the user's function at time t and state x."""
         value = self.function(t, x)
         found: Any = as_real(value)
         if found is None or found.ndim or not (for_slope or isfinite(found)):
@@ -307,11 +301,6 @@ def at_next_samples(
 
     A sampling time at t itself happens.  A clock that is ahead by more than its period, as that of a state from the end
     of another run, is set back; one that has not begun stays so.
-
-    Raises
-    ------
-    UsageError
-        A period is not positive, a counter not whole, or the `span` of the run goes backwards.
     """
     clocks = module.info.clocks
     if span is not None:
@@ -386,11 +375,6 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
 
     A state from another run, and constraints that are closed by name in `initial`, are taken as they are: an error that
     was there when a constraint closed dies away in the run.
-
-    Raises
-    ------
-    UsageError
-        Tells the equation, its error and how much of one is allowed.
     """
     layout = module.layout
     require_switched(layout, x[layout.n_x - layout.n_states :])

@@ -90,13 +90,7 @@ class Gaps:
         return result
 
     def normals(self, t: float, x: Array) -> Array:
-        """Derivatives of the rates by v, (n, n_v).
-
-        Raises
-        ------
-        UsageError
-            A gap that depends on velocities.
-        """
+        """Derivatives of the rates by v, (n, n_v)."""
         layout, u = self.layout, self.inputs(t, x)
         q, v = np.ascontiguousarray(x[: layout.n_q]), np.ascontiguousarray(x[layout.n_q :])
         rows = np.zeros((len(self.names), layout.n_v))
@@ -150,13 +144,7 @@ class Gaps:
 
 
 def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
-    """The rate of an input that varies, by its place in u.
-
-    Raises
-    ------
-    UsageError
-        It depends on the state.
-    """
+    """The rate of an input that varies, by its place in u."""
     name, value = forcing.names[index], forcing.formulas.get(index, forcing.varying[index])
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
@@ -214,11 +202,6 @@ def find_sliding(
     x : (n_x,) array
     forcing : Forcing, optional
         Inputs that vary.
-
-    Raises
-    ------
-    UsageError
-        An output is not linear in the velocities.
     """
     layout, n_q = module.layout, module.layout.n_q
     names = [name for gap in gaps if gap in rough for name in rough[gap][1]]
@@ -358,11 +341,6 @@ def strike_events(
         Events that happened.
     forcing : Forcing
         Inputs of the run.
-
-    Raises
-    ------
-    UsageError
-        A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws.
     """
     layout, u = module.layout, forcing(t, x)
     module = module.bind(None, u)

@@ -90,11 +90,6 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
     impulses : (n,) array
     change : (m,) array
         z = H impulses.
-
-    Raises
-    ------
-    UsageError
-        The locked coordinates cannot all stop, or gaps cannot open together as fast as they should.
     """
     count = len(e)
     sizes = np.linalg.norm(H, axis=0)

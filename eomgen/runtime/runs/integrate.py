@@ -168,11 +168,6 @@ def integrate(
         The last evaluation that failed, of the module's own methods.
     exception or None
         What stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
-
-    Raises
-    ------
-    ZenoError
-        Resets follow each other ever faster, or lead nowhere.
     """
     core: Any = module.core
     start, end = nodes[0], nodes[-1]

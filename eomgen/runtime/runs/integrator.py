@@ -110,13 +110,6 @@ class Integrator:
         -------
         (n_x,) array
             On the constraints.
-
-        Raises
-        ------
-        SimulationError
-            The integration ended early; its cause is the last failure of a kernel.
-        UsageError
-            Wrong shapes or values, a time that is lost in rounding, or a call while another thread's goes on.
         """
         try:
             if not (isinstance(t, float) and isinstance(h, float) and isfinite(t + h)):

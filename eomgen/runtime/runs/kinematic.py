@@ -274,15 +274,7 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
 
 
 def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
-    """The led coordinates, and those of the independent ones that stand still besides.
-
-    Raises
-    ------
-    UsageError
-        Too many are led, or they depend on each other.
-    PartitionError
-        The position is singular for them.
-    """
+    """The led coordinates, and those of the independent ones that stand still besides."""
     from ..initial import Initial
 
     layout = module.layout
@@ -338,13 +330,7 @@ def _freedom(module: BoundModel, q: Array, t: float) -> str:
 def follow_to_start(
     driven: DrivenCoordinates, q: Array, start: tuple[float, Array], first: tuple[float, Array]
 ) -> Array:
-    """From the initial position to the first point of the range.
-
-    Raises
-    ------
-    PartitionError
-        The way is blocked.
-    """
+    """From the initial position to the first point of the range."""
     (t, y), (t0, y0) = start, first
     length = largest(np.concatenate([(y0 - y) / driven.led_scales, [t0 - t]]))
     if length <= UNMOVED:
@@ -383,13 +369,7 @@ def follow_drivers(
     method: Any,
     options: Mapping[str, Any],
 ) -> KinematicAnalysis | None:
-    """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other.
-
-    Raises
-    ------
-    UsageError
-        Method kinematic for another mechanism, or what only a run that integrates can do.
-    """
+    """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other."""
     if not is_driven(module) or _led_by_inputs(module, inputs, method):
         if method is not None:
             raise cannot(
@@ -432,15 +412,7 @@ def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method:
 
 
 def _follow(module: BoundModel, initial: Start, forcing: Forcing, start: float, end: float) -> _Motion:
-    """The motion over a span.
-
-    Raises
-    ------
-    PartitionError
-        The start is a singular position.
-    SimulationError
-        The drivers come to a position from which they cannot go on.
-    """
+    """The motion over a span."""
     nothing = np.empty(0)
     if initial is None:
         t0, q = start_from(module, None, start)

@@ -302,11 +302,6 @@ class RigidSteps:
     acting : list of (m, 14) arrays
         Contacts of steps since the list was emptied: both shapes, normal (3), first direction across it (3), point (3),
         impulses along the normal and across it (3), which act on the second shape.
-
-    Raises
-    ------
-    UsageError
-        The model has no rigid contacts, or lacks a kernel.
     """
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
@@ -436,15 +431,7 @@ def step_rigidly(
     progress: bool | None,
     options: Mapping[str, Any],
 ) -> RigidRun:
-    """The motion of a mechanism whose contacts between groups are rigid.
-
-    Raises
-    ------
-    UsageError
-        No contacts, no step, options of other methods, shapes deep in each other at the start.
-    SimulationError
-        A state is not finite, or more pairs are near than there is room for.
-    """
+    """The motion of a mechanism whose contacts between groups are rigid."""
     _require_it(module, method)
     given = {key: value for key, value in options.items() if value is not None and value is not False}
     check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))

@@ -55,11 +55,6 @@ def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callab
     t : float
     assembled : callable
         u (n_u,) -> the state assembled with these inputs.
-
-    Raises
-    ------
-    AssemblyError
-        None was found.
     """
     places = layout.constraint_inputs
 
@@ -120,11 +115,6 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
     dict of str to object
         rtol and atol as a float or an (n,) array, rtol at least 100 times the spacing of floating-point numbers; the
         steps as floats, without those that are None.
-
-    Raises
-    ------
-    UsageError
-        A value that cannot be.
     """
     checked = {name: value for name, value in options.items() if value is not None or not name.endswith("_step")}
     for name in ("rtol", "atol"):

@@ -96,12 +96,7 @@ def plan_run(
     limits: Mapping[str, Any],
     options: Mapping[str, Any],
 ) -> Plan:
-    """Read the method, its tolerances and steps (``limits``) and options, inputs and events of a run.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Read the method, its tolerances and steps (``limits``) and options, inputs and events of a run."""
     size, declared, layout = check_method(method, step), declare(module), module.layout
     method = declared["method"] if method is None else method
     watched = events if isinstance(events, Events) else Events(layout, events)
