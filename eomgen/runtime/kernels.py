@@ -220,7 +220,7 @@ def _places(shape: tuple[int, ...]) -> Indices:
 
 
 def batch_of(arrays: Sequence[Any], n: int) -> tuple[int, ...]:
-    """The last axis (k,) of n numbers for each of k states, or none of one state; of several arrays n are all theirs."""
+    """The last axis (k,) of n numbers for each of k states, none of one state; of several arrays n are all theirs."""
     shape = read_numbers("x", arrays[0]).shape
     if len(arrays) == 1 and (shape[:1] != (n,) or len(shape) > 2):
         raise ill_shaped(f"x must have shape ({n},) or ({n}, k), not {shape}")

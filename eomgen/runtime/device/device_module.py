@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, cast
 
@@ -13,8 +12,9 @@ from numpy.typing import ArrayLike
 from ...base.targets import TIMED_ON_DEVICE
 from ...base.value_rules import read_count
 from ...errors import cannot, ill_shaped, ill_typed, incomplete, no_choice, no_such
+from ..ensembles.block import RunBlock
 from ..layout import ModelInfo
-from ..runs.run_arguments import check_method, check_tolerances, declare, find_span, ordered_times, own_step
+from ..runs.run_arguments import declare, find_span, ordered_times, own_step, steps_of
 from ..trajectory import Span
 from .cuda_device import Array, Device, DeviceArray
 
@@ -170,44 +170,6 @@ class BatchCall:
 # -- runs --------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class DeviceRuns:
-    """What became of the runs.
-
-    Attributes
-    ----------
-    x : (n_x, k) array
-        Last states, on the constraints.
-    t : (k,) array
-        Their times.
-    samples : (n_x, m, k) array or None
-        States at the times asked for, on the constraints; NaN where a run did not get to.
-    status : (k,) int array
-        0: the end was reached; 1: an event ended the run; below 0: the run failed, with the numbers of
-        ``simulate_many``: -100 a step became too small, -104 more than max_steps steps, -102 resets follow each other
-        ever faster, -103 a reset failed, -110 the parameters give no constants.
-    failure, failure_time : (k,) arrays
-        Status of the last evaluation that failed, 0 if none did, and its time.
-    steps, rejected, evaluations : (k,) int arrays
-    noted : (k,) int array
-        Number of events.
-    notes : (2 + n_x, m, k) array or None
-        Number, time and state of the first m events of each run; NaN where there were fewer.
-    """
-
-    x: Array
-    t: Array
-    samples: Array | None
-    status: Array
-    failure: Array
-    failure_time: Array
-    steps: Array
-    rejected: Array
-    evaluations: Array
-    noted: Array
-    notes: Array | None = None
-
-
 def carry_out(
     module: DeviceFunctions,
     span: Span,
@@ -220,7 +182,7 @@ def carry_out(
     step: float | None,
     max_steps: int,
     keep_events: int,
-) -> DeviceRuns:
+) -> RunBlock:
     """Run every column of x0; see :meth:`~.device_module.DeviceModule.simulate_many`."""
     if module.facts["no_runs"]:
         raise cannot(f"simulate_many of {module.name!r} on a device: {module.facts['no_runs']}")
@@ -236,12 +198,7 @@ def carry_out(
     methods = [name.upper() for name in module.facts["methods"]]
     if method not in methods:
         raise no_choice(f"no method {method!r} on a device; there are {', '.join(methods)}")
-    step = check_method(method, step)
-    own = {name: declared[name] for name in ("rtol", "atol", "max_step") if name in declared}
-    chosen = own | {k: v for k, v in options.items() if v is not None}
-    if step is not None:
-        chosen |= {"max_step": step, "first_step": step}
-    chosen = check_tolerances(n, abs(end - start), chosen)
+    chosen = steps_of(like, (start, end), method, step, options)
     if not isinstance(chosen["rtol"], float):
         raise ill_shaped(f"rtol must be one number on a device, not of shape {np.shape(chosen['rtol'])}")
     times = np.empty(0) if t_eval is None else ordered_times(t_eval, start, end, n)
@@ -286,7 +243,7 @@ def carry_out(
     if events:
         notes = np.ascontiguousarray(found["notes"].transpose(2, 1, 0))
         notes[2:] = _projected(module, notes[2:], notes[1], p, u)
-    return DeviceRuns(
+    return RunBlock(
         x, found["t"], samples, found["status"], found["failure"], found["failure_time"], steps, rejected,
         evaluations, found["noted"] if events else np.zeros(count, dtype=np.int64), notes,
     )  # fmt: skip
@@ -359,7 +316,7 @@ class DeviceModule(DeviceFunctions):
         step: float | None = None,
         max_steps: int = 1_000_000,
         keep_events: int = 16,
-    ) -> DeviceRuns:
+    ) -> RunBlock:
         """Integrate the equations of motion from many states, every run with steps of its own.
 
         Parameters
@@ -385,8 +342,8 @@ class DeviceModule(DeviceFunctions):
 
         Returns
         -------
-        DeviceRuns
-            With arrays of NumPy.
+        RunBlock
+            With arrays of NumPy: what became of the runs, as of a block of an ensemble.
 
         Raises
         ------

@@ -14,22 +14,14 @@ from numpy.typing import ArrayLike
 
 from ...base.value_rules import read_count
 from ...errors import bad_data, ill_typed, no_choice, untrue
-from ..argument_checks import check_names, require_room, require_steps, without_dots
+from ..argument_checks import check_names, require_room, without_dots
 from ..identity import code_digest, digest
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted
 from ..runs.compiled import can_run
 from ..runs.events import require_forward
-from ..runs.run_arguments import (
-    check_method,
-    check_tolerances,
-    declare,
-    find_span,
-    longest_step,
-    ordered_times,
-    own_step,
-)
+from ..runs.run_arguments import declare, find_span, ordered_times, own_step, steps_of
 from ..trajectory import Span
 from .block import (
     GRAIN,
@@ -245,14 +237,7 @@ def _plan(
     forcing = Forcing(module.layout, tables)
     forcing.require_finite()
     can_run(module, method, forcing)  # refuses what no other method stands in for
-    step = check_method(method, step)
-    if step is not None:
-        require_steps("step", step, start, end)
-        options = {**options, "max_step": step, "first_step": step}
-    own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
-    chosen = own | {k: v for k, v in options.items() if v is not None}
-    chosen = check_tolerances(module.n_x, abs(end - start), chosen)
-    require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)
+    chosen = steps_of(module, (start, end), method, step, options)
     times = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     most, kept = read_count("max_steps", max_steps, 1), read_count("keep_events", watched[1], 1)
     return Plan((start, end), method, chosen, most, times, tables, watched[0], kept, constants)

@@ -26,7 +26,7 @@ from ...errors import (
     no_number,
     off_range,
 )
-from ..argument_checks import as_real, read_flag, read_number, read_numbers, read_times, unknown
+from ..argument_checks import as_real, read_flag, read_number, read_numbers, read_times, require_steps, unknown
 from ..initial import Initial
 from ..inputs import Forcing
 from ..trajectory import Span, Start, last_state
@@ -235,6 +235,21 @@ def check_method(method: Any, step: Any) -> float | None:
     if (isinstance(method, str) and method == "RK4") != (step is not None):
         raise incomplete("method RK4 needs step=, the size of its steps (s), and no other method takes it but moreau")
     return None if step is None else check_step("step", step)
+
+
+def steps_of(
+    module: BoundModel, span: tuple[float, float], method: str, step: Any, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Tolerances and limits of the steps of many runs, checked: those given, else the model's own."""
+    size, declared = check_method(method, step), declare(module)
+    if size is not None:
+        require_steps("step", size, *span)
+        options = {**options, "max_step": size, "first_step": size}
+    given = {name: value for name, value in options.items() if value is not None}
+    own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
+    found = check_tolerances(module.n_x, abs(span[1] - span[0]), own | given)
+    require_steps("max_step", float(found.get("max_step", np.inf)), *span)
+    return found
 
 
 def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
