@@ -354,7 +354,7 @@ def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
         y = float(outputs(q, zero, zero, t=t)[k])
         if of_velocities:
             return y, np.asarray(row[n_q : n_q + n_v])
-        return y, np.array([row[:n_q] @ places.rates(q, unit) for unit in np.eye(len(places.q))])
+        return y, np.asarray(row[:n_q] @ places.rates(q, np.eye(len(places.q))))
 
     known = {"m": layout.length, "rad": 1.0}.get(layout.unit(name).removesuffix("/s"))
     size = float(np.abs(by_v if of_velocities else by_q).max(initial=0.0))
@@ -633,7 +633,7 @@ class Initial:
     def side(self, q: Array) -> float:
         """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
         layout = self.layout
-        J = self.scales.jacobian(self._C_q(q, t=self.t))
+        J = self.scaled_jacobian(q)
         dependent = np.delete(np.arange(layout.n_v), layout.independent)
         return float(np.linalg.det(J[np.ix_(layout.rows, dependent)])) if len(layout.rows) else 1.0
 
@@ -645,7 +645,7 @@ class Initial:
         Rates of shape (m,) give m motions at this position, velocities (n, m).
         """
         if self.layout.n_c:
-            require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
+            require_rank(self.kernels, self.scaled_jacobian(q))
         declared = {name: x for name, x in self.sort(self.layout.initial).rates.items() if name not in (given or {})}
         if given is not None:
             self._require_motion(q, given)
@@ -679,7 +679,7 @@ class Initial:
         layout = self.layout
         if not layout.n_c:
             return
-        J = self.scales.jacobian(self._C_q(q, t=self.t))
+        J = self.scaled_jacobian(q)
         basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}) / self.scales.q  # what driven constraints impose
         for name, values in given.items():

@@ -107,7 +107,7 @@ class Gaps:
                     raise cannot(
                         f"gap {self.names[i]}: this output depends on velocities; a gap must depend on positions only"
                     )
-                rows[i] = by_velocity(layout, q, slopes[j, : layout.n_q])
+                rows[i] = slopes[j, : layout.n_q] @ layout.scales.rates(q, np.eye(layout.n_v))
         return rows
 
     def rates(self, t: float, x: Array, rows: Array | None = None) -> Array:
@@ -157,13 +157,6 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     if any(forcing(t, x + move)[index] != forcing(t, x)[index] for move in ELSEWHERE * np.eye(len(x))):
         raise cannot(words)
     return float(drift(lambda time: forcing(time, x)[[index]], t)[0])
-
-
-def by_velocity(layout: Layout, q: Array, slope: Array) -> Array:
-    """Derivative of a rate by v from that of the value by q: N^T slope."""
-    if layout.space is None:
-        return slope
-    return np.array([slope @ layout.space.rates(q, e) for e in np.eye(layout.n_v)])
 
 
 def allowance(layout: Layout, names: Sequence[str], tolerance: float) -> Array:
@@ -366,7 +359,8 @@ def strike_events(
     for i in gaps:
         if np.abs(slopes[i][layout.n_q :]).max(initial=0.0) > 0.0:
             raise cannot(f"event {events[i]['name']}: a gap must depend on positions only, not on velocities")
-    rows = np.array([by_velocity(layout, q, slopes[i][: layout.n_q]) for i in gaps])
+    N = layout.scales.rates(q, np.eye(layout.n_v))
+    rows = np.array([slopes[i][: layout.n_q] @ N for i in gaps])
     moved = moving_inputs(layout, u)
     rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
     names = [str(events[i]["name"]) for i in gaps]
