@@ -18,7 +18,6 @@ from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
 from ..base.numeric.projection import tangent_projector
 from ..base.numeric.ranks import Partition, partition, rank
-from ..base.numeric.scales import Scales
 from ..errors import ill_chosen
 from ..runtime.argument_checks import read_names, unknown
 
@@ -83,12 +82,12 @@ def find_tangent(
     strict = independent is not None
     C_q = module.kernels.constraint_jacobian(x[:n_q], t=t)
     J = scales.jacobian(C_q)
-    B, velocities = _basis(J, layout.rank, preferred, strict, scales)
+    B, velocities = null_basis(J, layout.rank, preferred, strict, scales.q)
     if n_h == layout.n_c:
         Z, positions = B, velocities
     else:  # the others follow in their order, so that as many as possible have the names of velocities
         order = np.concatenate([velocities, np.setdiff1d(np.arange(layout.n_v), velocities)])
-        Z, positions = _basis(J[:n_h], rank(J[:n_h]).rank, order, False, scales)
+        Z, positions = null_basis(J[:n_h], rank(J[:n_h]).rank, order, False, scales.q)
     moving = layout.n_v - len(layout.states)
     Z, positions = (Z, positions) if states else (Z[:, positions < moving], positions[positions < moving])
     dq = scales.rates(x[:n_q], Z)
@@ -113,12 +112,10 @@ def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     return np.array([*chosen, *range(moving, layout.n_v)], dtype=np.intp)
 
 
-def _basis(
-    J: Array, count: int, preferred: Sequence[int] | Indices, strict: bool, scales: Scales
-) -> tuple[Array, Indices]:
-    """Basis of the null space of scaled rows, in units, and the columns that are independent in it."""
+def null_basis(J: Array, count: int, preferred: Indices, strict: bool, s: Array) -> tuple[Array, Indices]:
+    """Basis of the null space of scaled rows, in the units of sizes s (n,), and the columns independent in it."""
     split = partition(J, count, preferred, strict)
-    return scales.q[:, None] * split.B / scales.q[split.independent], split.independent
+    return s[:, None] * split.B / s[split.independent], split.independent
 
 
 def _velocity_change(layout: Layout, x: Array, rates: Array, dq: Array) -> Array:

@@ -10,11 +10,18 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
 from ..base.numeric.projection import minimum_norm
-from ..base.numeric.ranks import partition, rank
+from ..base.numeric.ranks import rank
 from ..errors import cannot, ill_chosen, ill_shaped, no_choice
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_closed, require_support
-from .balance import TangentSpace, displacement_names, displacement_rates, find_tangent, projected_directions
+from .balance import (
+    TangentSpace,
+    displacement_names,
+    displacement_rates,
+    find_tangent,
+    null_basis,
+    projected_directions,
+)
 from .linearization import Linearization, own_accelerations
 
 if TYPE_CHECKING:
@@ -55,16 +62,11 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     slopes, at_rest, C_q = rows[:n_h, :n_q], rows[n_h : n_h + n_c, :n_q], rows[n_h : n_h + n_c, n_q : layout.n_x]
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
-    places = _chosen(layout.q, names, n_q - count)
-    if places is None and layout.info.independent_places:
-        places = (
-            np.array([layout.q.index(name) for name in layout.info.independent_places], dtype=np.intp),
-            False,
-        )
-    Z, positions = _basis(J, count, places, layout.place_scales.q)
-    velocities = _chosen(layout.v, names, layout.n_dof)
-    preferred = (layout.independent, False) if velocities is None else velocities
-    B, moving = _basis(layout.scales.jacobian(C_q), layout.rank, preferred, layout.scales.q)
+    declared = [layout.q.index(name) for name in layout.info.independent_places] or range(n_q)
+    places = _chosen(layout.q, names, n_q - count) or (np.array(declared, dtype=np.intp), False)
+    Z, positions = null_basis(J, count, *places, layout.place_scales.q)
+    velocities = _chosen(layout.v, names, layout.n_dof) or (layout.independent, False)
+    B, moving = null_basis(layout.scales.jacobian(C_q), layout.rank, *velocities, layout.scales.q)
     dv = -minimum_norm(C_q, at_rest @ Z, layout.scales) if n_c else np.zeros((layout.n_v, Z.shape[1]))
     dv = dv - B @ dv[moving]  # the independent velocities stay
     return TangentSpace(positions, moving, Z, B, np.block([[Z, np.zeros((n_q, B.shape[1]))], [dv, B]]))
@@ -79,13 +81,6 @@ def _chosen(among: Sequence[str], names: Sequence[str], count: int) -> tuple[Ind
         named = ", ".join(among[k] for k in found)
         raise ill_chosen(f"independent must name {count} different ones of {', '.join(among)}, not {named}")
     return np.array(found, dtype=np.intp), True
-
-
-def _basis(J: Array, count: int, preferred: tuple[Indices, bool] | None, s: Array) -> tuple[Array, Indices]:
-    """Basis of the null space of scaled rows, in units, and the columns that are independent in it."""
-    columns, strict = (np.arange(J.shape[1]), False) if preferred is None else preferred
-    split = partition(J, count, columns, strict)
-    return s[:, None] * split.B / s[split.independent], split.independent
 
 
 def refuse_inputs(layout: Layout) -> None:
