@@ -24,7 +24,7 @@ from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..base.names import place_of_marker
 from ..base.results import Result, ResultTable, plain, same_keys
 from ..errors import NoDerivativeError, SimulationError, at_odds, ill_placed, ill_typed, incomplete, untrue
-from ..runtime.argument_checks import check_names, read_names, read_number, require_steps, unknown
+from ..runtime.argument_checks import check_names, plain_name, read_names, read_number, require_steps, unknown
 from ..runtime.change_points import scaled_jacobians, singular_values
 from ..runtime.columns import Named
 from ..runtime.failure import place
