@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .analysis.regressor import regressor as _regressor
     from .analysis.regressor import standard_parameters as _standard_parameters
     from .analysis.sensitivities import sensitivities as _sensitivities
+    from .codegen.targets.web import page as _page
     from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
     from .runtime.drawing import draw as _draw
