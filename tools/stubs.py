@@ -6,16 +6,19 @@ has the rest.
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from inspect import Parameter, cleandoc
 from pathlib import Path
 
-from eomgen.elements.element_type import ElementType
-from eomgen.model import element_methods
-from eomgen.model.element_methods import ElementMethods, methods
-from eomgen.model.methods import RESULTS, arguments_of, documentation_of
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # of the eomgen beside this file, whichever is installed
 
-HOME = Path(element_methods.__file__).with_suffix(".pyi")
+from eomgen.elements.element_type import ElementType  # noqa: E402
+from eomgen.model.element_methods import ElementMethods, methods  # noqa: E402
+from eomgen.model.methods import RESULTS, arguments_of, documentation_of  # noqa: E402
+
+HOME = ROOT / "eomgen" / "model" / "element_methods.pyi"
 _HEAD = '''# Written by python tools/stubs.py from the tables of types.
 
 from collections.abc import Mapping, Sequence

@@ -84,7 +84,6 @@ def parse(
     resolve: Resolve,
     locate: Locate | None = None,
     any_function: bool = False,
-    plain: Callable[[str], str] = str,
 ) -> Expr:
     """The graph expression of a text.
 
@@ -100,8 +99,6 @@ def parse(
         Gives the expression of a marker's motion; without it such calls are refused.
     any_function : bool, optional
         Whether functions that the graph does not declare pass; what they stand for has no meaning then.
-    plain : callable, optional
-        ``leg1.hip`` of an instance of a component -> ``leg1_hip``; other names with dots are refused.
 
     Returns
     -------
@@ -143,7 +140,7 @@ def parse(
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
-    return _Walker(text, start, graph, resolve, locate, any_function, plain).walk(body[0].value, 0)
+    return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
 
 
 def names_in(text: str) -> list[str]:
@@ -171,7 +168,6 @@ class _Walker:
     resolve: Resolve
     locate: Locate | None
     any_function: bool
-    plain: Callable[[str], str]
     words: Mapping[str, tuple[int, int]] = field(default_factory=function_words)
     size: int = 0
 
@@ -188,9 +184,7 @@ class _Walker:
         if isinstance(node, ast.Constant):
             return self.number(node)
         if isinstance(node, ast.Name):
-            return self.name(node, node.id)
-        if isinstance(node, ast.Attribute) and (name := self.plain(_label(node))).isidentifier():
-            return self.name(node, name)
+            return self.name(node)
         if isinstance(node, ast.BinOp):
             return self.binary(node, depth)
         if isinstance(node, ast.UnaryOp):
@@ -223,13 +217,13 @@ class _Walker:
             raise self.fault(node, "the number is too large", "numbers go up to 1.7e308")
         return self.graph.constant(number)
 
-    def name(self, node: ast.expr, name: str) -> Expr:
-        if name == "pi":
+    def name(self, node: ast.Name) -> Expr:
+        if node.id == "pi":
             return self.graph.constant(math.pi)
-        if name in self.words or name in self.graph.functions:
-            raise self.fault(node, f"{name!r} is a function", f"write {name}(...)")
+        if node.id in self.words or node.id in self.graph.functions:
+            raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
         try:
-            return self.resolve(name)
+            return self.resolve(node.id)
         except ExpressionError as error:
             raise self.fault(node, error.message, error.remedy, error.code) from None
 

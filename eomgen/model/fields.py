@@ -74,7 +74,7 @@ STATE: Fields = {
     ),
     "period": k.Scalar("time from one sampling time to the next (s)", dimension=TIME),
     "offset": k.Scalar("a sampling time (s)", default=0.0, dimension=TIME),
-    "initial": k.Scalar("its value where a run begins, of parameters", default=0.0),
+    "initial": k.Scalar("its value where a run begins, of parameters", default=0),
     "unit": k.Unit("unit of the state; an initial value that is a number is converted to SI", default=""),
     "doc": _DOC,
     "latex": _LATEX,

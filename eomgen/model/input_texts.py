@@ -10,6 +10,7 @@ from ..expr.core import Expr, Graph, symbols_of
 from ..expr.differentiate import gradient, jvp
 from ..expr.schedule import Tape, record_tape
 from .expressions import parse
+from .visit import rewritten
 
 
 class Names(NamedTuple):
@@ -62,7 +63,7 @@ def record_text(text: str, names: Names, unknown: Callable[[str], Exception]) ->
             raise unknown(name)
         return graph.symbol(name)
 
-    return _record(text, names, parse(text, graph, resolve, plain=names.plain))
+    return _record(text, names, parse(rewritten(text, names.plain), graph, resolve))
 
 
 def _record(text: str, names: Names, expression: Expr) -> RecordedText:

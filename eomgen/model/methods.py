@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import ElementType
 from ..elements.joints import JOINTS
-from ..elements.kinds import Field, Law, items
+from ..elements.kinds import Field, Law, Rates, Text, items
 from ..errors import UsageError, at_odds, ill_typed, no_such
 from .description import DescribedEntry
 from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
@@ -176,13 +176,15 @@ def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, 
 
 
 def _said(model: Described, found: ElementType, given: dict[str, Any]) -> dict[str, Any]:
-    """What a model file would write of an entry that is no element; texts and whole numbers by default say nothing."""
+    """What a model file would write of an entry that is no element; whole numbers by default say nothing."""
     values, refer = dict[str, Any](), References(model)
     for key, value in given.items():
-        default = "" if found.keys[key].default is None else found.keys[key].default
-        plain = isinstance(value, str | int) and not isinstance(default, float)
-        if not (plain and value == default) and not (isinstance(value, dict) and not value):
-            values[key] = found.keys[key].reference(value, refer)
+        field = found.keys[key]
+        kind = Text if isinstance(value, str) else Rates
+        empty = isinstance(value, str | dict) and not value and isinstance(field, kind)
+        whole = isinstance(value, int) and not isinstance(field.default, float) and value == field.default
+        if not empty and not whole:
+            values[key] = field.reference(value, refer)
     return values
 
 

@@ -106,7 +106,9 @@ def with_sympy(value: Any, change: Callable[[Any], Any]) -> Any:
     if isinstance(value, Mapping):
         return {key: with_sympy(part, change) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return type(value)(with_sympy(part, change) for part in value)
+        return getattr(value, "_make", type(value))(with_sympy(part, change) for part in value)
+    if hasattr(value, "todok"):  # a mutable matrix of SymPy
+        return type(value)(*value.shape, [with_sympy(part, change) for part in value])
     listed = items(value)
     return value if listed is None else [with_sympy(part, change) for part in listed]
 

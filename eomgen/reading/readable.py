@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from ..base.names import acceleration_name, hint
 from ..base.notation import Notation, split_rate
@@ -80,6 +80,7 @@ def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
 # -- rows of the table -------------------------------------------------------------------------------------------------
 
 
+Made = TypeVar("Made")  #: what a quantity is
 Derived = tuple[Kinematics, Mobility, TreeEquations]
 Names = list[tuple[str, Expr]]
 Choose = Callable[[Quantities], Sequence[Expr]]
@@ -89,7 +90,7 @@ ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
 SHOWN = 8  #: names that a message lists
 
 
-class Quantity(cached_property[Any]):
+class Quantity(cached_property[Made]):
     """A row of the table: an attribute that is made when it is first asked for.
 
     Parameters
@@ -104,7 +105,7 @@ class Quantity(cached_property[Any]):
     """
 
     def __init__(
-        self, make: Callable[[Any, str], Any], doc: str | None, offered: str = "", by_name: bool = False
+        self, make: Callable[[Any, str], Made], doc: str | None, offered: str = "", by_name: bool = False
     ) -> None:
         super().__init__(lambda equations: make(equations, self.name))
         self.__doc__, self.offered, self.by_name = doc, offered, by_name
@@ -114,7 +115,9 @@ class Quantity(cached_property[Any]):
         self.name = name
 
 
-def scalar(doc: str, offered: str = "", form: Callable[[Quantities], Expr] | None = None, prefix: str = "") -> Quantity:
+def scalar(
+    doc: str, offered: str = "", form: Callable[[Quantities], Expr] | None = None, prefix: str = ""
+) -> Quantity[Any]:
     """A row of one expression, formed by the attribute of its name or by ``form``; its parts begin with ``prefix``."""
 
     def make(equations: Readable, name: str) -> Any:
@@ -123,7 +126,7 @@ def scalar(doc: str, offered: str = "", form: Callable[[Quantities], Expr] | Non
     return Quantity(make, doc, offered)
 
 
-def column(doc: str, offered: str = "", form: Choose | None = None) -> Quantity:
+def column(doc: str, offered: str = "", form: Choose | None = None) -> Quantity[Any]:
     """A row of a SymPy column."""
     return Quantity(
         lambda eqs, name: eqs._matrix(name, lambda s: [(x,) for x in (form or attrgetter(name))(s)], 1), doc, offered
@@ -135,12 +138,12 @@ def matrix(
     doc: str,
     offered: str = "",
     form: Callable[[Quantities], Sequence[Sequence[Expr]]] | None = None,
-) -> Quantity:
+) -> Quantity[Any]:
     """A row of a SymPy matrix."""
     return Quantity(lambda eqs, name: eqs._matrix(name, form or attrgetter(name), columns(eqs)), doc, offered)
 
 
-def quantity(offered: str = "", by_name: bool = False) -> Callable[[Callable[[Any], Any]], Quantity]:
+def quantity(offered: str = "", by_name: bool = False) -> Callable[[Callable[[Any], Made]], Quantity[Made]]:
     """A row that a method makes."""
     return lambda make: Quantity(lambda eqs, _: make(eqs), make.__doc__, offered, by_name)
 
@@ -569,7 +572,7 @@ class Readable(ABC):
 
     # -- how quantities are formed and written -------------------------------------------------------------------------
     @classmethod
-    def rows(cls) -> Iterator[Quantity]:
+    def rows(cls) -> Iterator[Quantity[Any]]:
         """The rows of the table."""
         return (row for row in vars(Readable).values() if isinstance(row, Quantity))
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tools.stubs import write
+
 ROOT = Path(__file__).parents[2]
 
 #: An expression of a user's file -> the class that a checker must see.
@@ -88,6 +90,7 @@ WRONG = {
 
 def check(tmp_path: Path, text: str) -> list[str]:
     """Lines that mypy prints of a user's file, with what a wheel holds beside it."""
+    write()
     site = tmp_path / "site"
     shutil.copytree(ROOT / "eomgen", site / "eomgen", ignore=shutil.ignore_patterns("__pycache__", "built"))
     (tmp_path / "mine.py").write_text(text)

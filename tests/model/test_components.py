@@ -476,6 +476,15 @@ def test_calls_of_a_module(module: Any, door: str) -> None:
     np.testing.assert_array_equal(np.asarray(dotted), np.asarray(plain))
 
 
+def test_an_instance_may_have_the_name_of_a_keyword(folder: Path) -> None:
+    m = eg.Model("m")
+    m.add(eg.load(folder / "parts" / "link.yaml"), "in_", at=m.ground)
+    m.output("twice", "2*in.hinge")
+    traj = m.compile(target="numpy").simulate(0.5, events={"zero": "in.hinge - t"})
+    np.testing.assert_array_equal(traj["twice"], 2 * traj["in.hinge"])
+    np.testing.assert_allclose(traj.x_events["zero"][0][0], traj.t_events["zero"][0], rtol=1e-9)
+
+
 VERBS = [  # words of the command line
     ("run", "--set", "a.q=0.2", "--set", "b.l=0.4", "--set", "b.tau=0.1", "--end", "0.1", "--target", "numpy"),
     ("run", "--set", "vx(a.rod.end)=0.2", "--set", "x(b.rod.end)=0.3", "--end", "0.1", "--target", "numpy"),

@@ -6,6 +6,7 @@ import inspect
 import json
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -246,9 +247,15 @@ def test_unnamed_markers_of_outputs_get_names(tmp_path: Path) -> None:
     assert before == m.to_yaml() == again.to_yaml()  # writing changes nothing, and nothing is named twice
 
 
+class Place(NamedTuple):
+    x: float
+    y: float
+    z: float
+
+
 def test_markers_that_nothing_speaks_of_are_left_out() -> None:
     m = arm()
-    m.body("lower_2", mass=1)
+    m.body("lower_2", mass=1, com=Place(0.0, 0.0, 2.0))
     assert "lower_2.at" not in m.to_yaml()
     m.ground.at(5, 5, 5).position  # noqa: B018 - asked for, not used
     assert "[5, 5, 5]" not in m.to_yaml()

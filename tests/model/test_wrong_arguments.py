@@ -151,6 +151,32 @@ def test_messages_name_the_argument_and_what_is_allowed() -> None:
     refuses("EG-TYPE a", lambda: base().ground.distance("a"))
 
 
+#: Method -> its arguments that are neither a mapping nor empty: both are refused where they stand.
+EMPTY = {"body": "solids points com principal about axes check_inertia display mass", "input": "value signal",
+         "parameter": "value", "table": "x y z kind", "state": "rate initial", "output": "expression",
+         "event": "expression terminal direction restitution friction"}  # fmt: skip
+
+
+@pytest.mark.parametrize(("method", "key"), [(name, key) for name, keys in EMPTY.items() for key in keys.split()])
+def test_what_is_empty_is_no_value_left_out(method: str, key: str) -> None:
+    needed = {p.name: RIGHT[p.name] for p in arguments(getattr(base(), method)) if p.name in RIGHT}
+    needed |= {"name": "w", **({"mass": 1} if method == "body" else {})}
+    for value in ({}, ""):
+        m = base()
+        getattr(m, method)(**needed | {key: value})
+        with pytest.raises(eg.ModelError) as caught:
+            m.check()
+        assert any(f".w.{key}" in p.path and "missing" not in p.message for p in caught.value.problems), value
+
+
+def test_what_is_empty_by_default_is_left_out() -> None:
+    m = base()
+    m.event("e", "qa", reset={}, doc="")
+    m.state("s", "-s", initial=0, unit="", doc="", latex="")
+    assert "e: qa\n" in m.to_yaml()
+    assert "s: -s\n" in m.to_yaml()
+
+
 # -- places of arguments, and what is left out ------------------------------------------------------------------------
 
 

@@ -6,6 +6,7 @@ import ast
 import base64
 import inspect
 import io
+import pkgutil
 import re
 import resource
 import shlex
@@ -97,6 +98,15 @@ def test_commands_run_in_order(path: Path, here: Path) -> None:
         assert program == "eomgen"
         result = command.run(*words, cwd=here)
         assert result.code == 0, f"{line}\n{result.err}"
+
+
+def test_functions_of_the_reference_say_what_they_take() -> None:
+    named = re.findall(r"autofunction:: (\S+)", "".join(p.read_text() for p in (DOCS / "reference").glob("*.md")))
+    assert named
+    for function in map(pkgutil.resolve_name, named):
+        assert not inspect.signature(function).parameters or "Parameters\n" in (inspect.getdoc(function) or ""), (
+            function
+        )
 
 
 SCRIPTS = {

@@ -9,6 +9,7 @@ A clock is an event, t - offset - k period, and the state that holds k, the numb
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -224,6 +225,9 @@ def _listed(given: Any) -> list[tuple[str | None, Any]]:
     return [(None, given)]
 
 
+_INSTANCE = re.compile(r"\b[A-Za-z_]\w*\.")  #: before a dot, also a word of Python
+
+
 def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Expression]:
     """An event by its text, or by a mapping with the keys of a model file."""
     options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
@@ -236,7 +240,8 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Ex
         raise no_choice(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = RunEvent(None, name or text, options.get("terminal"), direction)
     formula = read_text(layout, text, f"event {name or text!r}")
-    if isinstance(getattr(parse_module(text.strip()).body[0], "value", None), (ast.Compare, ast.BoolOp)):
+    plain = _INSTANCE.sub("_", text.strip())
+    if isinstance(getattr(parse_module(plain).body[0], "value", None), (ast.Compare, ast.BoolOp)):
         remedy = "give the difference of its sides: a - b for a > b"
         raise UsageError(f"event {name or text!r} is a comparison, which has no zero; {remedy}", code="EG-EVENT")
     return event, formula
