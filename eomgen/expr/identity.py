@@ -133,8 +133,23 @@ def vanishes(
     graph = common_graph(outputs)
     if graph is None:
         return []
-    of = [[y] for y in outputs] if pieces else _branches(graph, outputs)
-    flat = [x for branches in of for x in branches]
+    of = [frozenset[int]()] * len(outputs) if pieces else _roots(graph, outputs)
+    plain = [k for k, roots in enumerate(of) if roots is not None]
+    found = _vanish([outputs[k] for k in plain], within, unknown)
+    passed = {k for k, zero in zip(plain, found, strict=True) if zero}
+    for roots in {own for k in passed if (own := of[k])}:
+        alike = [k for k in sorted(passed) if of[k] == roots]
+        signed = [outputs[k] for k in alike]
+        for root in (Expr(graph, i) for i in sorted(roots)):
+            signed += substitute(signed, {root: -root})
+        others = np.reshape(_vanish(signed[len(alike) :], within, unknown), (-1, len(alike)))
+        zeros: np.ndarray = np.all(others, axis=0)
+        passed -= {k for k, zero in zip(alike, zeros, strict=True) if not zero}
+    return [k in passed for k in range(len(outputs))]
+
+
+def _vanish(flat: Sequence[Expr], within: float | None, unknown: bool) -> list[bool]:
+    """What :func:`vanishes` gives, with the signs that roots have alone."""
     left = dict.fromkeys(range(len(flat)), 0)  # points passed
     found, values = set[int](), dict[str, float]()
     random = np.random.default_rng(11)
@@ -147,15 +162,16 @@ def vanishes(
         zero = is_rounding(numbers, bounds) if within is None else np.abs(numbers) < within
         known = np.isfinite(numbers) & np.isfinite(bounds)
         left = {k: left[k] + z for k, z, some in zip(left, zero, known, strict=True) if z or not some}
-        for k in [k for k, passed in left.items() if passed == TRIES]:
-            del left[k]
-            if within is not None or (
-                is_rounding(*with_likely_bounds([flat[k]], values)) and _is_flat(flat[k], values)
-            ):
-                found.add(k)
-    verdicts = iter([k in found or (unknown and k in left) for k in range(len(flat))])
-    judged = [[next(verdicts) for _ in branches] for branches in of]
-    return [bool(own) and all(own) for own in judged]
+        done = [k for k, passed in left.items() if passed == TRIES]
+        left = {k: passed for k, passed in left.items() if passed < TRIES}
+        if within is None and done:
+            rounding = is_rounding(*with_likely_bounds([flat[k] for k in done], values))
+            done = [k for k, zero in zip(done, rounding, strict=True) if zero]
+            done = [
+                k for k, flat_there in zip(done, _are_flat([flat[k] for k in done], values), strict=True) if flat_there
+            ]
+        found |= set(done)
+    return [k in found or (unknown and k in left) for k in range(len(flat))]
 
 
 def dependence(
@@ -168,7 +184,7 @@ def dependence(
 
     ``moved`` has other values of symbols at the first points; names ``given`` stand for expressions and join ``at``.
     """
-    k, m = (len(next(iter(values.values()))) for values in (at, moved))
+    k, m = (len(next(iter(values.values()), ())) for values in (at, moved))
     wide = {name: np.concatenate([x, np.tile(x[:m], len(moved))]) for name, x in at.items()}
     for j, (name, x) in enumerate(moved.items()):
         wide[name][k + m * j : k + m * (j + 1)] = x
@@ -176,7 +192,7 @@ def dependence(
         wide[name] = with_bounds([expression], wide)[0][0]
         at[name] = wide[name][:k]
     values, bounds = with_bounds(outputs, wide)
-    v, e = (x[:, k:].reshape(-1, len(moved), m) for x in (values, bounds))
+    v, e = (x[:, k:].reshape(len(outputs), len(moved), m) for x in (values, bounds))
     before, known = (x[:, None, :m] for x in (values, bounds))
     with np.errstate(all="ignore"):
         same: np.ndarray = np.all(is_rounding(v - before, np.maximum(known + e, np.abs(before))), axis=2)
@@ -190,12 +206,15 @@ def random_point(outputs: Sequence[Expr], random: np.random.Generator, signs: bo
     return dict(zip(names, (sizes * random.choice((-1.0, 1.0), len(names)) if signs else sizes).tolist(), strict=True))
 
 
-def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
-    """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
-    names = sorted(symbols_of([x]))
-    slopes, bounds = with_likely_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
-    strict, likely = _slopes_of_terms(x, names, values)
-    return bool(is_rounding(slopes, np.maximum(bounds, np.minimum(strict, CHANCE * likely))).all())
+def _are_flat(outputs: Sequence[Expr], values: Mapping[str, float]) -> list[bool]:
+    """Whether the slopes by each symbol are rounding, also of the terms' own slopes, which folded constants hide."""
+    names = [sorted(symbols_of([x])) for x in outputs]
+    slopes = [gradient(x, [x.graph.symbol(name) for name in own]) for x, own in zip(outputs, names, strict=True)]
+    found, bounds = with_likely_bounds([slope for own in slopes for slope in own], values)
+    terms = [_slopes_of_terms(x, own, values) for x, own in zip(outputs, names, strict=True)]
+    strict, likely = (np.concatenate([own[k] for own in terms]) if terms else np.empty(0) for k in (0, 1))
+    zero = iter(is_rounding(found, np.maximum(bounds, np.minimum(strict, CHANCE * likely))))
+    return [bool(np.all([next(zero) for _ in own])) for own in names]
 
 
 def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -250,26 +269,24 @@ def terms_of(x: Expr) -> Expr:
     return found[x.id]
 
 
-def _branches(graph: Graph, outputs: Sequence[Expr]) -> list[list[Expr]]:
-    """Each output with every choice of the signs of its roots, as sqrt(x^2) - x vanishes for one of them alone.
+def _roots(graph: Graph, outputs: Sequence[Expr]) -> list[frozenset[int] | None]:
+    """The roots in each output, whose signs are all to be tried, as sqrt(x^2) - x vanishes for one of them alone.
 
-    Alone where it has no roots; nothing of one that is not analytic but for a few roots beside each other.
+    None of one that is not analytic but for a few roots beside each other.
     """
     analytic = operations_with(lambda row: row.analytic)
-    kinds: dict[int, int] = {}  # 0 of what is analytic, 1 but for roots, 2 of others
+    none = frozenset[int]()
+    held: dict[int, frozenset[int] | None] = {}
     for i in reachable(graph, (y.id for y in outputs)):
         operation, *operands = graph.nodes[i]
-        inside = 0 if operation in LEAVES else max((kinds[k] for k in operands), default=0)
-        own = 0 if operation in LEAVES or operation in analytic else 2 if operation != "sqrt" or inside else 1
-        kinds[i] = max(inside, own)
-    found = [[y] if kinds[y.id] < 2 else [] for y in outputs]
-    for branches in found:
-        roots = [i for y in branches if kinds[y.id] for i in reachable(graph, [y.id]) if graph.nodes[i][0] == "sqrt"]
-        for root in (Expr(graph, i) for i in roots if len(roots) <= ROOTS):
-            branches += substitute(branches, {root: -root})
-        if len(roots) > ROOTS:
-            branches.clear()
-    return found
+        inside = [] if operation in LEAVES else [held[k] for k in operands]
+        roots = none.union(*(own for own in inside if own))
+        if operation == "sqrt":
+            fits, roots = not roots, frozenset((i,))
+        else:
+            fits = operation in LEAVES or operation in analytic
+        held[i] = roots if fits and None not in inside and len(roots) <= ROOTS else None
+    return [held[y.id] for y in outputs]
 
 
 def settled_vector(a: Vec3, size: float) -> Vec3:

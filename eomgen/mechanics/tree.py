@@ -143,8 +143,7 @@ def settled_matrix(turned: Mat3, before: Mat3) -> Mat3:
 
 # What a joint lets free about and along its z axis alone does not change if both of its markers turn about z by the
 # same angle. Along which direction x then lies is chosen for the link: along an arm, a hinge's axis or an axis of the
-# parent. Without that, mechanisms that lie obliquely in ground carry three components where straight ones carry two: a
-# V6 engine turned in space takes 1,336 operations with it and 2,451 without (benchmarks/models/linkages.py).
+# parent. Without that, mechanisms that lie obliquely in ground carry three components where straight ones carry two.
 
 
 #: What an entry costs that is neither 0, nor 1 in its own place, also one of a centre of mass, which enters no equation
@@ -216,12 +215,13 @@ class AxisTurns:
     def _look(self, branch: Branch, axes: np.ndarray, seen: _Seen) -> bool:
         """Note the arms and axes of a link, and those of links on hinges parallel to its own, in common axes.
 
-        Not where a place is no number: a symbol along one axis would stand in two.
+        False where a symbol lengthens an arm along an axis, as it would stand in two. Other arms with symbols are left
+        out, as rounding would keep their entries from 0, and centres with symbols.
         """
         _, inner = self._ends(branch)
-        F, p = numbers(inner.frame.rotation), numbers([inner.frame.position])
-        if F is None or p is None:
-            return False
+        origin = inner.frame.position
+        if (F := numbers(inner.frame.rotation)) is None:
+            return True
         points = [(seen.centres, self.mechanism.bodies[branch.body].com)]
         for marker in self._others[branch.body]:
             if marker is not inner:
@@ -229,11 +229,14 @@ class AxisTurns:
                 if (R := numbers(marker.frame.rotation)) is not None:
                     seen.axes.append(axes @ F.T @ R[:, 2])
         for arms, point in points:
-            if (x := numbers([point])) is None:
+            if (ends := numbers([point, origin])) is not None:
+                if size := np.abs(ends).max(axis=1).sum():
+                    arm = axes @ F.T @ (ends[0] - ends[1])
+                    arms.append(np.where(np.abs(arm) <= ROUNDED * size, 0.0, arm / size))
+            elif arms is seen.lengths and any(
+                np.count_nonzero(np.abs(axes @ F.T @ arm) > ROUNDED * size) == 1 for arm, size in _growth(origin, point)
+            ):
                 return False
-            if size := np.abs(x).max() + np.abs(p).max():
-                arm = axes @ F.T @ (x - p)[0]
-                arms.append(np.where(np.abs(arm) <= ROUNDED * size, 0.0, arm / size))
         for child in self._children.get(branch.body, ()):
             outer, _ = self._ends(child)
             R = numbers(outer.frame.rotation)
@@ -287,6 +290,18 @@ def numbers(rows: Sequence[Sequence[Expr]]) -> np.ndarray | None:
     """Constant entries; None if one is not."""
     values = [[x.value for x in row] for row in rows]
     return None if any(x is None for row in values for x in row) else np.array(values, dtype=float)
+
+
+def _growth(start: Vec3, end: Vec3) -> list[tuple[np.ndarray, float]]:
+    """How an arm with symbols grows with each of them, from values drawn, and the sizes of what cancels in it."""
+    random = np.random.default_rng(7)
+    both = (*start, *end)
+    old, new = random_point(both, random), random_point(both, random)
+    found = []
+    for name in old:
+        a, b = np.reshape(np.subtract(evaluate(both, old | {name: new[name]}), evaluate(both, old)), (2, 3))
+        found.append((b - a, float(np.abs(a).max() + np.abs(b).max())))
+    return found
 
 
 def _cost(angle: float, H: np.ndarray, seen: _Seen) -> float:

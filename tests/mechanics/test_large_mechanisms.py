@@ -67,6 +67,33 @@ def test_links_with_symbols_in_their_lengths_keep_their_axes() -> None:
     assert eg.load_example("spatial_slider_crank").derive("embedding").operations["mass_matrix and bias"].total <= 95
 
 
+@pytest.mark.quick
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("com", "tip", "most"), [("c", 1, 48 + 86), ("0.5", "2*c", 56 + 105)])
+def test_symbols_along_oblique_directions_stop_no_turn(com: Any, tip: Any, most: int, seed: int) -> None:
+    """A planar four-bar that lies obliquely takes as few operations as one without the choice of axes for symbols."""
+    T = Rotation.random(rng=seed).as_matrix()
+    x, _, z = ([repr(v) for v in row] for row in T.T.tolist())
+    tensor = T @ np.diag([0.01, 0.08, 0.08]) @ T.T
+
+    def along(size: Any) -> list[str]:
+        return [f"{size}*({v})" for v in x]
+
+    m = eg.Model("four_bar", gravity=(-9.81 * T[:, 1]).tolist())
+    m.parameter("c", 0.5)
+    crank, coupler, rocker = (
+        m.body(name, mass=1, com=along(at), inertia=tensor)
+        for name, at in [("crank", com), ("coupler", 1), ("rocker", 0.75)]
+    )
+    m.revolute("A", m.ground, crank, axis=z)
+    m.revolute("B", crank.at(*along(tip)), coupler, axis=z)
+    m.revolute("C", m.ground.at(*along(2)), rocker, axis=z)
+    m.revolute("D", coupler.at(*along(2)), rocker.at(*along(1.5)), axis=z)
+    m.guess(A=1.0, B=-0.5, C=1.5)
+    operations = m.derive("embedding").operations
+    assert operations["mass_matrix and bias"].total + operations["constraints"].total <= most
+
+
 def test_spatial_four_bar_over_a_turn(module: Any) -> None:
     """The rocker follows from |pin - tip| = b: A cos phi + B sin phi = C."""
     mod = module("spatial_four_bar")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
+from eomgen.expr import identity
+from eomgen.expr.core import Expr, Graph, substitute
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -40,6 +44,27 @@ def test_an_equation_whose_roots_cancel(factor: str, rows: int) -> None:
     m.coupling("level", equation=f"({factor})*(x(b.tip) - 0.3)")
     report = m.check()
     assert (report.constraints, report.rank, report.degrees_of_freedom) == (rows, rows, 2 - rows)
+
+
+def test_signs_of_roots_are_put_in_for_all_expressions_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chained expressions with the same four roots take one pass a root; those that do not vanish as written, none."""
+    graph = Graph()
+    x, *squares = (graph.symbol(name) for name in "xabcd")
+    first, *others = roots = [graph.apply("sqrt", 1.0 + y) for y in squares]
+    total = sum(others, first)
+    for zero, passes in (((x + 1.0) * (x - 1.0) - x * x + 1.0, len(roots)), (x, 0)):
+        chain = [zero * total]
+        for _ in range(20):
+            chain.append(chain[-1] * x + zero * total)
+        calls: list[int] = []
+
+        def counted(*given: Any, calls: list[int] = calls) -> list[Expr]:
+            calls.append(1)
+            return substitute(*given)
+
+        monkeypatch.setattr(identity, "substitute", counted)
+        assert identity.vanishes(chain) == [passes > 0] * len(chain)
+        assert len(calls) == passes
 
 
 @pytest.mark.quick

@@ -131,6 +131,42 @@ def test_faults(given: dict, demand: str) -> None:
     refuses(demand, lambda: model_of(**given).check())
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"inertia": [[0.1, 1e-20, 0], [0, 0.1, 0], [0, 0, 0.1]], "about": "cm", "markers": {"cm": {"rpy": RPY}}},
+        {"inertia": TURN @ np.diag([0.1, 0.1, 0.1]) @ TURN.T, "axes": (0.1, 0.2, 0.3)},
+        *(
+            {"inertia": [[size, upper, 0], [lower, size, 0], [0, 0, size]]}
+            for size, upper, lower in [
+                (1, "sin(a)**2 + cos(a)**2 - 1", 0),
+                (1, "k*(-1e-17)", 0),
+                (1, "(a + k)**2 - a**2 - 2*a*k - k**2", 0),
+                (1e-9, "(a + k)**2 - a**2 - 2*a*k - k**2", 0),
+                ("sqrt(a - 10)", "(a + k)**2", "a**2 + 2*a*k + k**2"),
+            ]
+        ),
+    ],
+    ids=str,
+)
+def test_entries_that_are_alike_but_for_rounding(given: dict) -> None:
+    """Beside 0 too, with parameters without values, and beside entries that have no value where they are drawn."""
+    model = model_of(mass=1, **given)
+    for name in "ak":
+        model.parameter(name)
+    assert model.derive().report.degrees_of_freedom == 6
+
+
+@pytest.mark.parametrize(
+    ("upper", "lower"), [("sqrt(a - 10)", "2*sqrt(a - 10)"), ("a", "1.001*a"), ("a", 0), ("1e-8*a", 0)]
+)
+def test_entries_that_differ(upper: Any, lower: Any) -> None:
+    """Nor are entries alike that have no value wherever one looks."""
+    model = model_of(mass=1, inertia=[[0.1, upper, 0], [lower, 0.1, 0], [0, 0, 0.1]])
+    model.parameter("a")
+    refuses("EG-INERTIA inertia: symmetric", model.check)
+
+
 IMPOSSIBLE = [
     ({"mass": -1}, "EG-INERTIA mass: -1"),
     ({"mass": 1, "inertia": (1, 1, 2.5)}, "EG-INERTIA inertia: 2.5"),
