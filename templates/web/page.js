@@ -35,9 +35,8 @@ class Model {
     for (let k = 0; names[k] !== 0; k += 1) this.operations.push(this.text(names[k]));
     this.setParameters(info.pValues);
     exports.web_scales();
-    this.inputs = info.u.map((_, k) => (info.signals[k] ? { text: info.signals[k][0] } : { value: info.uValues[k] }));
-    info.uValues.forEach((value, k) => this.setInput(k, value));
-    for (const [k, [, code, constants, last]] of Object.entries(info.signals)) this.setTape(+k, code, constants, last);
+    this.inputs = [];
+    info.u.forEach((_, k) => this.declare(k));
     this.atol = this.room(n);
     this.write(this.atol, info.atol);
   }
@@ -63,6 +62,14 @@ class Model {
     this.p = [...p];
     this.write(this.spare.p, p);
     return this.f.web_set(this.spare.p) === 0;
+  }
+
+  // An input as the model declares it.
+  declare(k) {
+    const [text, ...tape] = this.info.signals[k] ?? [], value = this.info.uValues[k];
+    if (text) this.setTape(k, ...tape);
+    else this.setInput(k, value);
+    this.inputs[k] = text ? { text, declared: true } : { value };
   }
 
   setInput(k, value) {
@@ -108,6 +115,7 @@ class Model {
   reach(t, from, p, values) {
     const { info } = this, first = this.p, held = info.independent;
     let far = 0, x = from, last = first;
+    if (![...p, ...values.map(([, value]) => value)].every(Number.isFinite)) return [x, last, false];
     p.forEach((value, k) => { far = Math.max(far, Math.abs(value - first[k]) / (Math.abs(first[k]) || 1)); });
     for (const [k, value] of values) far = Math.max(far, Math.abs(value - from[k]) / (k < info.q.length ? info.sizes[k] : 1e9));
     const count = info.rows ? Math.min(60, Math.max(1, Math.ceil(far / 0.05))) : 1;
@@ -117,7 +125,7 @@ class Model {
       for (const [k, value] of values) next[k] = between(from[k], value);
       const here = p.map((value, k) => between(first[k], value));
       const closed = this.setParameters(here) ? (info.rows ? this.close(t, next, held) : next) : null;
-      if (!closed || closed.some(Number.isNaN)) {
+      if (!closed || !closed.every(Number.isFinite)) {
         this.setParameters(last);
         return [x, last, false];
       }
@@ -192,8 +200,11 @@ class Model {
 
 // -- inputs as expressions of t -------------------------------------------------------------------------------------------
 
+const FUNCTIONS = { min: 2, max: 2, atan2: 2, hypot: 2 }; // numbers that each takes, the first two or more
+for (const name of "abs sign sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh".split(" ")) FUNCTIONS[name] = 1;
+
 // The instructions of a text such as 2*sin(3*t): [code, numbers, last], as the model plays them.
-function parseExpression(text, names, operations) {
+function parseExpression(text, names) {
   const code = [], numbers = [], words = text.match(/\d+\.?\d*(?:e[-+]?\d+)?|\.\d+(?:e[-+]?\d+)?|\w+|\*\*|\S/gi) ?? [];
   let at = 0;
   const emit = (name, a = 0, b = 0, c = 0) => code.push([name, a, b, c]) - 1;
@@ -204,25 +215,27 @@ function parseExpression(text, names, operations) {
     const word = words[at];
     at += 1;
     if (word === "(") { const inside = sum(); need(")"); return inside; }
-    if (/^[\d.]/.test(word ?? "")) return number(Number(word));
+    if (Number.isFinite(Number(word))) return number(Number(word));
     if (word === "t") return emit("t");
     if (word === "pi") return number(Math.PI);
     for (const kind of ["x", "p"]) if (names[kind].includes(word)) return emit(kind, names[kind].indexOf(word));
-    if (!operations.includes(word) || words[at] !== "(") throw new Error(`${word ?? "the end"} is not known in ${text}`);
+    if (!Object.hasOwn(FUNCTIONS, word) || words[at] !== "(") throw new Error(`${word ?? "the end"} is not known in ${text}`);
     at += 1;
     const given = [sum()];
     while (take(",")) given.push(sum());
     need(")");
-    return emit(word, ...given);
+    const count = FUNCTIONS[word], most = ["min", "max"].includes(word) ? Infinity : count;
+    if (given.length < count || given.length > most) throw new Error(`${word}() takes ${count}${most > count ? " or more" : ""}, not ${given.length} in ${text}`);
+    return most > count ? given.reduce((a, b) => emit(word, a, b)) : emit(word, ...given);
   }
   function power() {
     const base = atom();
-    return take("**") || take("^") ? emit("pow", base, unary()) : base;
+    return take("**") ? emit("pow", base, unary()) : base;
   }
   function unary() { return take("-") ? emit("neg", unary()) : (take("+"), power()); }
   function chain(part, signs) {
     let found = part();
-    for (let sign = words[at]; sign in signs; sign = words[at]) { at += 1; found = emit(signs[sign], found, part()); }
+    for (let sign = words[at]; Object.hasOwn(signs, sign); sign = words[at]) { at += 1; found = emit(signs[sign], found, part()); }
     return found;
   }
   function product() { return chain(unary, { "*": "mul", "/": "div" }); }
@@ -315,7 +328,7 @@ class Picture {
     }
     this.trace = { points: [], buffer: gl.createBuffer(), kind: "line", color: "#999999", alpha: 1, width: 1.2, body: -1 };
     this.floor = this.grid();
-    this.values = {};
+    [this.low, this.high] = [data.low, data.high];
     this.fit();
     this.change({});
   }
@@ -392,8 +405,21 @@ class Picture {
 
   // -- camera --
 
+  // The box that the items fill now, in axes of the view.
+  extent() {
+    const { view } = this.data, low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
+    for (const { drawn = [], body, follow, frames } of this.items) {
+      const pose = follow || frames ? IDENTITY : this.poses[body] ?? IDENTITY;
+      for (let k = 0; k + 2 < drawn.length; k += 3) {
+        const at = place(pose, drawn.slice(k, k + 3)), seen = view ? view.map((axis) => dot(axis, at)) : at;
+        if (!seen.some(Number.isNaN)) seen.forEach((x, i) => { low[i] = Math.min(low[i], x); high[i] = Math.max(high[i], x); });
+      }
+    }
+    return { low, high };
+  }
+
   fit() {
-    const { view, low, high, up } = this.data, middle = low.map((x, k) => 0.5 * (x + high[k]));
+    const { view, up } = this.data, { low, high } = this, middle = low.map((x, k) => 0.5 * (x + high[k]));
     this.target = view ? [0, 1, 2].map((k) => middle[0] * view[0][k] + middle[1] * view[1][k] + middle[2] * view[2][k]) : middle;
     this.zoom = 1;
     this.free = 0;
@@ -405,7 +431,7 @@ class Picture {
 
   look() {
     const { data, canvas } = this, wide = canvas.clientWidth || 1, tall = canvas.clientHeight || 1;
-    const size = data.high.map((x, k) => x - data.low[k]), right = unit(cross(this.up, this.toward));
+    const size = this.high.map((x, k) => x - this.low[k]), right = unit(cross(this.up, this.toward));
     const up = cross(this.toward, right), span = Math.hypot(...size);
     const half = data.view ? 0.53 * Math.max(size[1], (size[0] * tall) / wide) : 0.46 * span * Math.max(1, 0.9 * tall / wide);
     this.half = half / this.zoom; // half of what is seen upwards at the target
@@ -570,7 +596,11 @@ class Picture {
 // -- the page -------------------------------------------------------------------------------------------------------------
 
 const get = (id) => document.getElementById(id);
-const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "-");
+function shown(value, digits = 4) {
+  if (!Number.isFinite(value)) return "-";
+  const plain = Number(value.toPrecision(digits)), size = Math.abs(plain);
+  return size === 0 || (size >= 1e-3 && size < 1e5) ? String(plain) : value.toExponential(digits - 1).replace(/\.?0*e\+?/, "e");
+}
 
 function element(kind, parent, properties = {}) {
   const made = document.createElement(kind);
@@ -633,12 +663,14 @@ class Page {
 
   // Begin anew from the start.
   restart() {
+    const { model, start: { x } } = this, open = model.residual(0, x);
     this.replayed = false;
     this.frames = [];
     this.cursor = 0;
-    this.say("");
-    this.model.begin(0, this.start.x);
-    this.keep(0, this.start.x);
+    this.event = "";
+    this.say(open <= 1e-6 ? "" : `the loops are open at the start, by ${shown(open)}`);
+    model.begin(0, x);
+    this.keep(0, x);
   }
 
   // What is shown from here on begins at the state shown.
@@ -650,12 +682,17 @@ class Page {
   }
 
   step(stamp) {
+    requestAnimationFrame((next) => this.step(next));
     const passed = this.last === null ? 0 : Math.min(0.1, (stamp - this.last) / 1000) * get("speed").value;
     this.last = stamp;
-    if (this.playing && passed > 0) this.proceed(passed);
-    this.show();
+    try {
+      if (this.playing && passed > 0) this.proceed(passed);
+      this.show();
+    } catch (error) {
+      this.play(false);
+      this.say(`the run stops here: ${error.message}; reset begins anew`);
+    }
     this.count += 1;
-    requestAnimationFrame((next) => this.step(next));
   }
 
   proceed(passed) {
@@ -723,6 +760,7 @@ class Page {
     if (trace) this.follow(trace);
     else this.picture.trace.points = [];
     this.picture.draw(poses, this.cursor, this.dark, this.names);
+    if (this.changed) this.fit(false);
     const time = get("time");
     time.max = this.frames.length - 1;
     time.value = this.cursor;
@@ -731,6 +769,17 @@ class Page {
     get("words").textContent = words + pace + (this.event ? `  ${this.event}` : "");
     if (this.count % 3 === 0 || !this.playing) this.plot();
     if (this.model && this.count % 6 === 0) this.measure(frame);
+  }
+
+  // The view on what is shown now, or on all of a film; after a change, wider where that leaves the view.
+  fit(anew) {
+    const { picture, data, model } = this, { low, high } = model ? picture.extent() : data, old = anew ? { low, high } : picture;
+    this.changed = false;
+    const margin = 0.1 * Math.max(...old.high.map((x, k) => x - old.low[k]));
+    if (!(low[0] <= high[0]) || (!anew && low.every((x, k) => x >= old.low[k] - margin && high[k] <= old.high[k] + margin))) return;
+    picture.low = low.map((x, k) => Math.min(x, old.low[k]));
+    picture.high = high.map((x, k) => Math.max(x, old.high[k]));
+    picture.fit();
   }
 
   // The way of a marker, through all frames since it was last drawn.
@@ -809,13 +858,14 @@ class Page {
     for (const [name] of data.markers) option(get("trace"), name);
     get("trace").parentElement.hidden = !data.markers.length || !model;
     const energies = model && "energy" in model.kernels ? ["energies"] : [], columns = this.columns;
-    const units = data.units, label = (name) => (units[name] ? `${name} (${units[name]})` : name);
+    const units = { energies: "J", "kinetic energy": "J", "potential energy": "J", energy: "J", ...data.units }, label = (name) => (units[name] ? `${name} (${units[name]})` : name);
     for (const k of [1, 2]) for (const name of [...energies, ...columns]) option(get(`choice${k}`), name, label(name));
     if (columns.length) get("choice1").value = columns[0];
     if (columns.length > 1) get("choice2").value = energies[0] ?? columns[1];
     get("plots").hidden = !columns.length;
     for (const factor of [0.1, 0.25, 0.5, 1, 2, 4]) option(get("speed"), factor, `\u00d7${shown(factor * (model ? 1 : data.motion.pace), 2)}`);
     get("speed").value = 1;
+    get("named").hidden = !data.labels.length;
     if (!model) return;
     this.fields = {};
     const { info } = model;
@@ -825,8 +875,8 @@ class Page {
       const k = info.q.length + j, speed = Math.max(10, 2 * Math.abs(info.x0[k]));
       this.fields[k] = this.field("starts", label(info.x[k]), info.x0[k], -speed, speed, (value) => this.setStart(k, value));
     }
-    info.p.forEach((name, k) => this.field("parameters", label(name), info.pValues[k], ...info.ranges[name], (value) => this.setParameter(k, value), info.docs[name]));
-    info.u.forEach((name, k) => this.field("inputs", label(name), model.inputs[k].text ?? info.uValues[k], ...info.ranges[name], (value) => this.setInput(k, value), info.docs[name]));
+    this.settings = info.p.map((name, k) => this.field("parameters", label(name), info.pValues[k], ...info.ranges[name], (value) => this.setParameter(k, value), info.docs[name]));
+    this.forces = info.u.map((name, k) => this.field("inputs", label(name), model.inputs[k].text ?? info.uValues[k], ...info.ranges[name], (value) => this.setInput(k, value), info.docs[name]));
     for (const id of ["parameters", "inputs", "starts"]) get(id).parentElement.hidden = !get(id).children.length;
     info.branches.forEach((_, k) => option(get("branch"), k, `assembly ${k + 1}`));
     get("branch").parentElement.hidden = info.branches.length < 2;
@@ -841,32 +891,56 @@ class Page {
     const box = element("input", row, { value: Number.isNaN(number) ? value : shown(number, 6), inputMode: "text", ariaLabel: text });
     slide.oninput = () => { box.value = shown(Number(slide.value), 6); set(Number(slide.value)); };
     box.onchange = () => {
-      const typed = box.value.trim(), typedNumber = Number(typed);
-      if (home !== "inputs" && (typed === "" || Number.isNaN(typedNumber))) { this.say(`${text} must be a number, not ${typed || "nothing"}`); return; }
-      if (!Number.isNaN(typedNumber)) slide.value = typedNumber;
-      set(Number.isNaN(typedNumber) ? typed : typedNumber);
+      const typed = box.value.trim(), entered = typed ? Number(typed) : NaN, words = home === "inputs" && typed && Number.isNaN(entered);
+      if (!words && !Number.isFinite(entered)) { this.settle(); this.say(`${text} must be a finite number, not ${typed || "nothing"}`); return; }
+      if (!words) slide.value = entered;
+      set(words ? typed : entered);
     };
     return { slide, box };
   }
 
   // Another parameter: the state shown and the start go along; where loops cannot close, both stay.
   setParameter(k, value) {
-    const { model, start } = this, wanted = (this.wanted ??= [...start.p]);
-    wanted[k] = value;
-    const low = model.info.bounds[model.info.p[k]];
+    const { model, start } = this, { info, p: before } = model, low = info.bounds[info.p[k]], now = this.frames[this.cursor];
     if (low && !(value >= low[0] && value <= low[1])) {
-      this.say(`${model.info.p[k]} must be from ${shown(low[0])} to ${shown(low[1])}`);
-      wanted[k] = model.p[k];
+      this.settle();
+      this.say(`${info.p[k]} must be from ${shown(low[0])} to ${shown(low[1])}`);
       return;
     }
-    const now = this.frames[this.cursor], before = model.p, [x, p, reached] = model.reach(now.t, now.x, wanted, []);
+    const [x, p, reached] = model.reach(now.t, now.x, before.map((old, i) => (i === k ? value : old)), []);
     model.setParameters(before);
-    const [first] = model.reach(0, start.x, p, []);
+    const [first, , whole] = model.reach(0, start.x, p, []);
     model.setParameters(p);
-    this.start = { x: first, p };
-    this.say(reached ? "" : `the loops do not close with ${model.info.p[k]} = ${shown(value)}; the mechanism is shown with ${shown(p[k])}`);
-    this.picture.change(Object.fromEntries(model.info.p.map((name, i) => [name, p[i]])));
+    this.start = { x: whole ? first : model.close(0, x, info.independent) ?? x, p };
+    this.settle();
     this.replace(now.t, x);
+    this.say(!reached ? `the loops do not close with ${info.p[k]} = ${shown(value)}; the mechanism is shown with ${shown(p[k])}`
+      : whole ? "" : `the loops do not close at the start with ${info.p[k]} = ${shown(value)}; what is shown is the start from now on`);
+  }
+
+  // The parameters that the model has, into the picture and the boxes.
+  settle() {
+    const { p, info } = this.model;
+    this.picture.change(Object.fromEntries(info.p.map((name, k) => [name, p[k]])));
+    this.changed = true;
+    this.settings.forEach(({ box, slide }, k) => { box.value = shown(p[k], 6); slide.value = p[k]; });
+  }
+
+  // Parameters, inputs and start as the model declares them.
+  declare() {
+    const { model } = this, { info } = model;
+    model.setParameters(info.pValues);
+    this.forces.forEach((_, k) => this.declareInput(k));
+    this.start = { x: Float64Array.from(info.x0), p: model.p };
+    this.settle();
+    this.restart();
+  }
+
+  declareInput(k) {
+    this.model.declare(k);
+    const { text, value = 0 } = this.model.inputs[k], { box, slide } = this.forces[k];
+    box.value = text ?? shown(value, 6);
+    slide.value = value;
   }
 
   replace(t, x) {
@@ -888,9 +962,10 @@ class Page {
   setInput(k, value) {
     const { model } = this;
     try {
-      if (typeof value === "number") model.setInput(k, value);
-      else model.setTape(k, ...parseExpression(value, model.info, model.operations));
-      model.inputs[k] = typeof value === "number" ? { value } : { text: value };
+      if (value === "as declared") this.declareInput(k);
+      else if (typeof value === "number") model.setInput(k, value);
+      else model.setTape(k, ...parseExpression(value, model.info));
+      if (value !== "as declared") model.inputs[k] = typeof value === "number" ? { value } : { text: value };
       this.say("");
     } catch (error) {
       this.say(error.message);
@@ -903,9 +978,11 @@ class Page {
     const { model } = this, x = Float64Array.from(model.info.x0), p = model.p;
     x.set(model.info.branches[k]);
     model.setParameters(model.info.pValues);
-    const [closed] = model.reach(0, model.close(0, x, model.info.independent) ?? x, p, []);
+    const [closed, , reached] = model.reach(0, model.close(0, x, model.info.independent) ?? x, p, []);
     this.start = { x: closed, p: model.p };
+    this.settle();
     this.restart();
+    if (!reached) this.say("these loops do not close with the parameters set; the boxes show those that they close with");
   }
 
   reset() {
@@ -918,7 +995,10 @@ class Page {
     const { model, start } = this, { info } = model, number = (x) => String(Number(x.toPrecision(15)));
     const initial = [...info.independentQ, ...info.independent.map((j) => info.q.length + j)].map((k) => [info.x[k], number(start.x[k])]);
     const parameters = info.p.map((name, k) => [name, number(model.p[k])]);
-    const inputs = info.u.map((name, k) => [name, model.inputs[k].text ? JSON.stringify(model.inputs[k].text) : number(model.inputs[k].value ?? 0)]);
+    const inputs = info.u.flatMap((name, k) => {
+      const { declared, text, value } = model.inputs[k];
+      return declared ? [] : [[name, text ? JSON.stringify(text) : number(value)]];
+    });
     const set = (pairs) => pairs.map(([name, value]) => `${JSON.stringify(name)}: ${value}`).join(", ");
     const text = kind === "python"
       ? `run = mod.simulate(${number(info.end)}, initial={${set(initial)}},\n    parameters={${set(parameters)}}, inputs={${set(inputs)}})`
@@ -931,7 +1011,15 @@ class Page {
   }
 
   listen() {
-    const canvas = get("over"), { picture } = this, fingers = new Map();
+    const canvas = get("over"), fingers = new Map(), fit = () => this.fit(true);
+    get("picture").addEventListener("webglcontextlost", (event) => { event.preventDefault(); this.say("the browser took the picture's memory; it is drawn again when the browser allows, else reload the page"); });
+    get("picture").addEventListener("webglcontextrestored", () => {
+      this.picture = new Picture(this.data, this.numbers, get("picture"), canvas);
+      this.traced = "";
+      if (this.model) this.settle();
+      this.say("");
+    });
+    get("declared").onclick = () => this.declare();
     get("play").onclick = () => this.play(!this.playing);
     get("back").onclick = () => this.move(-1);
     get("forth").onclick = () => this.move(1);
@@ -947,7 +1035,7 @@ class Page {
     canvas.onpointerdown = (event) => {
       canvas.setPointerCapture(event.pointerId);
       fingers.set(event.pointerId, at(event));
-      this.grip = this.model && fingers.size === 1 && !event.shiftKey ? picture.pick(...at(event)) : null;
+      this.grip = this.model && fingers.size === 1 && !event.shiftKey ? this.picture.pick(...at(event)) : null;
       if (this.grip) this.play(false);
     };
     canvas.onpointermove = (event) => {
@@ -956,19 +1044,21 @@ class Page {
       const now = at(event), by = [now[0] - before[0], now[1] - before[1]];
       if (fingers.size === 2) {
         const [other] = [...fingers].filter(([id]) => id !== event.pointerId).map(([, place_]) => place_);
-        picture.zoom *= Math.hypot(now[0] - other[0], now[1] - other[1]) / (Math.hypot(before[0] - other[0], before[1] - other[1]) || 1);
+        this.picture.zoom *= Math.hypot(now[0] - other[0], now[1] - other[1]) / (Math.hypot(before[0] - other[0], before[1] - other[1]) || 1);
       } else if (this.grip) this.drag(now);
       else if (this.data.view || event.shiftKey) this.pan(by);
       else this.orbit(by);
       fingers.set(event.pointerId, now);
     };
     canvas.onpointerup = canvas.onpointercancel = (event) => { fingers.delete(event.pointerId); this.grip = null; };
-    canvas.onwheel = (event) => { event.preventDefault(); picture.zoom = Math.min(50, Math.max(0.1, picture.zoom * Math.exp(-event.deltaY / 500))); };
-    canvas.ondblclick = () => picture.fit();
+    canvas.onwheel = (event) => { event.preventDefault(); this.picture.zoom = Math.min(50, Math.max(0.1, this.picture.zoom * Math.exp(-event.deltaY / 500))); };
+    canvas.ondblclick = fit;
     document.onkeydown = (event) => {
-      if (["INPUT", "SELECT", "TEXTAREA", "BUTTON", "SUMMARY"].includes(event.target.tagName) && event.key !== "Escape") return;
+      const { tagName, type } = event.target, own = { BUTTON: [" "], SUMMARY: [" "], range: ["ArrowLeft", "ArrowRight"] }[type === "range" ? type : tagName];
+      if (event.ctrlKey || event.metaKey || event.altKey || own?.includes(event.key)) return;
+      if (!own && ["INPUT", "SELECT", "TEXTAREA"].includes(tagName)) return;
       const speeds = get("speed"), faster = (by) => { speeds.selectedIndex = Math.min(5, Math.max(0, speeds.selectedIndex + by)); };
-      const keys = { " ": () => this.play(!this.playing), ArrowLeft: () => this.move(-1), ArrowRight: () => this.move(1), r: () => this.reset(), 0: () => picture.fit(), "+": () => faster(1), "-": () => faster(-1), n: () => { this.names = !this.names; } };
+      const keys = { " ": () => this.play(!this.playing), ArrowLeft: () => this.move(-1), ArrowRight: () => this.move(1), r: () => this.reset(), 0: fit, "+": () => faster(1), "-": () => faster(-1), n: () => { this.names = !this.names; } };
       if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
     };
   }
@@ -992,7 +1082,7 @@ class Page {
     const here = place(picture.poses[grip.body], grip.local), seen = picture.seen(here);
     const size = ((2 * picture.half) / picture.canvas.clientHeight) * (this.data.view ? 1 : seen[3]);
     const target = plus(plus(here, right, (x - seen[0]) * size), up, (seen[1] - y) * size);
-    const axes = [...right, ...up], reach = Math.max(...this.data.high.map((h, k) => h - this.data.low[k]));
+    const axes = [...right, ...up], reach = Math.max(...picture.high.map((h, k) => h - picture.low[k]));
     const moved = model.pull(0, frame.x, grip.body, grip.local, axes, [dot(right, target), dot(up, target)], reach);
     if (!moved || moved.some(Number.isNaN)) { this.say("the loops do not close there"); return; }
     this.start = { x: moved, p: model.p };

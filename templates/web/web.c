@@ -113,13 +113,15 @@ EXPORT(web_operations) const char *const *web_operations(void)
 /* An input over time: an expression of n instructions; its value is constant where n is 0. */
 EXPORT(web_signal) void web_signal(int input, int n, const int *code, const double *constants, int last)
 {
-    eomgen_tape *const tape = (eomgen_tape *)web_room(sizeof *tape + sizeof last);
-    int *const out = (int *)(tape + 1);
-    *out = last;
-    tape->n = n, tape->n_out = 1, tape->code = code, tape->numbers = constants, tape->out = out;
-    tape->results = numbers(n);
     memset(signals + input, 0, sizeof *signals);
-    signals[input].n = n > 0, signals[input].tape = n > 0 ? tape : NULL;
+    if (n > 0) {
+        eomgen_tape *const tape = (eomgen_tape *)web_room(sizeof *tape + sizeof last);
+        int *const out = (int *)(tape + 1);
+        *out = last;
+        tape->n = n, tape->n_out = 1, tape->code = code, tape->numbers = constants, tape->out = out;
+        tape->results = numbers(n);
+        signals[input].n = 1, signals[input].tape = tape;
+    }
     run.signals = NULL;
     for (int i = 0; i < model->n_u; i++) {
         run.signals = signals[i].n > 0 ? signals : run.signals;

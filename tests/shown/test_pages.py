@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +60,7 @@ Model.open(data.model, data.wasm).then((model) => {
   model.begin(0, Float64Array.from(data.model.x0));
   const states = times.map((t) => (model.advance(t), [...model.state(t)]));
   const energies = states.map((x, k) => [...model.call("energy", times[k], x)]);
-  console.log(JSON.stringify({ states, energies, happened: model.happened }));
+  console.log(JSON.stringify({ inputs: model.inputs, states, energies, happened: model.happened }));
 });
 """
 
@@ -90,6 +90,14 @@ def opened(page: Path, tmp_path: Path) -> Iterator[Browser]:
         assert (browser.complaints, browser.requests) == ([], [])
 
 
+def put_in(opened: Browser, name: str, value: Any) -> str:
+    """Type a value into the box of a name; what the page says to it, its loops closed."""
+    box = f"[...document.querySelectorAll('.field')].find((one) => one.textContent.startsWith('{name}')).children[2]"
+    opened.evaluate(f"(() => {{ const it = {box}; it.value = '{value}'; it.onchange(); }})()")
+    assert opened.evaluate(RESIDUAL) < CLOSED
+    return str(opened.evaluate("get('message').textContent"))
+
+
 @pytest.mark.needs("node")
 @pytest.mark.slow
 def test_a_page_takes_the_steps_of_simulate(page: Path) -> None:
@@ -110,6 +118,7 @@ def test_events_and_inputs_over_time_are_those_of_simulate(tmp_path: Path) -> No
     run = module.simulate(1.5, t_eval=np.linspace(0.0, 1.4, 50))
     seen = in_node(page, run.t)
     assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
+    assert seen["inputs"] == [{"text": "as declared", "declared": True}]
     assert [t for name, t in seen["happened"]] == pytest.approx(
         run.t_events["ground"][: len(seen["happened"])], abs=SAME
     )
@@ -119,13 +128,7 @@ def test_events_and_inputs_over_time_are_those_of_simulate(tmp_path: Path) -> No
 @pytest.mark.slow
 def test_sliders_and_drags_keep_loops_closed_and_a_gap_is_told(opened: Browser) -> None:
     opened.click("#play")
-    box = "[...document.querySelectorAll('.field')].find((one) => one.textContent.startsWith('{}')).children[2]"
-
-    def put(name: str, value: float) -> str:
-        opened.evaluate(f"(() => {{ const it = {box.format(name)}; it.value = '{value}'; it.onchange(); }})()")
-        assert opened.evaluate(RESIDUAL) < CLOSED
-        return str(opened.evaluate("document.getElementById('message').textContent"))
-
+    put = partial(put_in, opened)
     for theta in (2.9, -2.0, 0.1):  # past the dead centres
         assert put("theta (", theta) == ""
         x = opened.evaluate("[...page.frames[page.cursor].x]")
@@ -150,6 +153,61 @@ def test_sliders_and_drags_keep_loops_closed_and_a_gap_is_told(opened: Browser) 
 
 @pytest.mark.needs("chromium")
 @pytest.mark.slow
+def test_what_a_page_refuses_is_told_and_changes_nothing_else(opened: Browser) -> None:
+    opened.click("#play")
+    put = partial(put_in, opened)
+    for name in ("r (", "theta (", "tau ("):
+        for value in ("1e999", "-Infinity", ""):
+            assert "must be a finite number" in put(name, value)
+    assert "do not close" in put("r (", 0.9)
+    assert put("m_c (", 1.2) == ""
+    for text in ("max(3)", "atan2(2)", "sin(1,2,3)", "const(7)", "x(2)", "2 constructor 3", "1e999*t", "toString(1)"):
+        assert text in put("tau (", text)
+    assert put("tau (", "max(1, t, 2*sin(t))") == ""
+    opened.evaluate("get('declared').click()")
+    assert opened.evaluate(
+        "page.model.p.every((p, k) => p === page.model.info.pValues[k]) && !page.model.inputs[0].text"
+    )
+
+    put("theta (", np.pi / 2)  # a start that longer cranks do not reach
+    opened.evaluate("page.replace(0, page.model.reach(0, page.start.x, page.model.p, [[0, 0.02]])[0])")
+    assert "what is shown is the start" in put("r (", 0.36)
+    assert opened.evaluate("page.model.residual(0, page.start.x)") < CLOSED
+
+    opened.evaluate("page.model.state = () => { throw new Error('lost'); }")
+    opened.click("#play")
+    opened.wait_for("get('message').textContent.includes('lost')")
+    opened.evaluate("delete page.model.state")
+    opened.click("#play")
+    opened.wait_for("page.frames.length > 3")
+    opened.click("#theme")  # keys work after a click on a button
+    opened.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowLeft")
+    assert opened.evaluate("page.playing") is False
+    assert opened.evaluate("[0.0000187, -150000, 0.05, 0, 99999].map((x) => shown(x, 3))") == [
+        "1.87e-5", "-1.5e5", "0.05", "0", "1e5"
+    ]  # fmt: skip
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
+def test_a_lost_picture_comes_back_and_the_view_holds_what_is_shown(opened: Browser) -> None:
+    opened.click("#play")
+    opened.evaluate("window.gone = page.picture.gl.getExtension('WEBGL_lose_context'); gone.loseContext()")
+    opened.wait_for("get('message').textContent.includes('picture')")
+    opened.evaluate("gone.restoreContext()")
+    opened.wait_for("!get('message').textContent && page.picture.poses !== undefined")
+    assert len(np.unique(opened.picture().reshape(-1, 3) // 32, axis=0)) > 8
+    before = opened.evaluate("page.picture.high[0] - page.picture.low[0]")
+    assert put_in(opened, "l (", 3.0) == ""
+    opened.wait_for(f"page.picture.high[0] - page.picture.low[0] > 2 + {before}")
+    put_in(opened, "l (", 0.35)
+    opened.evaluate("new Promise(requestAnimationFrame)")
+    opened.evaluate("document.onkeydown({ target: {}, key: '0', preventDefault() {} })")
+    assert opened.evaluate("page.picture.high[0] - page.picture.low[0]") < 1.5 * before
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
 def test_a_page_plays_steps_and_fits_a_telephone(page: Path, tmp_path: Path) -> None:
     with Browser(tmp_path / "profile", size=(400, 760)) as browser:
         browser.open(page.as_uri())
@@ -164,6 +222,14 @@ def test_a_page_plays_steps_and_fits_a_telephone(page: Path, tmp_path: Path) -> 
         browser.click("#reset")
         assert browser.evaluate("page.frames[page.cursor].t") == 0
         assert (browser.complaints, browser.requests) == ([], [])
+
+
+def test_names_of_other_files_are_refused(tmp_path: Path) -> None:
+    for name in ("it.gif", "it.txt", "it"):
+        with pytest.raises(eg.UsageError, match="must end in .html"):
+            slider_crank().page(tmp_path / name)
+    with pytest.raises(eg.UsageError, match="the file comes first"):
+        slider_crank().page(slider_crank().simulate(0.1), "it.html")  # type: ignore[call-overload]
 
 
 def test_models_that_cannot_run_in_a_page_are_refused_by_name(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.algebra import Array
 from ...base.files import as_path, open_plain, write_whole
 from ...base.limits.in_c import definitions
-from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot
+from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot, ill_typed
 from ...runtime.bound_model import BoundModel
 from ...runtime.drawing import module_of
 from ...runtime.layout import bounds_of
@@ -143,7 +143,7 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         low, high = bounds_of(info).get(name, (-np.inf, np.inf))
         ends = sorted((0.5 * value, 2.0 * value)) if value else [-1.0, 1.0]
         ranges[name] = [float(np.clip(end, low, high)) for end in ends]
-    ranges |= {name: [-max(10.0, 2.0 * abs(u)), max(10.0, 2.0 * abs(u))] for name, u in inputs.items()}
+    ranges |= {name: [-10.0 * (abs(u) or 1.0), 10.0 * (abs(u) or 1.0)] for name, u in inputs.items()}
     for k in places:
         limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
         ends = [limits.get("lower", x0[k] - reach), limits.get("upper", x0[k] + reach)]
@@ -208,6 +208,8 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
     model = describe_model(module, method)
     if motion is not None:
         model["x0"] = motion.x[:, 0].tolist()
+        reached = {name: float(np.abs(trajectory[name]).max()) for name in module.layout.u}
+        model["ranges"] |= {name: [-most, most] for name, most in reached.items() if 0.0 < most < np.inf}
     return page_html(module, scene, motion, (), model, wasm, getattr(equations, "_equations_html", ""))
 
 
@@ -239,9 +241,13 @@ def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any 
     ModelError
         The model cannot run in a page: it has impacts, rigid contacts or sampled states without a law.
     UsageError
-        The model has no bodies, or the module comes of a generated package.
+        The model has no bodies, or the module comes of a generated package; the file does not end in ``.html``.
     """
+    if isinstance(trajectory, str | os.PathLike):
+        raise ill_typed("the file comes first: page(file, run)")
     path = None if file is None else as_path("file", file)
+    if path is not None and path.suffix.lower() != ".html":
+        raise bad_file(f"{path}: the name of a page must end in .html")
     text = page_text(module, trajectory)
     if path is None:
         return InlinePage(text)
