@@ -3,6 +3,7 @@
 
 const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 const CLOSED = 1e-9; // scaled residual of loops that count as closed
+const DECLARED = "as declared"; // of an input, whatever the model has
 
 // -- the model ------------------------------------------------------------------------------------------------------------
 
@@ -36,7 +37,7 @@ class Model {
     this.setParameters(info.pValues);
     exports.web_scales();
     this.inputs = [];
-    info.u.forEach((_, k) => this.declare(k));
+    info.u.forEach((_, k) => this.setInput(k, DECLARED));
     this.atol = this.room(n);
     this.write(this.atol, info.atol);
   }
@@ -64,17 +65,15 @@ class Model {
     return this.f.web_set(this.spare.p) === 0;
   }
 
-  // An input as the model declares it.
-  declare(k) {
-    const [text, ...tape] = this.info.signals[k] ?? [], value = this.info.uValues[k];
-    if (text) this.setTape(k, ...tape);
-    else this.setInput(k, value);
-    this.inputs[k] = text ? { text, declared: true } : { value };
-  }
-
-  setInput(k, value) {
-    this.f.web_signal(k, 0, 0, 0, 0);
-    new Float64Array(this.f.memory.buffer, this.f.web_inputs(), this.info.u.length)[k] = value;
+  // An input: a number, an expression, or as the model declares it.
+  setInput(k, given) {
+    const { info } = this, known = info.signals[k], value = given === DECLARED && !known ? info.uValues[k] : given;
+    if (typeof value !== "number") this.setTape(k, ...(value === DECLARED ? known.slice(1) : parseExpression(value, info)));
+    else {
+      this.f.web_signal(k, 0, 0, 0, 0);
+      new Float64Array(this.f.memory.buffer, this.f.web_inputs(), info.u.length)[k] = value;
+    }
+    this.inputs[k] = value;
   }
 
   setTape(k, code, constants, last) {
@@ -629,7 +628,7 @@ class Page {
     this.fill();
     this.listen();
     if (model) {
-      this.start = { x: Float64Array.from(data.model.x0), p: [...data.model.pValues] };
+      this.start = Float64Array.from(data.model.x0);
       this.recorded(data.motion);
       if (!this.frames.length) this.restart();
       else this.replayed = true;
@@ -661,14 +660,15 @@ class Page {
     if (this.frames.length > 20000) this.frames.splice(0, 5000);
   }
 
-  // Begin anew from the start.
-  restart() {
-    const { model, start: { x } } = this, open = model.residual(0, x);
+  // Begin anew from a start.
+  restart(x = this.start, words = "") {
+    const { model } = this, open = model.residual(0, x);
+    this.start = x;
     this.replayed = false;
     this.frames = [];
     this.cursor = 0;
     this.event = "";
-    this.say(open <= 1e-6 ? "" : `the loops are open at the start, by ${shown(open)}`);
+    this.say(words || open <= 1e-6 ? words : `the loops are open at the start, by ${shown(open)}`);
     model.begin(0, x);
     this.keep(0, x);
   }
@@ -795,10 +795,8 @@ class Page {
   }
 
   measure(frame) {
-    for (const [k, { box, slide }] of Object.entries(this.fields ?? {})) {
-      if (document.activeElement === box || document.activeElement === slide) continue;
-      box.value = shown(frame.x[k], 6);
-      slide.value = frame.x[k];
+    for (const [k, field] of Object.entries(this.fields)) {
+      if (![field.box, field.slide].includes(document.activeElement)) this.put(field, frame.x[k]);
     }
     if (this.model.info.rows) get("residual").textContent = `loop residual ${this.model.residual(frame.t, frame.x).toExponential(1)}`;
   }
@@ -876,7 +874,7 @@ class Page {
       this.fields[k] = this.field("starts", label(info.x[k]), info.x0[k], -speed, speed, (value) => this.setStart(k, value));
     }
     this.settings = info.p.map((name, k) => this.field("parameters", label(name), info.pValues[k], ...info.ranges[name], (value) => this.setParameter(k, value), info.docs[name]));
-    this.forces = info.u.map((name, k) => this.field("inputs", label(name), model.inputs[k].text ?? info.uValues[k], ...info.ranges[name], (value) => this.setInput(k, value), info.docs[name]));
+    this.forces = info.u.map((name, k) => this.field("inputs", label(name), model.inputs[k], ...info.ranges[name], (value) => this.setInput(k, value), info.docs[name]));
     for (const id of ["parameters", "inputs", "starts"]) get(id).parentElement.hidden = !get(id).children.length;
     info.branches.forEach((_, k) => option(get("branch"), k, `assembly ${k + 1}`));
     get("branch").parentElement.hidden = info.branches.length < 2;
@@ -885,23 +883,29 @@ class Page {
 
   // A slider and a box for one value.
   field(home, text, value, low, high, set, about = "") {
-    const row = element("label", get(home), { className: "field", title: about }), number = Number(value);
+    const row = element("label", get(home), { className: "field", title: about });
     element("span", row, { textContent: text });
-    const slide = element("input", row, { type: "range", min: low, max: high, step: (high - low) / 500 || 1, value: Number.isNaN(number) ? 0 : number });
-    const box = element("input", row, { value: Number.isNaN(number) ? value : shown(number, 6), inputMode: "text", ariaLabel: text });
-    slide.oninput = () => { box.value = shown(Number(slide.value), 6); set(Number(slide.value)); };
+    const slide = element("input", row, { type: "range", min: low, max: high, step: (high - low) / 500 || 1, value: 0 });
+    const box = element("input", row, { inputMode: "text", ariaLabel: text }), made = { slide, box };
+    this.put(made, value);
+    slide.oninput = () => { this.put(made, Number(slide.value)); set(Number(slide.value)); };
     box.onchange = () => {
       const typed = box.value.trim(), entered = typed ? Number(typed) : NaN, words = home === "inputs" && typed && Number.isNaN(entered);
       if (!words && !Number.isFinite(entered)) { this.settle(); this.say(`${text} must be a finite number, not ${typed || "nothing"}`); return; }
       if (!words) slide.value = entered;
       set(words ? typed : entered);
     };
-    return { slide, box };
+    return made;
+  }
+
+  put({ slide, box }, value) {
+    box.value = typeof value === "number" ? shown(value, 6) : value;
+    if (typeof value === "number") slide.value = value;
   }
 
   // Another parameter: the state shown and the start go along; where loops cannot close, both stay.
   setParameter(k, value) {
-    const { model, start } = this, { info, p: before } = model, low = info.bounds[info.p[k]], now = this.frames[this.cursor];
+    const { model } = this, { info, p: before } = model, low = info.bounds[info.p[k]], now = this.frames[this.cursor];
     if (low && !(value >= low[0] && value <= low[1])) {
       this.settle();
       this.say(`${info.p[k]} must be from ${shown(low[0])} to ${shown(low[1])}`);
@@ -909,9 +913,9 @@ class Page {
     }
     const [x, p, reached] = model.reach(now.t, now.x, before.map((old, i) => (i === k ? value : old)), []);
     model.setParameters(before);
-    const [first, , whole] = model.reach(0, start.x, p, []);
+    const [first, , whole] = model.reach(0, this.start, p, []);
     model.setParameters(p);
-    this.start = { x: whole ? first : model.close(0, x, info.independent) ?? x, p };
+    this.start = whole ? first : model.close(0, x, info.independent) ?? x;
     this.settle();
     this.replace(now.t, x);
     this.say(!reached ? `the loops do not close with ${info.p[k]} = ${shown(value)}; the mechanism is shown with ${shown(p[k])}`
@@ -923,49 +927,36 @@ class Page {
     const { p, info } = this.model;
     this.picture.change(Object.fromEntries(info.p.map((name, k) => [name, p[k]])));
     this.changed = true;
-    this.settings.forEach(({ box, slide }, k) => { box.value = shown(p[k], 6); slide.value = p[k]; });
+    this.settings.forEach((field, k) => this.put(field, p[k]));
   }
 
   // Parameters, inputs and start as the model declares them.
   declare() {
     const { model } = this, { info } = model;
     model.setParameters(info.pValues);
-    this.forces.forEach((_, k) => this.declareInput(k));
-    this.start = { x: Float64Array.from(info.x0), p: model.p };
+    this.forces.forEach((_, k) => this.setInput(k, DECLARED));
     this.settle();
-    this.restart();
-  }
-
-  declareInput(k) {
-    this.model.declare(k);
-    const { text, value = 0 } = this.model.inputs[k], { box, slide } = this.forces[k];
-    box.value = text ?? shown(value, 6);
-    slide.value = value;
+    this.restart(Float64Array.from(info.x0));
   }
 
   replace(t, x) {
-    this.frames.length = this.cursor + 1;
-    this.frames.pop();
+    this.frames.length = this.cursor;
     this.keep(t, x);
     this.goOn();
   }
 
   // A coordinate or velocity to begin with.
   setStart(k, value) {
-    const { model } = this, [x, p, reached] = model.reach(0, this.frames[this.cursor].x, model.p, [[k, value]]);
-    this.start = { x, p };
+    const { model } = this, [x, , reached] = model.reach(0, this.frames[this.cursor].x, model.p, [[k, value]]);
     this.play(false);
-    this.restart();
-    if (!reached) this.say(`the loops do not close there; the picture shows ${model.info.x[k]} = ${shown(x[k])}`);
+    this.restart(x, reached ? "" : `the loops do not close there; the picture shows ${model.info.x[k]} = ${shown(x[k])}`);
   }
 
   setInput(k, value) {
     const { model } = this;
     try {
-      if (value === "as declared") this.declareInput(k);
-      else if (typeof value === "number") model.setInput(k, value);
-      else model.setTape(k, ...parseExpression(value, model.info));
-      if (value !== "as declared") model.inputs[k] = typeof value === "number" ? { value } : { text: value };
+      model.setInput(k, value);
+      this.put(this.forces[k], model.inputs[k]);
       this.say("");
     } catch (error) {
       this.say(error.message);
@@ -979,10 +970,8 @@ class Page {
     x.set(model.info.branches[k]);
     model.setParameters(model.info.pValues);
     const [closed, , reached] = model.reach(0, model.close(0, x, model.info.independent) ?? x, p, []);
-    this.start = { x: closed, p: model.p };
     this.settle();
-    this.restart();
-    if (!reached) this.say("these loops do not close with the parameters set; the boxes show those that they close with");
+    this.restart(closed, reached ? "" : "these loops do not close with the parameters set; the boxes show those that they close with");
   }
 
   reset() {
@@ -993,12 +982,10 @@ class Page {
 
   copy(kind) {
     const { model, start } = this, { info } = model, number = (x) => String(Number(x.toPrecision(15)));
-    const initial = [...info.independentQ, ...info.independent.map((j) => info.q.length + j)].map((k) => [info.x[k], number(start.x[k])]);
+    const initial = [...info.independentQ, ...info.independent.map((j) => info.q.length + j)].map((k) => [info.x[k], number(start[k])]);
     const parameters = info.p.map((name, k) => [name, number(model.p[k])]);
-    const inputs = info.u.flatMap((name, k) => {
-      const { declared, text, value } = model.inputs[k];
-      return declared ? [] : [[name, text ? JSON.stringify(text) : number(value)]];
-    });
+    const inputs = info.u.map((name, k) => [name, model.inputs[k]]).filter(([, value]) => value !== DECLARED)
+      .map(([name, value]) => [name, typeof value === "number" ? number(value) : JSON.stringify(value)]);
     const set = (pairs) => pairs.map(([name, value]) => `${JSON.stringify(name)}: ${value}`).join(", ");
     const text = kind === "python"
       ? `run = mod.simulate(${number(info.end)}, initial={${set(initial)}},\n    parameters={${set(parameters)}}, inputs={${set(inputs)}})`
@@ -1085,8 +1072,7 @@ class Page {
     const axes = [...right, ...up], reach = Math.max(...picture.high.map((h, k) => h - picture.low[k]));
     const moved = model.pull(0, frame.x, grip.body, grip.local, axes, [dot(right, target), dot(up, target)], reach);
     if (!moved || moved.some(Number.isNaN)) { this.say("the loops do not close there"); return; }
-    this.start = { x: moved, p: model.p };
-    this.restart();
+    this.restart(moved);
   }
 }
 

@@ -118,7 +118,7 @@ def test_events_and_inputs_over_time_are_those_of_simulate(tmp_path: Path) -> No
     run = module.simulate(1.5, t_eval=np.linspace(0.0, 1.4, 50))
     seen = in_node(page, run.t)
     assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
-    assert seen["inputs"] == [{"text": "as declared", "declared": True}]
+    assert seen["inputs"] == ["as declared"]
     assert [t for name, t in seen["happened"]] == pytest.approx(
         run.t_events["ground"][: len(seen["happened"])], abs=SAME
     )
@@ -166,13 +166,13 @@ def test_what_a_page_refuses_is_told_and_changes_nothing_else(opened: Browser) -
     assert put("tau (", "max(1, t, 2*sin(t))") == ""
     opened.evaluate("get('declared').click()")
     assert opened.evaluate(
-        "page.model.p.every((p, k) => p === page.model.info.pValues[k]) && !page.model.inputs[0].text"
+        "page.model.p.every((p, k) => p === page.model.info.pValues[k]) && page.model.inputs[0] === 0"
     )
 
     put("theta (", np.pi / 2)  # a start that longer cranks do not reach
-    opened.evaluate("page.replace(0, page.model.reach(0, page.start.x, page.model.p, [[0, 0.02]])[0])")
+    opened.evaluate("page.replace(0, page.model.reach(0, page.start, page.model.p, [[0, 0.02]])[0])")
     assert "what is shown is the start" in put("r (", 0.36)
-    assert opened.evaluate("page.model.residual(0, page.start.x)") < CLOSED
+    assert opened.evaluate("page.model.residual(0, page.start)") < CLOSED
 
     opened.evaluate("page.model.state = () => { throw new Error('lost'); }")
     opened.click("#play")
