@@ -404,17 +404,19 @@ class Picture {
 
   // -- camera --
 
-  // The box that the items fill now, in axes of the view.
-  extent() {
+  // The box that the items fill at several poses, with an edge, in axes of the view.
+  extent(several) {
     const { view } = this.data, low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
     for (const { drawn = [], body, follow, frames } of this.items) {
-      const pose = follow || frames ? IDENTITY : this.poses[body] ?? IDENTITY;
-      for (let k = 0; k + 2 < drawn.length; k += 3) {
-        const at = place(pose, drawn.slice(k, k + 3)), seen = view ? view.map((axis) => dot(axis, at)) : at;
-        if (!seen.some(Number.isNaN)) seen.forEach((x, i) => { low[i] = Math.min(low[i], x); high[i] = Math.max(high[i], x); });
+      for (const poses of follow || frames || body < 0 ? [[]] : several) {
+        for (let k = 0; k + 2 < drawn.length; k += 3) {
+          const at = place(poses[body] ?? IDENTITY, drawn.slice(k, k + 3)), seen = view ? view.map((axis) => dot(axis, at)) : at;
+          if (!seen.some(Number.isNaN)) seen.forEach((x, i) => { low[i] = Math.min(low[i], x); high[i] = Math.max(high[i], x); });
+        }
       }
     }
-    return { low, high };
+    const edge = 0.07 * Math.max(...high.map((x, i) => x - low[i]));
+    return { low: low.map((x) => x - edge), high: high.map((x) => x + edge) };
   }
 
   fit() {
@@ -771,9 +773,11 @@ class Page {
     if (this.model && this.count % 6 === 0) this.measure(frame);
   }
 
-  // The view on what is shown now, or on all of a film; after a change, wider where that leaves the view.
+  // The view on the run so far, or on all of a film; after a change, wider where the mechanism leaves the view.
   fit(anew) {
-    const { picture, data, model } = this, { low, high } = model ? picture.extent() : data, old = anew ? { low, high } : picture;
+    const { picture, data, model, frames } = this, every = anew ? Math.ceil(frames.length / 40) : Infinity;
+    const several = model ? frames.map((_, k) => k).filter((k) => k % every === 0 || k === this.cursor).map((k) => this.poses(k)) : [];
+    const { low, high } = model ? picture.extent(several) : data, old = anew ? { low, high } : picture;
     this.changed = false;
     const margin = 0.1 * Math.max(...old.high.map((x, k) => x - old.low[k]));
     if (!(low[0] <= high[0]) || (!anew && low.every((x, k) => x >= old.low[k] - margin && high[k] <= old.high[k] + margin))) return;
