@@ -99,7 +99,10 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[
 
 # -- C ----------------------------------------------------------------------------------------------------------------
 #: The literals of the metadata: harmless characters, and all others as escapes of three digits.
-METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
+METADATA = re.compile(
+    r'metadata_texts\[\] = \{\n#ifndef EOMGEN_WITHOUT_METADATA\n((?: +"(?:[A-Za-z0-9 _.,:-]|\\[0-7]{3})*",?\n)*)#endif\n'
+    r" +NULL\n\};"
+)
 
 
 def code_of(text: str) -> list[str]:
