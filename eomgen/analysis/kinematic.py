@@ -40,7 +40,7 @@ LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 tur
 
 
 class Range(NamedTuple):
-    """What is asked for: n points."""
+    """The requested positions: n points."""
 
     t: Array  #: (n,)
     names: tuple[str, ...]  #: of the led coordinates
@@ -139,45 +139,45 @@ def kinematic_analysis(
         Unknown names, wrong shapes, too many coordinates led.
     """
     require_support(module.layout, "kinematic_analysis")
-    asked = read_range(module, t, led)
+    requested = read_range(module, t, led)
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
-    return analyse(module, asked, initial, partial)
+    return analyse(module, requested, initial, partial)
 
 
-def analyse(module: BoundModel, asked: Range, initial: Start, partial: bool) -> KinematicAnalysis:
+def analyse(module: BoundModel, requested: Range, initial: Start, partial: bool) -> KinematicAnalysis:
     """Follow the range from the initial position."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
     partial = read_flag("partial", partial)
-    t0, y0 = float(asked.t[0]), asked.y[:, 0]
+    t0, y0 = float(requested.t[0]), requested.y[:, 0]
     start_t, q = start_from(module, initial, t0)
     try:
-        names = complete(module, q, start_t, asked.names)
+        names = complete(module, q, start_t, requested.names)
     except PartitionError:
-        if initial is not None or not asked.names:
+        if initial is not None or not requested.names:
             raise
         # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
-        start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
-        names = complete(module, q, start_t, asked.names)
+        start_t, q = start_from(module, dict(zip(requested.names, y0.tolist(), strict=True)), t0)
+        names = complete(module, q, start_t, requested.names)
     driven = DrivenCoordinates(module, names)
-    further = driven.led_values(q, start_t)[len(asked.names) :]
+    further = driven.led_values(q, start_t)[len(requested.names) :]
     start_y = driven.led_values(q, start_t)
-    led = len(asked.names)
-    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as asked for
+    led = len(requested.names)
+    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as requested
         start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
-    rest = np.repeat(further[:, None], len(asked.t), axis=1)
+    rest = np.repeat(further[:, None], len(requested.t), axis=1)
     still = np.zeros_like(rest)
-    asked = Range(
-        asked.t,
+    requested = Range(
+        requested.t,
         names,
-        np.concatenate([asked.y, rest]),
-        np.concatenate([asked.y1, still]),
-        np.concatenate([asked.y2, still]),
+        np.concatenate([requested.y, rest]),
+        np.concatenate([requested.y1, still]),
+        np.concatenate([requested.y2, still]),
     )
-    _refuse_long_ways(driven, names, np.column_stack([start_y, asked.y]))
-    q = follow_to_start(driven, q, (start_t, start_y), (t0, asked.y[:, 0]))
-    return follow_range(driven, asked, q, partial, led)
+    _refuse_long_ways(driven, names, np.column_stack([start_y, requested.y]))
+    q = follow_to_start(driven, q, (start_t, start_y), (t0, requested.y[:, 0]))
+    return follow_range(driven, requested, q, partial, led)
 
 
 def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
@@ -192,18 +192,18 @@ def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array)
         )
 
 
-def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
+def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
     """Straight pieces one after the other."""
-    n = len(asked.t)
-    pieces = _pieces(driven, asked)
+    n = len(requested.t)
+    pieces = _pieces(driven, requested)
     columns: list[tuple[Array, Array, Array]] = []
     found: list[Singular] = []
     stop: Singular | None = None
-    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
+    extents = float(np.ptp(requested.t)), largest(np.ptp(requested.y, axis=1) / driven.led_scales)
     count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
     for first, last in pieces:
-        t, y = float(asked.t[first]), asked.y[:, first]
-        dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
+        t, y = float(requested.t[first]), requested.y[:, first]
+        dt, dy = requested.t[first : last + 1] - t, requested.y[:, first : last + 1] - y[:, None]
         length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
         path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
@@ -213,7 +213,7 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
         reach = np.array([followed.holds(s) for s in along])
         taken = np.arange(len(along))[new][reach[new]]
         index = first + taken
-        columns.append(followed.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
+        columns.append(followed.motion(along[taken], (requested.y1[:, index], requested.y2[:, index])))
         count += len(taken)
         points += [(done + p.s, path.at(p.s)[0], p.q) for p in followed.continuation.points if followed.holds(p.s)]
         places.append(done + along[taken])
@@ -228,9 +228,13 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
     x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
     order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
     passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
-    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led], passed=passed)
+    result = keep(driven, requested.t[:count], columns, found, stop, n, requested.names[:led], passed=passed)
     if count < n and not partial:
-        gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
+        gap = (
+            ""
+            if stop is None
+            else describe_gap(driven, float(requested.t[count]), requested.y[:, count], stop.q) + "; "
+        )
         error = PartitionError(
             f"the range cannot be followed to its end: {stop}; {gap}give partial=True for the part that can be reached "
             f"({count} of {n} points)",
@@ -242,9 +246,9 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
     return result
 
 
-def _pieces(driven: DrivenCoordinates, asked: Range) -> list[tuple[int, int]]:
+def _pieces(driven: DrivenCoordinates, requested: Range) -> list[tuple[int, int]]:
     """First and last indices of straight pieces of the range."""
-    scaled = np.concatenate([asked.t[None, :], asked.y / driven.led_scales[:, None]])
+    scaled = np.concatenate([requested.t[None, :], requested.y / driven.led_scales[:, None]])
     steps = np.diff(scaled, axis=1)
     sizes = np.abs(steps).max(axis=0) if steps.size else np.empty(0)
     pieces: list[tuple[int, int]] = []
@@ -262,7 +266,7 @@ def _pieces(driven: DrivenCoordinates, asked: Range) -> list[tuple[int, int]]:
             direction = here
         elif direction is None:
             direction = here
-    pieces.append((first, len(asked.t) - 1))
+    pieces.append((first, len(requested.t) - 1))
     return pieces
 
 
