@@ -37,6 +37,7 @@ from ..runtime.runs.events import GO_ON, PAUSE, RESET, UNWATCHED, WAIT, Events
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.trajectory import Trajectory
 
 
 # -- what is differentiated by, and inputs -----------------------------------------------------------------------------
@@ -298,14 +299,32 @@ class Variational:
         """z of x and S."""
         return np.concatenate([x, (S * self.weights).ravel()])
 
-    def outputs(self, t: float, x: Array, S: Array) -> Array:
-        """Derivatives (n_y, k) of the outputs."""
-        layout, here = self.module.layout, self.at(t, x)
+    def rates(self, t: Array, x: Array, S: Array | None) -> tuple[Array, Array, Array, Array, Array]:
+        """At times (m,) and states (n_x, m): inputs and x', the tangent (m, n_x, n_x), what drives S' beside it, and
+        the changes of inputs (m, n_u, k) that go with S (m, n_x, k)."""
+        u = self.forcing.sample(t, x) if self.forcing else np.repeat(self.module.u[:, None], len(t), axis=1)
+        du = np.broadcast_to(self.du, (len(t), *self.du.shape))
+        if self.forcing and S is not None:
+            du = np.array([self.move(float(at), x[:, j], S[j]).u for j, at in enumerate(t)])
+        J, by = np.moveaxis(self.tangent(t, x, u=u), -1, 0), np.zeros((len(t), *self.still.x.shape))
+        if self.columns.parameters:
+            by = np.moveaxis(self.by_p(t, x, u=u), -1, 0) @ self.dp
+        if self.columns.inputs or self.inputs.by_state_or_parameters:
+            by = by + np.moveaxis(self.by_u(t, x, u=u), -1, 0) @ du
+        return u, self.rhs(t, x, u=u), J, by, du
+
+    def with_outputs(self, run: Trajectory, S: Array) -> tuple[Array, Array]:
+        """S (n_t, n_x, k) of a run, and the derivatives of its outputs, as (n_x, k, n_t) and (n_y, k, n_t)."""
+        layout, t, x = self.module.layout, run.t, run.x
         n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
-        x_dot, S_dot = self.slopes(t, x, S)
-        Y, move = here.kernels.output_derivatives(x[:n_q], x[n_q:], x_dot[n_q:], t=t), self.move(t, x, S)
-        by_u, by_p = Y[:, n_x + n_v : n_x + n_v + n_u], Y[:, n_x + n_v + n_u :]
-        return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
+        dy = np.zeros((len(t), layout.n_y, S.shape[2]))
+        if layout.n_y:
+            u, x_dot, J, by, du = self.rates(t, x, S)
+            kernel = self.module.kernels.kernel("output_derivatives")
+            Y = np.moveaxis(kernel(x[:n_q], x[n_q:], x_dot[n_q:], t=t, u=u), -1, 0)
+            by_x, by_a, by_u, by_p = np.split(Y, np.cumsum((n_x, n_v, n_u)), axis=2)
+            dy = by_x @ S + by_a @ (J @ S + by)[:, n_q:] + by_u @ du + by_p @ self.dp
+        return np.moveaxis(S, 0, -1), np.moveaxis(dy, 0, -1)
 
 
 def _weights(module: BoundModel, columns: Differentiated) -> Array:

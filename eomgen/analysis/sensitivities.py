@@ -2,11 +2,17 @@
 
 Forward sensitivities: S' = J S + df/dp beside x' = f (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
 Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
+
+S' is linear in S, so it needs no steps of its own: along those of the compiled run, on each the four nodes of Gauss's
+formula of order 8 (section II.7), all Jacobians come from one call and all steps from one set of linear systems. The
+same formula applied to the run itself tells whether the steps are short enough.  Where they are not, and for loops,
+events and laws of inputs that depend on the state, both are integrated together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Unpack
@@ -17,7 +23,7 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array, Indices
 from ..base.files import whole_file
-from ..base.limits.analyses import SINGULAR
+from ..base.limits.analyses import QUADRATURE, SINGULAR
 from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
 from ..base.limits.impacts import OPENS
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
@@ -29,7 +35,7 @@ from ..runtime.change_points import scaled_jacobians, singular_values
 from ..runtime.columns import Named
 from ..runtime.failure import place
 from ..runtime.initial import Initial
-from ..runtime.inputs import Forcing
+from ..runtime.inputs import Forcing, Table
 from ..runtime.layout import Layout, start_slopes
 from ..runtime.refusals import require_support
 from ..runtime.runs.bound_run import Crawling, Run
@@ -341,6 +347,63 @@ def _named(columns: Differentiated, pairs: tuple[tuple[int, int], ...]) -> list[
     return [(columns.names[column], index) for column, index in pairs]
 
 
+# -- along the steps of a run ------------------------------------------------------------------------------------------
+
+#: Nodes and weights of Gauss's formula with four nodes on [0, 1], its matrix by the conditions C(4):
+#: sum_j a_ij c_j^(k-1) = c_i^k / k.
+NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(4)[0] + 1.0), 0.5 * np.polynomial.legendre.leggauss(4)[1])
+POWERS = np.arange(1, 5)
+MATRIX = algebra.solve(NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] ** POWERS[:, None]) / POWERS[:, None]).T
+#: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
+#: more in the derivatives than in the run.
+TIGHTER = 0.1
+
+
+def serves(module: BoundModel, forcing: Forcing) -> bool:
+    """Whether derivatives can be had along the steps of a run: no constraints, and inputs of time alone, smooth."""
+    layout, formulas = module.layout, forcing.formulas
+    if layout.n_c or layout.quaternion_slots or layout.given_rates:
+        return False
+    if any(f.branches or any(op in ("x", "p") for op, *_ in f.tape[0]) for f in formulas.values()):
+        return False
+    return all(i in formulas or isinstance(signal, Table) for i, signal in forcing.varying.items())
+
+
+def find_along(run: Variational, simulated: Callable[..., Trajectory], corners: Sequence[float], S: Array,
+               times: Array, settings: Mapping[str, Any]) -> Array | None:  # fmt: skip
+    """S (n_t, n_x, k) at times of a run, from S at its start, where Gauss's formula meets the run; else None."""
+    tight = {**settings, **{name: TIGHTER * settings[name] for name in ("rtol", "atol")}}
+    grid = np.unique(np.concatenate([simulated(**tight).t, times, corners]))
+    h, n_x = np.diff(grid), len(S)
+    t = (grid[:-1, None] + h[:, None] * NODES).ravel()
+    whole = simulated(**tight, t_eval=np.unique(np.concatenate([t, grid])))
+    x, ends = whole.x[:, np.searchsorted(whole.t, t)], whole.x[:, np.searchsorted(whole.t, grid)]
+    _, rate, J, by, _ = run.rates(t, x, None)
+    missed = ends[:, :-1] + h * (rate.reshape(n_x, len(h), -1) @ WEIGHTS) - ends[:, 1:]
+    if not np.abs(missed).max(initial=0.0) <= QUADRATURE * np.min(settings["rtol"]) * np.abs(whole.x).max():
+        return None
+    return integrate_linear(h, J, by, S)[np.searchsorted(grid, times)]
+
+
+def integrate_linear(h: Array, J: Array, by: Array, start: Array) -> Array:
+    """S (steps + 1, n, k) of S' = J S + by, J and by at the nodes of all steps.
+
+    Slopes K_i = J_i (S + h sum_j a_ij K_j) + by_i: of each step one system in all K_i, with S and by on its right side.
+    """
+    count, n, s = len(h), start.shape[0], len(NODES)
+    J, by = J.reshape(count, s, n, n), by.reshape(count, s, n, -1)
+    system = -np.einsum("m,ij,mipq->mipjq", h, MATRIX, J).reshape(count, s * n, s * n)
+    system[:, range(s * n), range(s * n)] += 1.0
+    right = np.concatenate([J, by], axis=-1).reshape(count, s * n, -1)
+    K = algebra.solve(system, right).reshape(count, s, n, -1)
+    gain = h[:, None, None] * np.einsum("i,mipq->mpq", WEIGHTS, K)
+    found = np.empty((count + 1, *start.shape))
+    found[0] = start
+    for m in range(count):
+        found[m + 1] = found[m] + gain[m, :, :n] @ found[m] + gain[m, :, n:]
+    return found
+
+
 # -- the run -----------------------------------------------------------------------------------------------------------
 
 
@@ -423,9 +486,16 @@ def sensitivities(
     S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
     solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
+    times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
+    if not salts and stop > start and serves(bound, forcing):
+        simulated = partial(simulate, bound, (start, stop), x0, None, inputs, events=events, method=method)
+        with told_by_the_caller():
+            trajectory = simulated(**settings, t_eval=times)
+            S = find_along(run, simulated, corners, S0, trajectory.t, settings)
+        if S is not None:
+            return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held)
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
-    times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
     title, watch = solver.__name__, Run(bound, forcing)
     watch.begin(start, stop, x0, float(settings.get("max_step", np.inf)), len(z0) if times is None else 0)
@@ -456,13 +526,8 @@ def sensitivities(
     if alone is not None:
         _require_same(trajectory, alone)
     refuse_lost_branches(bound, forcing, trajectory, columns)
-    dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
-    for j, time in enumerate(trajectory.t):
-        t, x = float(time), trajectory.x[:, j]
-        dx[..., j] = run.consistent(t, x, raw[..., j])
-        if layout.n_y:
-            dy[..., j] = run.outputs(t, x, dx[..., j])
-    return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
+    S = np.array([run.consistent(float(t), trajectory.x[:, j], raw[..., j]) for j, t in enumerate(trajectory.t)])
+    return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held, salts.found)
 
 
 def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:

@@ -102,9 +102,9 @@ ROUNDED_COEFFICIENT = 1e-11
 #: By which forces may miss a straight line in a parameter that linear least squares find, over the largest force:
 #: differences of three evaluations keep 14 digits, and what is not linear misses by a part of its own size.
 LINEAR = 1e-10
-#: By which Gauss's formula may miss a run over one of its steps, over the largest state, for its nodes to carry the
-#: derivatives too: runs are integrated to 1e-8, a law that bends within a step misses by the step times the bend.
-QUADRATURE = 1e-7
+#: Relative tolerances of a run by which Gauss's formula may miss it over one of its steps, over the largest state, for
+#: its nodes to carry the derivatives too: a law that bends within a step misses by the step times the bend.
+QUADRATURE = 10.0
 
 
 # -- verification, by differences and runs of limited length -----------------------------------------------------------
