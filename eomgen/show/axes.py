@@ -175,23 +175,20 @@ def places(
         Corners of the axes.
     """
     turns = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    ways = np.column_stack([np.cos(turns), np.sin(turns)])
-    taken: list[tuple[Array, Array]] = []
-    found = []
+    ways = np.tile(np.column_stack([np.cos(turns), np.sin(turns)]), (len(DISTANCES), 1))
+    distances = np.repeat(DISTANCES, DIRECTIONS)
+    taken, found = np.empty((0, 4)), []  # middles and halves of the names that have a place
     for point, text in zip(points, texts, strict=True):
-        half = 0.5 * size * np.array([WIDE * len(text) + EDGE, TALL + EDGE])
-        best, least = np.zeros(2), np.inf
-        for distance in DISTANCES:
-            for way in ways:
-                offset = way * distance + way * half
-                middle = point + offset
-                cost = FAR * distance + float((np.abs(drawn - middle) < half + 1.0).all(axis=1).sum())
-                cost += ON_A_NAME * sum(bool((np.abs(other - middle) < half + h).all()) for other, h in taken)
-                cost += OUTSIDE * bool((middle - half < low).any() or (middle + half > high).any())
-                if cost < least:
-                    best, least = offset, cost
-        taken.append((point + best, half))
-        found.append(best)
+        lines = text.split("\n")
+        half = 0.5 * size * np.array([WIDE * max(map(len, lines)) + EDGE, TALL * len(lines) + EDGE])
+        offsets = ways * (distances[:, None] + half)
+        middles = (point + offsets)[:, None]
+        near = drawn[(np.abs(drawn - point) < DISTANCES[-1] + 2.0 * half + 1.0).all(axis=1)]
+        cost = FAR * distances + (np.abs(near - middles) < half + 1.0).all(axis=2).sum(axis=1)
+        cost += ON_A_NAME * (np.abs(taken[:, :2] - middles) < half + taken[:, 2:]).all(axis=2).sum(axis=1)
+        cost += OUTSIDE * ((middles - half < low) | (middles + half > high)).any(axis=(1, 2))
+        found.append(offsets[cost.argmin()])
+        taken = np.vstack([taken, [*(point + found[-1]), *half]])
     return found
 
 

@@ -389,6 +389,17 @@ def test_shapes_of_urdf_have_the_colors_of_their_materials(tmp_path: Path) -> No
     assert blue > green > red
 
 
+# -- graphs of mechanisms ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["jansen_leg", "planetary_gear", "excavator"])
+def test_names_in_the_graph_of_a_mechanism_cover_no_other(name: str) -> None:
+    ax = eg.load_example(name).check().draw()
+    ax.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
+
+
 # -- notebooks --------------------------------------------------------------------------------------------------------
 
 
