@@ -324,8 +324,7 @@ class ImpactRun(Trajectory):
 
 
 AT_REST = 0.1  #: part of the size at which gaps count as closed by which one that stays closed may fall
-ENDLESS = 10**9  #: impacts in a row
-IDLE = 50  #: starts in a row that bring no time
+IDLE = 50  #: events in a row without an impact
 
 
 class GapEvents(Events):
@@ -346,9 +345,7 @@ class GapEvents(Events):
     ----------
     impacts : list of (float, Impact)
     ended : str
-        Why the run is over; empty while it is not, or where it has to begin anew beside a gap that stays closed.
-    over : bool
-        Whether the integration ends here.
+        Why the run is over; empty while it is not.
     """
 
     def __init__(self, gaps: Gaps, restitutions: Mapping[str, float], rough: Rough, most: int, end: float) -> None:
@@ -356,7 +353,7 @@ class GapEvents(Events):
         self.gaps, self.restitutions, self.rough, self.most, self.end = gaps, restitutions, rough, most, end
         self.limits = allowance(gaps.layout, gaps.names, TOUCHING)
         self.impacts: list[tuple[float, Impact]] = []
-        self.fastest, self.ended, self.over = 0.0, "", False
+        self.fastest, self.ended = 0.0, ""
         self._first, self._known, self._values = len(self.names), (np.nan, b""), np.zeros(len(gaps.names))
         for i, name in enumerate(gaps.names):
             self.functions.append(RunEvent(partial(self._value, i), name, 0, -1, WAIT))
@@ -377,11 +374,11 @@ class GapEvents(Events):
         resting = (values <= allowed) & (self.gaps.rates(t, x) <= 0.0)
         self._lift = np.where(values < STARTED * self.limits, values, 0.0)
         self._lift[resting] = (values - allowed)[resting]
-        self.over = False
+        self._known = np.nan, b""
 
     def encode(self) -> dict[str, Any]:
         """As the loop takes them; impacts may follow each other as fast as they do."""
-        return {**(super().encode() or {}), "crowd": ENDLESS}
+        return {**(super().encode() or {}), "crowd": self.most + IDLE}
 
     def _value(self, i: int, t: float, x: Array) -> float:
         """A gap; all of them are asked for in turn."""
@@ -397,7 +394,10 @@ class GapEvents(Events):
         closed = self.gaps.values(t, x) <= self.limits
         closed[[i - self._first for i in fired if i >= self._first]] = True
         x = self._impact_of(t, x, closed)  # before the model's own impact of the same gap, which then finds it opening
-        return super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
+        x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
+        if self.stays:
+            self.arm(t, x)
+        return x
 
     def crowded(self, t: float, count: int) -> SimulationError:
         """The error for gaps that close without an impact."""
@@ -421,7 +421,7 @@ class GapEvents(Events):
             self.ended = "rest"
         elif len(self.impacts) >= self.most:
             self.ended = "impacts"
-        self.over = bool(self.ended) or bool(slow.any())
+        self.over, self.stays = bool(self.ended), bool(slow.any())
         return x
 
     def _slow(self, t: float, x: Array, closed: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -519,41 +519,30 @@ def simulate_impacts(
     events = GapEvents(Gaps(bound, tuple(found), forcing if forcing else None), found, rough, most, end)
     before = find_state(bound, initial, start, forcing)
     first = events.begin(start, before)
-    parts: list[Trajectory] = []
+    events.arm(start, first)
+    run = None
     t, x = np.array([start]), first[:, None]
-    idle = 0
-    while not events.ended and t[-1] < end:
-        began = float(t[-1])
-        events.arm(began, x[:, -1])
-        part = simulate(bound, (began, end), x[:, -1], None, inputs, events=events, dense_output=True, **options)
-        parts.append(part)
-        fresh = np.append(False, (np.diff(part.t) != 0.0) | (np.diff(part.x, axis=1) != 0.0).any(axis=0))
-        t, x = np.append(t, part.t[fresh]), np.hstack([x, part.x[:, fresh]])
-        idle = 0 if t[-1] > began else idle + 1
-        if idle > IDLE:
-            raise events.crowded(began, idle)
-        if not events.over:
-            break
+    if not events.ended and start < end:
+        run = simulate(bound, (start, end), first, None, inputs, events=events, dense_output=True, **options)
+        fresh = np.append(True, (np.diff(run.t) != 0.0) | (np.diff(run.x, axis=1) != 0.0).any(axis=0))
+        t, x = run.t[fresh], run.x[:, fresh]
     if events.impacts and events.impacts[0][0] == start:
         t, x = np.append(start, t), np.hstack([before[:, None], x])
-    ended = events.ended or ("event" if t[-1] < end else "end")
-    return _record(bound, forcing, events, t, x, parts, ended)
+    return _record(bound, forcing, events, t, x, run, events.ended or ("event" if t[-1] < end else "end"))
 
 
 def _record(
-    module: BoundModel, forcing: Forcing, events: GapEvents, t: Array, x: Array, parts: Sequence[Trajectory], ended: str
+    module: BoundModel, forcing: Forcing, events: GapEvents, t: Array, x: Array, run: Trajectory | None, ended: str
 ) -> ImpactRun:
-    """All of it as one trajectory."""
+    """All of it as one trajectory; without a run where it ends at once."""
     gaps = events.gaps
     _refuse_beyond(gaps, t, x)
     columns = Columns(module, t, x, forcing.sample(t, x))
-    off = np.max([[*part.residuals] for part in parts] or [[*Residuals()]], axis=0)
-    options = parts[-1].metadata if parts else {}
-    counts = {key: sum(getattr(part, key) for part in parts) for key in ("nfev", "njev", "nlu")}
+    options = {} if run is None else run.metadata
+    counts = {key: 0 if run is None else getattr(run, key) for key in ("nfev", "njev", "nlu")}
     status, ends_at = 0 if ended == "end" else 1, (float(t[0]), float(t[-1]))
-    known = header_of(
-        module.layout, options.get("method"), options, gaps.names, Residuals(*off.tolist()), status, "", counts, ends_at
-    )
+    residuals = Residuals() if run is None else run.residuals
+    known = header_of(module.layout, options.get("method"), options, gaps.names, residuals, status, "", counts, ends_at)
     header = {**describe(module), **known}
     hits: dict[str, list[tuple[float, Array]]] = {name: [] for name in gaps.names}
     for time, impact in events.impacts:
@@ -564,14 +553,10 @@ def _record(
     x_events = [np.array([before for _, before in of]).reshape(-1, len(x)).T for of in hits.values()]
     times = {time for time, _ in events.impacts}
     breaks = [k for k in range(1, len(t)) if t[k] == t[k - 1] and float(t[k]) in times]
-    ends = np.array([float(part.t[-1]) for part in parts])
     only = x[:, :1]
 
     def sample(times: Array) -> Trajectory:
-        which = np.searchsorted(ends, times)
-        states = np.repeat(only, len(times), axis=1)
-        for k in np.unique(which[which < len(parts)]):
-            states[:, which == k] = parts[k].at(times[which == k]).x
+        states = np.repeat(only, len(times), axis=1) if run is None else run.at(times).x
         return Trajectory(times, states, Columns(module, times, states, forcing.sample(times, states)), header)
 
     made = ImpactRun.of((t, x, columns, header, t_events, x_events, sample), events.impacts, breaks, ended)
