@@ -401,7 +401,7 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     require_support(module.layout, "base_parameters")
     if not 0.0 <= read_number("least", least) < 1.0:
         raise off_range(f"least must be 0 or positive and less than 1, not {least:g}")
-    module = module if p is None else module.bind(p)
+    module = module.bind(p)
     standard = standard_names(module)
     count = ROWS * len(standard) // max(1, module.n_dof) + SPARE
     W = _observe(module, np.random.default_rng(seed), count)

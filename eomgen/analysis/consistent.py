@@ -80,7 +80,7 @@ def consistent(
     -----
     ``project(x)`` is the same with weights 1 to first order in the change; ``x0`` starts from named values.
     """
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     layout, t = module.layout, read_number("t", t)
     state = np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):

@@ -124,7 +124,7 @@ def actuator_forces(
     UsageError
         A name is unknown, the accelerations violate the constraints, or the drives cannot make the motion.
     """
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     layout = module.layout
     require_support(layout, "actuator_forces")
     states = prepare(module, t, x)

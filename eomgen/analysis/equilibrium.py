@@ -217,7 +217,7 @@ def equilibrium(
         A constraint that closes and opens is closed there, or states are sampled, or contacts rigid.
     """
     require_support(module.layout, "equilibrium")
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     time = read_number("t", t)
     unknowns = read_names("unknowns", unknowns)
     by_name = isinstance(hold, Mapping)

@@ -205,7 +205,7 @@ def impact(
     each other are closed together, impulses obey Newton's and Coulomb's laws for the velocities after the impact; where
     that would bring in energy, restitutions are multiplied by the largest factor with which it does not.
     """
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     found, locked = check_gaps(module.layout, gaps, lock)
     rough = check_friction(module.layout, friction, found)
     if rough and locked:

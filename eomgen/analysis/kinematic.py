@@ -140,9 +140,7 @@ def kinematic_analysis(
     """
     require_support(module.layout, "kinematic_analysis")
     requested = read_range(module, t, led)
-    if parameters is not None or inputs is not None:
-        module = module.bind(parameters, inputs)
-    return analyse(module, requested, initial, partial)
+    return analyse(module.bind(parameters, inputs), requested, initial, partial)
 
 
 def analyse(module: BoundModel, requested: Range, initial: Start, partial: bool) -> KinematicAnalysis:
@@ -358,10 +356,8 @@ def motion_range(
         As :meth:`kinematic_analysis`.
     """
     require_support(module.layout, "motion_range")
-    if parameters is not None or inputs is not None:
-        module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):
-        return _follow_both_ways(module, name, initial, t, within)
+        return _follow_both_ways(module.bind(parameters, inputs), name, initial, t, within)
 
 
 def _follow_both_ways(

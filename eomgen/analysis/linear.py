@@ -150,7 +150,7 @@ def linearize(
     if not isinstance(form, str) or form not in FORMS:
         raise no_choice(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     require_support(module.layout, "linearize")
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     layout, time = module.layout, read_number("t", t)
     state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):

@@ -274,7 +274,7 @@ def modes(
     EquilibriumError
         None was found.
     """
-    module = module if p is None and u is None else module.bind(p, u)
+    module = module.bind(p, u)
     if x is None:
         x = equilibrium(module, t=t).x
     if isinstance(x, Mapping):

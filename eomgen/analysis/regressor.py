@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -187,16 +186,12 @@ def inertial_remainder(
     (n_v,) or (n_v, k) array
     """
     pi = np.array(list(standard_parameters(module, p).values()))
-    whole = module.inverse_dynamics(q, v, a, p=_values(module, p), u=_inputs(module, u), t=t)
+    whole = module.inverse_dynamics(q, v, a, p=_values(module, p), u=module.kernels.fail.vector("u", u, module.u), t=t)
     return into(out, whole - np.tensordot(pi, regressor(module, q, v, a, p=p, t=t), (0, 1)))
 
 
 def _values(module: BoundModel, p: Any) -> Any:
-    return module.layout.values("parameter", module.layout.p, p, module.p) if isinstance(p, Mapping) else p
-
-
-def _inputs(module: BoundModel, u: Any) -> Any:
-    return module.layout.values("input", module.layout.u, u, module.u) if isinstance(u, Mapping) else u
+    return module.kernels.fail.vector("p", p, module.p)
 
 
 def _motion(

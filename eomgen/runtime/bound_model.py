@@ -136,6 +136,8 @@ class BoundModel:
         UsageError
             An unknown name or a wrong shape.
         """
+        if p is None and u is None:
+            return self
         layout = self.layout
         return self.rebound(
             layout.values("parameter", layout.p, p, self.p), layout.values("input", layout.u, u, self.u)
@@ -361,8 +363,7 @@ class BoundModel:
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "state" if name in layout.states else "velocity" if name in layout.v else "coordinate"
                 raise ill_placed(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
-        kernels = (self if p is None and u is None else self.bind(p, u)).kernels
-        return Initial(kernels, read_number("t", t), map(str, names))
+        return Initial(self.bind(p, u).kernels, read_number("t", t), map(str, names))
 
     # kinematics
 

@@ -18,6 +18,7 @@ from ..base.algebra import Array
 from ..base.limits.constraints import GONE
 from ..base.limits.constraints import PASSED as SINGULAR
 from ..base.limits.numbers import TINY
+from ..base.numeric.splines import cubic_piece
 from ..errors import EvaluationError
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ class StatesBetween:
         s = (times - t[k]) / h
         q0, q1 = self.x[: self.n_q, k], self.x[: self.n_q, k + 1]
         d0, d1 = self.rates[:, k] * h, self.rates[:, k + 1] * h
-        q = q0 + s * d0 + s**2 * (3.0 * (q1 - q0) - 2.0 * d0 - d1) + s**3 * (d0 + d1 - 2.0 * (q1 - q0))
+        q = cubic_piece(q0, q1, d0, d1, s)
         if self.bends is not None:  # what the second derivatives at the ends lack
             b0 = self.bends[:, k] * h**2 - 6.0 * (q1 - q0) + 4.0 * d0 + 2.0 * d1
             b1 = self.bends[:, k + 1] * h**2 + 6.0 * (q1 - q0) - 2.0 * d0 - 4.0 * d1

@@ -98,10 +98,8 @@ def _all_rows(module: BoundModel) -> Any:
 def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:
     """Check and project states."""
     layout = module.layout
-    if isinstance(p, Mapping):
-        p = layout.values("parameter", layout.p, p, module.p)
-    if isinstance(u, Mapping):
-        u = layout.values("input", layout.u, u, module.u)
+    read = module.kernels.fail.vector
+    p, u = read("p", p, module.p), read("u", u, module.u)
     state = read_numbers("x", x)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise ill_shaped(

@@ -20,7 +20,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE, LOCATED, MOMENT
-from ..base.numeric.splines import slopes
+from ..base.numeric.splines import curve_coefficients, slopes
 from ..base.texts import shown
 from ..errors import (
     ExpressionError,
@@ -191,16 +191,13 @@ class Signal(Table):
 
 def _rows(times: Array, values: Array, order: int) -> Array:
     """The pieces of a table: value, slope, half the curvature, a sixth of the third derivative of each."""
+    if order == 3 and len(times) > 1:
+        rows = curve_coefficients(times, values, slopes(times, values, "cubic"), False)
+        return np.ascontiguousarray(rows[:, ::-1])
     rows = np.zeros((len(times) + 1, 4))
     rows[0, 0], rows[1:, 0] = values[0], values
-    if order and len(times) > 1:
-        h = np.diff(times)
-        rise = np.diff(values) / h
-        rows[1:-1, 1] = rise
-        if order == 3:
-            slope = slopes(times, values, "cubic")
-            bend = (slope[:-1] + slope[1:] - 2.0 * rise) / h
-            rows[1:-1, 1], rows[1:-1, 2], rows[1:-1, 3] = slope[:-1], (rise - slope[:-1]) / h - bend, bend / h
+    if order:
+        rows[1:-1, 1] = np.diff(values) / np.diff(times)
     return rows
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
 from ..base.limits.analyses import FOLLOWED
-from ..base.numeric.continuation import ASTRAY, LONG, STEPS, Continuation, Point, Tangent, interpolate
+from ..base.numeric.continuation import ASTRAY, LONG, STEPS, Continuation, StraightPath, Tangent, interpolate
 from ..base.numeric.projection import largest
 from ..errors import EvaluationError, PartitionError, ProjectionError, at_odds, ill_shaped, no_number, too_large
 from .argument_checks import both_names, read_number, read_numbers
@@ -31,56 +31,6 @@ EARLY = 1000  #: steps after which a way is refused that is too long at the pres
 JUMP = 0.6  #: largest scaled change of any coordinate in one iteration; more may be another branch
 
 
-class IndependentPath:
-    """Closed positions while the independent coordinates go along a straight line; s is the scaled distance.
-
-    Parameters
-    ----------
-    motion : DependentMotion
-    start : (n_q,) array
-        A closed position.
-    target : (n_dof,) array
-        Independent coordinates at the end.
-    t : float
-    """
-
-    def __init__(self, motion: DependentMotion, start: Array, target: Array, t: float) -> None:
-        self.motion, self.target, self.t = motion, target, t
-        self.scales, self.origin = motion.layout.scales, start[motion.layout.independent_q]
-        way = target - self.origin
-        self.length = float(np.abs(way / motion.scales_i).max(initial=0.0))
-        self.rate = way / (self.length or 1.0)
-        self.failed = np.empty(0)  # what the kernel gave where it found nothing
-        n_q, n = len(start), len(self.scales.q)
-        self.drifts = bool(self._kinematics(0.0, np.zeros_like(way), start)[n_q : n_q + n].any())
-
-    def at(self, s: float) -> Array:
-        """Independent coordinates."""
-        return self.target if s == self.length else self.origin + s * self.rate
-
-    def solve(self, s: float, guess: Array) -> Point | None:
-        """The point next to a guess, by one Newton iteration of the kernel."""
-        n_q = len(guess)
-        found = self._kinematics(s, self.rate, guess)
-        if not np.isfinite(found).all():
-            self.failed = found
-            return None
-        q, v = found[:n_q], found[n_q : n_q + len(self.scales.q)]
-        if self.drifts:  # the time stands still here
-            v = v - self._kinematics(s, np.zeros_like(self.rate), q)[n_q : n_q + len(v)]
-        return Point(s, q, Tangent(v))
-
-    def tangent(self, s: float, q: Array) -> Tangent:
-        """The direction at a position."""
-        found = self.solve(s, q)
-        return Tangent(np.zeros_like(self.scales.q)) if found is None else found.tangent
-
-    def _kinematics(self, s: float, rate: Array, guess: Array) -> Array:
-        rest = np.zeros(self.motion.layout.n_states)  # states stand still
-        x = np.concatenate([self.at(s), rate, rest, np.zeros_like(rate), rest, guess])
-        return np.asarray(self.motion.kernel(x, t=self.t))
-
-
 class DependentMotion:
     """Solves the dependent coordinates of one model, never switching branch silently."""
 
@@ -89,7 +39,9 @@ class DependentMotion:
         self.fail = kernels.fail
         if layout.rank:
             self.kernel = kernels.kernel("kinematics", nan=True)
-        self.scales_i = layout.scales.q[layout.independent_moving]
+        self.scales, self.scales_i = layout.scales, layout.scales.q[layout.independent_moving]
+        self.drifts = False  #: whether the time alone moves the mechanism where a path is followed
+        self.failed = np.empty(0)  #: what the kernel gave where it found nothing
 
     def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:
         """[q, v, a] (3 n,) by one Newton iteration from a guess, wherever it leads."""
@@ -113,17 +65,46 @@ class DependentMotion:
             return result
         return self.newton(q_i, v_i, a_i, self.follow(near, q_i, t), t)
 
+    def solve(self, t: float, y: Array, t1: float, y1: Array, guess: Array) -> tuple[Array, Tangent] | None:
+        """The position next to a guess by one Newton iteration of the kernel, and its direction at this time."""
+        n_q, n = len(guess), len(self.scales.q)
+        found = self._kinematics(t, y, y1, guess)
+        if not np.isfinite(found).all():
+            self.failed = found
+            return None
+        q, v = found[:n_q], found[n_q : n_q + n]
+        if self.drifts:  # the time stands still here
+            v = v - self._kinematics(t, y, np.zeros_like(y1), q)[n_q : n_q + n]
+        return q, Tangent(v)
+
+    def tangent(self, t: float, q: Array, t1: float, y1: Array) -> Tangent:
+        """The direction at a position."""
+        found = self.solve(t, q[self.layout.independent_q], t1, y1, q)
+        return Tangent(np.zeros_like(self.scales.q)) if found is None else found[1]
+
+    def _kinematics(self, t: float, y: Array, rate: Array, guess: Array) -> Array:
+        rest = np.zeros(self.layout.n_states)  # states stand still
+        return np.asarray(self.kernel(np.concatenate([y, rate, rest, np.zeros_like(rate), rest, guess]), t=t))
+
+    def _way(self, start: Array, y1: Array, t: float) -> Continuation:
+        """A continuation from a closed q in a direction of the independent coordinates; s is the scaled distance."""
+        y, n_q = start[self.layout.independent_q], len(start)
+        self.drifts = bool(self._kinematics(t, y, np.zeros_like(y), start)[n_q : n_q + len(self.scales.q)].any())
+        return Continuation(StraightPath(self, t, y, 0.0, y1), start, fewest=1)
+
     def follow(self, start: Array, target: Array, t: float) -> Array:
         """From a closed q along the straight line to independent values."""
         if not self.layout.rank:
             return start
-        path = IndependentPath(self, start, target, t)
-        self._require_near(target, path.length)
-        continuation = Continuation(path, start, fewest=1)
-        self._go_on(continuation, target, path.length)
-        found = continuation.reach(path.length)
+        origin = start[self.layout.independent_q]
+        length = float(np.abs((target - origin) / self.scales_i).max(initial=0.0))
+        self._require_near(target, length)
+        y1 = (target - origin) / (length or 1.0)
+        way = self._way(start, y1, t)
+        self._go_on(way, target, length)
+        found = way.reach(length)
         if found is None:
-            raise self._too_far(target, self._blocked(path.at(continuation.points[-1].s), path.failed))
+            raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, self.failed))
         return found.q
 
     def follow_all(self, start: Array, targets: Array) -> list[Array]:
@@ -142,9 +123,7 @@ class DependentMotion:
             chosen = np.flatnonzero((lengths >= 0.0) == (sense > 0.0))
             if not chosen.size:
                 continue
-            path = IndependentPath(self, start, origin + sense * unit, 0.0)
-            path.length = np.inf  # it has no end of its own
-            way = Continuation(path, start, fewest=1)
+            way = self._way(start, np.array([sense * unit]), 0.0)
             farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
             while not way.blocked and way.points[-1].s <= farthest:
                 self._go_on(way, targets[:, chosen[0]], np.floor(way.points[-1].s) + 1.0)
@@ -152,7 +131,7 @@ class DependentMotion:
             x = np.concatenate([targets[:, chosen], np.zeros((2 * self.layout.n_dof, len(chosen))), guesses])
             found = self.kernel(x, t=0.0)[:n_q]
             for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
-                near = np.abs(path.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
+                near = np.abs(self.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
                 result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
         return list(result.T)
 

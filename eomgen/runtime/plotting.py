@@ -10,6 +10,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.pictures import FAINT
 from ..base.notation import TIME, Notation, label
+from ..base.numeric.splines import cubic_piece
 from ..errors import at_odds, cannot, incomplete
 from .argument_checks import plain_name, read_names, require, unknown
 
@@ -49,10 +50,7 @@ def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Arr
     if slopes is None:
         straight: Array = x[:, k] + s * (x[:, k + 1] - x[:, k])
         return straight
-    # Hermite's basis on [0, 1]
-    start, end = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * s * (3.0 - 2.0 * s)
-    cubic: Array = start * x[:, k] + end * x[:, k + 1]
-    cubic += h * (s * (1.0 - s) ** 2 * slopes[:, k] - s * s * (1.0 - s) * slopes[:, k + 1])
+    cubic = cubic_piece(x[:, k], x[:, k + 1], h * slopes[:, k], h * slopes[:, k + 1], s)
     gone, told = x[:, k + 1] - x[:, k], 0.5 * h * (slopes[:, k] + slopes[:, k + 1])
     far = abs(gone - told) > APART * (abs(gone) + 0.5 * abs(h) * (abs(slopes[:, k]) + abs(slopes[:, k + 1])))
     return np.where(far, x[:, k] + s * gone, cubic)

@@ -27,7 +27,7 @@ FAULTS = (
         "tests/runs/test_inputs.py::test_cubic_tables_and_their_rates_are_those_of_scipy",
     ),
     Fault(
-        "table-coefficients", "_rows",
+        "table-coefficients", "curve_coefficients",
         "2.0 * rise",
         "rise",
         "cubic tables: a factor 2",

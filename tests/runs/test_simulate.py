@@ -241,7 +241,7 @@ def module() -> eg.Module:
 @pytest.mark.parametrize("options", [{}, {"method": "RK45"}, {"rtol": 1e-5}, {"atol": 1e-6, "method": "Radau"}])
 def test_runs_are_the_same_however_their_arguments_are_given(module: eg.Module, options: dict[str, Any]) -> None:
     """Events of none, a limit that limits nothing, a module bound anew: what is found once is what each would find."""
-    first = module.bind().simulate(0.3, **options)
+    first = module.bind({}).simulate(0.3, **options)
     module.simulate(0.3, **options)
     ways: list[dict[str, Any]] = [{}, {"events": []}, {"max_step": np.inf}, {"inputs": {}}, {"parameters": {}}]
     for way in ways:

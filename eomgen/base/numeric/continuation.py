@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..limits.numbers import EPS
 from .assembly import DAMPING, ClosureSystem, ConstraintSystem, close, closed
 from .projection import largest
 from .scales import Scales
+from .splines import cubic_piece
 
 # -- curves ------------------------------------------------------------------------------------------------------------
 
@@ -56,6 +57,36 @@ class PositionCurve(Protocol):
         """The point next to a guess; None if Newton's iteration finds none."""
 
 
+class StraightPath(NamedTuple):
+    """A straight path of prescribed coordinates: t and their values y are linear in s."""
+
+    driven: Any  #: with ``solve`` and ``tangent`` of time and values, and ``scales``
+    t: float
+    y: Array
+    t1: float  #: dt/ds
+    y1: Array  #: dy/ds
+
+    @property
+    def scales(self) -> Scales:
+        """The scales of positions."""
+        scales: Scales = self.driven.scales
+        return scales
+
+    def at(self, s: float) -> tuple[float, Array]:
+        """Time and values."""
+        return self.t + s * self.t1, self.y + s * self.y1
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position of the path."""
+        found: Tangent = self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
+        return found
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess."""
+        found = self.driven.solve(*self.at(s), self.t1, self.y1, guess)
+        return None if found is None else Point(s, *found)
+
+
 def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
     """Positions (n_q, k) at parameters s (k,) between points of a curve, cubics through them and their directions."""
     if len(points) == 1:
@@ -66,9 +97,7 @@ def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
     k = np.clip(np.searchsorted(nodes, s), 1, len(points) - 1)
     width = nodes[k] - nodes[k - 1]
     x = np.clip((s - nodes[k - 1]) / width, 0.0, 1.0)
-    q0, q1 = values[:, k - 1], values[:, k]
-    d0, d1 = slopes[:, k - 1] * width, slopes[:, k] * width
-    result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
+    result = cubic_piece(values[:, k - 1], values[:, k], slopes[:, k - 1] * width, slopes[:, k] * width, x)
     for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
         result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
     return result

@@ -126,6 +126,11 @@ def _end(h0: float, h1: float, r0: float, r1: float) -> float:
     return float(d)
 
 
+def cubic_piece(y0: Array, y1: Array, d0: Array, d1: Array, s: Array) -> Array:
+    """The cubic from y0 to y1 at places s from 0 to 1, with derivatives d0 and d1 by s at its ends (Hermite)."""
+    return np.asarray(y0 + s * (d0 + s * (3.0 * (y1 - y0) - 2.0 * d0 - d1 + s * (2.0 * (y0 - y1) + d0 + d1))))
+
+
 def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
     """Coefficients (n + 1, 4) of :class:`~.user_functions.Curve` from values and slopes at the points."""
     h = np.diff(x)

@@ -32,6 +32,7 @@ from ...base.numeric.continuation import (
     SECTIONS,
     Continuation,
     Point,
+    StraightPath,
     Tangent,
     find_least,
     find_root,
@@ -115,6 +116,11 @@ class DrivenCoordinates:
 
     # motion
 
+    def solve(self, t: float, y: Array, t1: float, y1: Array, guess: Array) -> tuple[Array, Tangent] | None:
+        """The closed position next to a guess, and dq/ds there where dt/ds = t1 and dy/ds = y1."""
+        q = self.position(t, y, guess)
+        return None if q is None else (q, self.tangent(t, q, t1, y1))
+
     def right(self, q: Array, t: float, t1: float, y1: Array) -> Array:
         """Scaled right-hand side of K v = [-C_t t1; y1] where dt/ds = t1 and dy/ds = y1."""
         C_t = np.zeros(self.layout.n_c)
@@ -177,36 +183,10 @@ class DrivenCoordinates:
             return np.full(layout.n_v, np.nan)
 
 
-class DrivenPath(NamedTuple):
-    """A straight path of a driven mechanism: t and the led values are linear in s."""
+class DrivenPath(StraightPath):
+    """A straight path of a driven mechanism."""
 
     driven: DrivenCoordinates
-    t: float
-    y: Array
-    t1: float  #: dt/ds
-    y1: Array  #: dy/ds
-
-    @property
-    def scales(self) -> Scales:
-        """The scales of positions."""
-        return self.driven.scales
-
-    def at(self, s: float) -> tuple[float, Array]:
-        """Time and led values."""
-        return self.t + s * self.t1, self.y + s * self.y1
-
-    def beyond(self, s: float) -> DrivenPath:
-        """The rest of the path from s on."""
-        return DrivenPath(self.driven, *self.at(s), self.t1, self.y1)
-
-    def tangent(self, s: float, q: Array) -> Tangent:
-        """The direction at a position of the path."""
-        return self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
-
-    def solve(self, s: float, guess: Array) -> Point | None:
-        """The point next to a guess."""
-        q = self.driven.position(*self.at(s), guess)
-        return None if q is None else Point(s, q, self.tangent(s, q))
 
     def along(self, s: float, q: Array, direction: Array) -> tuple[float, Array, Array] | None:
         """The point next to a guess at right angles to a direction (n_v + 1,) of scaled motion and s, and the direction
@@ -576,7 +556,8 @@ class FollowedPath:
         if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
             return found
         before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
-        short = DrivenContinuation(self.path.beyond(before.s), before.q)
+        t, y = self.path.at(before.s)
+        short = DrivenContinuation(self.path._replace(t=t, y=y), before.q)
         short.to(s - before.s)
         return short.points[-1].q
 

@@ -147,7 +147,7 @@ class Integrator:
     ) -> None:
         """Raise the error for a call that came to x at t and no further."""
         status, t, failure, raised = trouble
-        bound = self.module if p is None and u is None else self.module.bind(p, u)
+        bound = self.module.bind(p, u)
         run = Run(bound, Forcing(bound.layout, None))
         run.last = None if failure is None else ("rhs", *failure)
         if isinstance(raised, Crawling):
@@ -166,7 +166,7 @@ class Integrator:
             isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and out.flags.carray
         ):
             raise ill_shaped(f"out must be a contiguous writeable float64 array of shape {shape}")
-        bound = self.module if p is None and u is None else self.module.bind(p, u)
+        bound = self.module.bind(p, u)
         options = {k: min(v, abs(h)) if k == "first_step" else v for k, v in self._options.items()}
         if h == 0.0:
             state = bound.project(state, t=t)
@@ -215,7 +215,7 @@ def integrator(
     refuse_moreau(method, "integrator")
     given = {name: declared[name] for name in ("method", "rtol", "atol")}
     given.update({name: value for name, value in options.items() if value is not None})
-    return Integrator(module if parameters is None and inputs is None else module.bind(parameters, inputs), **given)
+    return Integrator(module.bind(parameters, inputs), **given)
 
 
 def _vector(label: str, given: Any, n: int) -> Any:

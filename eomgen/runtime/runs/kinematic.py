@@ -18,6 +18,7 @@ from ...base.limits.analyses import SINGULAR, SLACK
 from ...base.limits.constraints import CONTRADICTION, UNMOVED
 from ...base.numeric.assembly import close
 from ...base.numeric.projection import largest
+from ...base.numeric.splines import curve_coefficients
 from ...errors import (
     TO_BE_FINITE,
     AssemblyError,
@@ -131,12 +132,12 @@ class KinematicAnalysis(Trajectory):
             raise cannot(f"{name!r} has no rate among the columns")
         if len(self.t) < 2 or not np.diff(self.t).any():
             raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
-        y, rate = self[name], self[name + "_dot"]
-        found = []
+        y, rate, found = self[name], self[name + "_dot"], []
+        with np.errstate(all="ignore"):
+            pieces = curve_coefficients(self.t, y, rate, False)[1:-1]
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):
-            h = self.t[k + 1] - self.t[k]
-            d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
-            cubic = np.array([d0 + d1 - 2 * dy, 3 * dy - 2 * d0 - d1, d0, y[k]])
+            h, d0, d1 = self.t[k + 1] - self.t[k], rate[k], rate[k + 1]
+            cubic = pieces[k] * (h**3, h**2, h, 1.0)
             roots = np.roots(np.polyder(cubic)) if cubic[:3].any() else np.zeros(1)
             inside = [
                 float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < SLACK and -SLACK <= r.real <= 1 + SLACK

@@ -207,7 +207,7 @@ def set_up(
     """The module with the values of a run bound, its inputs over time, start and end (s)."""
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(declare(module)["end"]))
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    bound = module.bind(parameters, forcing.constants or None)
     forcing.attach(bound)
     return bound, forcing, start, end
 
