@@ -425,6 +425,6 @@ def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
 
 
 def tape_rows() -> str:
-    """``#define EOMGEN_TAPE(X)`` with X(name, value of a, b, c) for every operation, for steppers/tape.c."""
+    """``#define EOMGEN_TAPE(X)`` with X(name, value of a, b, c) for every operation, for steppers/control.c."""
     rows = (f"X({row.name}, {row.plain_c})" for row in OPERATIONS.values())
     return " \\\n    ".join(["#define EOMGEN_TAPE(X)", *rows]) + "\n"

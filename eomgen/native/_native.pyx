@@ -81,7 +81,7 @@ cdef extern from "eomgen_steppers.h" nogil:
     ctypedef struct eomgen_run:
         eomgen_function rhs, jacobian, meeting
         const_reals c, atol, closed
-        reals u, w, y, y_old, f, next, K, F, failure_state
+        reals u, w, y, y_old, f, next, F, failure_state
         const eomgen_signal *signals
         const eomgen_series *series
         int n, n_u, n_q, n_beside, interpolates, failure, stopped
@@ -98,7 +98,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         void (*begin)(eomgen_run *) noexcept nogil
         int (*step)(eomgen_run *) noexcept nogil
     const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor
-    long eomgen_further(const eomgen_method *, long, const eomgen_series *)
+    long eomgen_rows(const eomgen_method *, long, const eomgen_series *)
+    double *eomgen_lay_out(eomgen_run *, const eomgen_method *, double *)
     const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
                      double *, double *) noexcept

@@ -150,7 +150,7 @@ cdef class Stepper:
         else:
             self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
-        cdef cnp.npy_intp length = table.n_work + table.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
+        cdef cnp.npy_intp length = table.n_work + table.n_u
         if self.method.squares > 0:
             self.run.jacobian = model.kernel("jacobian").call
         if "meeting_time" in model.places:
@@ -160,22 +160,15 @@ cdef class Stepper:
             raise ValueError(f"y0 must have shape ({rhs.n_in},)")
         cdef const eomgen_series *series = seen_series(model.series)
         self.run.series = series
-        length += eomgen_further(self.method, n, series)
+        length += eomgen_rows(self.method, n, series)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
-        cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
         run.rhs, run.n, run.n_u = rhs.call, n, table.n_u
         run.c = <const double *>cnp.PyArray_DATA(context.c)
-        run.w = free
+        run.w = <double *>cnp.PyArray_DATA(self.memory)
         run.u = run.w + table.n_work
-        run.y = run.u + table.n_u
-        run.y_old = run.y + n
-        run.f = run.y_old + n
-        run.failure_state = run.f + n
-        run.next = run.failure_state + n
         run.closed = run.w + table.closed_at if plan is not None and table.closed_at else NULL
-        run.K = run.next + n
-        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, series)
+        eomgen_lay_out(run, self.method, run.u + table.n_u)
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), table.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
@@ -293,9 +286,8 @@ cdef extern from "eomgen_loop.h" nogil:
         void *asker
         const_ints direction, action, reset_of, reset_x
         const long *most
-        reals values_reset, g, g_new, slope, slope_new, size, trial, y, bracket, latest
-        long *count
-        ints leaving, whose, fired, touch
+        reals values_reset, size
+        ints fired
     ctypedef struct eomgen_trajectory:
         const_reals nodes, t_eval
         eomgen_events *events
@@ -304,6 +296,7 @@ cdef extern from "eomgen_loop.h" nogil:
         long n_nodes, n_eval, room, pieces_room, notes_room, trail_room
         long node, stored, n_pieces, n_notes, n_trail, resets
         int begun
+    void eomgen_lay_out_events(eomgen_events *, double *, long *, int *)
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED, EOMGEN_STOPPED
     int eomgen_advance(const eomgen_method *, eomgen_run *, eomgen_trajectory *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_trajectory *) noexcept
@@ -435,13 +428,8 @@ cdef class Run(Stepper):
         ev.reset_of = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(pairs[:, 0], np.intc))
         ev.reset_x = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(pairs[:, 1], np.intc))
         ev.values_reset = <double *>self.work(n_resets, float)
-        cdef double *numbers = <double *>self.work(15 * n + self.run.n, float)
-        ev.g, ev.g_new, ev.slope, ev.slope_new = numbers, numbers + n, numbers + 2 * n, numbers + 3 * n
-        ev.size, ev.trial, ev.latest = numbers + 4 * n, numbers + 5 * n, numbers + 6 * n
-        ev.bracket, ev.y = numbers + 7 * n, numbers + 15 * n
-        ev.count = <long *>self.work(n, np.dtype("l"))
-        cdef int *whole = <int *>self.work(5 * n, np.intc)
-        ev.leaving, ev.fired, ev.touch, ev.whose = whole, whole + n, whole + 2 * n, whole + 3 * n
+        eomgen_lay_out_events(ev, <double *>self.work(15 * n + self.run.n, float), <long *>self.work(n, np.dtype("l")),
+                              <int *>self.work(5 * n, np.intc))
         self.trajectory.events = ev
 
     cdef allocate(self, long room):

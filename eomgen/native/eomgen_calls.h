@@ -41,28 +41,20 @@ static inline int eomgen_processor(void)
 
 #endif
 
-/* NAME, whose result of LENGTH numbers BLOCK writes; SOLVED: a function of a solver. */
-#define EOMGEN_FUNCTION(NAME, BLOCK, LENGTH) \
+/* NAME, whose result of LENGTH numbers BLOCK writes, or a SOLVER. */
+#define EOMGEN_PUBLIC(NAME, AT, STATUS, LENGTH) \
     int NAME(double t, const double *restrict x, const double *restrict u, const double *restrict c, \
         double *restrict out, double *restrict w) \
     { \
         if (out == NULL) { \
             return EOMGEN_SUCCESS; \
         } \
-        const int status = BLOCK(t, x, u, c, out, w); \
+        AT const int status = STATUS; \
         return status != 0 ? status : LENGTH > 256 ? check_rows(out, LENGTH) : check_finite(out, LENGTH); \
     }
-#define EOMGEN_SOLVED(NAME, SOLVER, LENGTH) \
-    int NAME(double t, const double *restrict x, const double *restrict u, const double *restrict c, \
-        double *restrict out, double *restrict w) \
-    { \
-        if (out == NULL) { \
-            return EOMGEN_SUCCESS; \
-        } \
-        const eom_at at = { MODEL, t, u, c, w }; \
-        const int status = SOLVER(&at, x, out); \
-        return status != 0 ? status : LENGTH > 256 ? check_rows(out, LENGTH) : check_finite(out, LENGTH); \
-    }
+#define EOMGEN_FUNCTION(NAME, BLOCK, LENGTH) EOMGEN_PUBLIC(NAME, , BLOCK(t, x, u, c, out, w), LENGTH)
+#define EOMGEN_AT const eom_at at = { MODEL, t, u, c, w };
+#define EOMGEN_SOLVED(NAME, SOLVER, LENGTH) EOMGEN_PUBLIC(NAME, EOMGEN_AT, SOLVER(&at, x, out), LENGTH)
 
 /* 1 if an entry of the result is NaN or infinite; four sums, because each addition waits for the one before. */
 EOMGEN_SHARED int check_finite(const double *out, int length)

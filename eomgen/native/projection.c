@@ -295,25 +295,14 @@ static int correct_change(const eom_at *at, int rows, double *restrict G, const 
    changes, as the length of Euler parameters of which e^T e - 1 stands as a constraint. */
 static int form_normal(const eom_at *at, const double *restrict q)
 {
-    double *const rows = AT(GRADIENT), *const G = AT(NORMAL);
-    double largest = 0.0;
+    double *const rows = AT(GRADIENT);
     (void)EVALUATE(coordinate_slopes, q, rows);
     for (int i = 0; i < MH; i++) {
         for (int k = 0; k < NQ; k++) {
             rows[i * NQ + k] /= AT(SCALES)[N + i];
         }
-        for (int j = 0; j <= i; j++) {
-            G[i * M + j] = 0.0;
-            for (int k = 0; k < NQ; k++) {
-                G[i * M + j] += rows[i * NQ + k] * rows[j * NQ + k];
-            }
-        }
-        largest = fmax(largest, G[i * M + i]);
     }
-    for (int i = 0; i < MH; i++) {
-        G[i * M + i] += largest > CONSTRAINTS_UNMOVED * CONSTRAINTS_UNMOVED ? CONSTRAINTS_TIKHONOV * largest : 1.0;
-    }
-    return cholesky(MH, M, 0.0, G);
+    return factor_gram(MH, NQ, M, rows, CONSTRAINTS_TIKHONOV, AT(NORMAL));
 }
 
 /* change -= the least one of q that changes the scaled residual by r + J d, which the best velocities d leave of r. The

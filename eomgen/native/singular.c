@@ -79,16 +79,7 @@ static void invert_tangent(const eom_at *at)
         }
     }
     for (int p = 0; p < F; p++) {
-        const double pivot = a[p * width + p];
-        for (int k = p; k < width; k++) {
-            a[p * width + k] /= pivot;
-        }
-        for (int i = 0; i < F; i++) {
-            const double factor = a[i * width + p];
-            for (int k = p; k < width && i != p; k++) {
-                a[i * width + k] -= factor * a[p * width + k];
-            }
-        }
+        eliminate(F, width, p, p, a);
     }
 }
 

@@ -12,7 +12,7 @@ from ..base.operations import tape_rows
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
-    *("control", "plain", "rk4", "products", "lu", "lu_large", "newton", "radau"),
+    *("control", "plain", "rk4", "lu", "lu_complex", "newton", "radau"),
     *("taylor_terms", "taylor", "events", "loop"),
 )
 

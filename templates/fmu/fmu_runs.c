@@ -256,8 +256,7 @@ int fmu_set_clocks(fmu_instance *f)
 long fmu_step_room(void)
 {
     const long n = FMU_N_X;
-    return n * (7 + FMU_METHOD.rows_K + FMU_METHOD.rows_F) + eomgen_further(&FMU_METHOD, n, NULL) +
-           10L * (FMU_N_EVENTS + 1) + FMU_N_RESETS + (2L + n) * (2 * FMU_N_EVENTS + 2) + 1;
+    return 2 * n + eomgen_rows(&FMU_METHOD, n, NULL) + 10L * (FMU_N_EVENTS + 1) + FMU_N_RESETS + (2L + n) * (2 * FMU_N_EVENTS + 2) + 1;
 }
 
 /* What the stepper works with: pointers into the instance. */
@@ -301,7 +300,6 @@ static void prepare(fmu_instance *f, stepping *j)
 {
     const int n = FMU_N_X;
     fmu_memory *const m = &f->m;
-    double *at = f->steps;
     memset(j, 0, sizeof *j);
     eomgen_run *const run = &j->run;
     run->rhs = FMU_MODEL(rhs), run->c = m->c, run->u = m->u, run->n_u = FMU_N_U, run->w = f->w, run->n = n;
@@ -315,13 +313,10 @@ static void prepare(fmu_instance *f, stepping *j)
     for (int i = 0; i < n; i++) {
         j->atol[i] = FMU_ATOL * (m->rtol / FMU_RTOL);
     }
-    run->y = at, run->y_old = at + n, run->f = at + 2 * n, run->failure_state = at + 3 * n, run->next = at + 4 * n;
     const int closed_at = FMU_MODEL(model)()->closed_at;
     run->closed = closed_at > 0 ? f->w + closed_at : NULL;
-    run->K = at + 5 * n;
-    run->F = run->K + n * FMU_METHOD.rows_K + eomgen_further(&FMU_METHOD, n, NULL);
-    j->events.y = run->F + n * FMU_METHOD.rows_F;
-    at = j->events.y + 2 * n;
+    j->events.y = eomgen_lay_out(run, &FMU_METHOD, f->steps);
+    double *at = j->events.y + 2 * n;
     run->until_callback = -1;
     run->t = run->t_old = m->t, run->h_abs = m->h_abs;
     memcpy(run->y, m->x, (size_t)n * sizeof(double));

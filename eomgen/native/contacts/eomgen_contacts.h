@@ -14,10 +14,10 @@
    point method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the
    solution as it is. Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
    method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257), and one contact in the plane by its four cases. Before all
-   that, many contacts are solved by the edges of their cones (pivots.c: G. de Saxce, Z.-Q. Feng, The bipotential method,
+   that, many contacts are solved by the edges of their cones (G. de Saxce, Z.-Q. Feng, The bipotential method,
    Math. Comput. Modelling 28 (1998), 225-245; D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly
    convex quadratic programs, Math. Program. 27 (1983), 1-33; F. Cadoux, Ph.D. thesis, Grenoble, 2009), or in space by
-   sweeps. What is left goes to laws that are rounded over a velocity and become sharp (rounded.c: B. Chen, P. T. Harker, A
+   sweeps. What is left goes to laws that are rounded over a velocity and become sharp (B. Chen, P. T. Harker, A
    non-interior-point continuation method for linear complementarity problems, SIAM J. Matrix Anal. Appl. 14 (1993),
    1168-1190). */
 #ifndef EOMGEN_CONTACTS_H

@@ -7,30 +7,19 @@
 /* Doubles of memory for one trajectory at a time. */
 static ptrdiff_t memory_of_one(const eomgen_ensemble *e)
 {
-    const ptrdiff_t rows = 5 + e->method->rows_K + e->method->rows_F;
-    const ptrdiff_t further = eomgen_further(e->method, e->n, e->series);
-    return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further + e->n_eval;
+    const eomgen_model *const model = e->model;
+    return model->n_work + model->n_u + model->n_const + eomgen_rows(e->method, e->n, e->series) + e->n_eval;
 }
 
-/* Set a run up in the memory of a thread; returns the room for the times asked for. */
-static double *lay_out_one(eomgen_run *run, const eomgen_ensemble *e, const eomgen_thread *own)
+double *eomgen_set_up(eomgen_run *run, const eomgen_ensemble *e, const eomgen_thread *own, double *w, double *memory)
 {
-    const int n = e->n;
-    double *const constants = own->memory;
     memset(run, 0, sizeof *run);
-    run->rhs = e->rhs, run->jacobian = e->jacobian, run->series = e->series;
-    run->meeting = e->meeting, run->n_q = e->n_q;
-    run->c = constants, run->signals = own->signals, run->n_u = e->model->n_u, run->n = n;
+    run->rhs = e->rhs, run->jacobian = e->jacobian, run->series = e->series, run->meeting = e->meeting, run->n_q = e->n_q;
+    run->signals = own->signals, run->n_u = e->model->n_u, run->n = e->n;
     run->rtol = e->rtol, run->atol = e->atol, run->max_step = e->max_step, run->most_steps = e->max_steps;
-    run->w = constants + e->model->n_const;
-    run->u = run->w + e->model->n_work;
-    run->y = run->u + e->model->n_u;
-    run->y_old = run->y + n, run->f = run->y_old + n, run->failure_state = run->f + n;
-    run->next = run->failure_state + n;
-    run->closed = e->model->closed_at ? run->w + e->model->closed_at : NULL;
-    run->K = run->next + n;
-    run->F = run->K + e->method->rows_K * n + eomgen_further(e->method, e->n, e->series);
-    return run->F + e->method->rows_F * n;
+    run->w = w, run->closed = e->model->closed_at ? w + e->model->closed_at : NULL;
+    run->c = memory, run->u = memory + e->model->n_const;
+    return eomgen_lay_out(run, e->method, run->u + e->model->n_u);
 }
 
 void eomgen_keep_notes(eomgen_ensemble *e, eomgen_trajectory *trajectory, ptrdiff_t k)
@@ -57,7 +46,7 @@ static int advance(eomgen_ensemble *e, eomgen_run *run, eomgen_trajectory *traje
     return status;
 }
 
-static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *own, double *constants, double *times, ptrdiff_t k)
+static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *own, double *times, ptrdiff_t k)
 {
     const size_t size = (size_t)e->n * sizeof(double);
     eomgen_trajectory trajectory;
@@ -80,7 +69,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
     memcpy(run->y, e->x0 + k * e->n, size);
     memcpy(run->u, e->u + k * e->u_stride, (size_t)e->model->n_u * sizeof(double));
     int status = EOMGEN_BAD_PARAMETERS;
-    if (EOMGEN_PRECOMPUTE(e->model)(e->p + k * e->p_stride, constants) == 0) {
+    if (EOMGEN_PRECOMPUTE(e->model)(e->p + k * e->p_stride, (double *)run->c) == 0) {
         status = advance(e, run, &trajectory, k);
     }
     for (ptrdiff_t j = trajectory.stored * e->n; j < e->n_eval * e->n; j++) {
@@ -133,10 +122,7 @@ ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e)
 ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const eomgen_lane_worker *const worker = find_worker(e, own);
-    if (worker != NULL) {
-        return worker->memory(e, own);
-    }
-    return memory_of_one(e);
+    return worker != NULL ? worker->memory(e, own) : memory_of_one(e);
 }
 
 static long callback_stop(void *callback_data, const double *t)
@@ -153,10 +139,10 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
         return;
     }
     eomgen_run run;
-    double *const times = lay_out_one(&run, e, own);
+    double *const times = eomgen_set_up(&run, e, own, own->memory, own->memory + e->model->n_work);
     run.callback = callback_stop, run.callback_data = e;
     for (ptrdiff_t k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
-        run_one(e, &run, own, own->memory, times, k);
+        run_one(e, &run, own, times, k);
         __atomic_fetch_add(&e->done, 1, __ATOMIC_RELAXED);
     }
 }

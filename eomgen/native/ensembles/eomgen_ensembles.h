@@ -74,6 +74,9 @@ typedef struct {
 /* The next trajectory of the queue, or -1. */
 ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e);
 
+/* A run with the work w of the functions, its constants, inputs and rows in memory; returns what lies behind them. */
+double *eomgen_set_up(eomgen_run *run, const eomgen_ensemble *e, const eomgen_thread *own, double *w, double *memory);
+
 /* Keep the events noted by now for trajectory k, as many as there is room for. */
 void eomgen_keep_notes(eomgen_ensemble *e, eomgen_trajectory *trajectory, ptrdiff_t k);
 

@@ -123,16 +123,14 @@ static int has_single(const eomgen_ensemble *e, const eomgen_thread *own)
 /* Doubles of what each lane keeps, and of work that they share. */
 static ptrdiff_t single_each(const eomgen_ensemble *e, const eomgen_events *events)
 {
-    const eomgen_method *const method = e->method;
-    const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, n = events != NULL ? events->n : 0;
-    const ptrdiff_t kept = events != NULL ? e->n + 7 * n + ROOM_OF(long, n) + ROOM_OF(int, 3 * n) : 0;
-    return ROOM_OF(lane_single, 1) + rows * e->n + e->model->n_const + e->model->n_u + kept;
+    const ptrdiff_t n = events != NULL ? events->n : 0, rows = eomgen_rows(e->method, e->n, e->series);
+    const ptrdiff_t kept = events != NULL ? e->n + 15 * n + events->n_resets + ROOM_OF(long, n) + ROOM_OF(int, 5 * n) : 0;
+    return ROOM_OF(lane_single, 1) + rows + e->model->n_const + e->model->n_u + kept;
 }
 
-static ptrdiff_t single_shared(const eomgen_ensemble *e, const eomgen_events *events)
+static ptrdiff_t single_shared(const eomgen_ensemble *e)
 {
-    const ptrdiff_t n = events != NULL ? events->n : 0;
-    return e->model->n_work + e->n_eval + (events != NULL ? events->n_resets + 8 * n + ROOM_OF(int, 2 * n) : 0);
+    return e->model->n_work + e->n_eval;
 }
 
 /* The stages of the step just made, and the polynomial from them. */
@@ -144,49 +142,31 @@ static void prepare_single(eomgen_run *run)
     single->lanes->all->method->prepare(run);
 }
 
-static double *lay_out_events(eomgen_events *events, const eomgen_thread *own, int states, double *memory, double *shared)
+static double *lay_out_events(eomgen_events *events, const eomgen_thread *own, int states, double *memory)
 {
     *events = *own->events;
     const int n = events->n;
-    double **const kept[] = { &events->g, &events->g_new, &events->slope, &events->slope_new, &events->size, &events->trial,
-                              &events->latest };
-    for (int i = 0; i < 7; i++, memory += n) {
-        *kept[i] = memory;
-    }
-    events->y = memory, memory += states;
-    events->count = (long *)(void *)memory, memory += ROOM_OF(long, n);
-    events->leaving = (int *)(void *)memory, events->fired = events->leaving + n, events->touch = events->fired + n;
-    events->values_reset = shared, events->bracket = shared + events->n_resets;
-    events->whose = (int *)(void *)(events->bracket + 8 * n);
-    return memory + ROOM_OF(int, 3 * n);
+    double *const count = memory + 15 * n + states, *const whole = count + ROOM_OF(long, n);
+    eomgen_lay_out_events(events, memory, (long *)(void *)count, (int *)(void *)whole);
+    events->values_reset = whole + ROOM_OF(int, 5 * n);
+    return events->values_reset + events->n_resets;
 }
 
 /* Set up what is done single, W times, in so many doubles as the two functions above say. */
 static lane_single *lay_out_single(const eomgen_ensemble *e, const eomgen_thread *own, const lane_run *lanes, double *memory)
 {
-    const int n = e->n;
-    const eomgen_method *const method = e->method;
-    double *const w = memory, *const times = w + e->model->n_work, *const shared = times + e->n_eval;
-    lane_single *const all = (lane_single *)(void *)(memory + single_shared(e, own->events));
+    double *const w = memory, *const times = w + e->model->n_work;
+    lane_single *const all = (lane_single *)(void *)(memory + single_shared(e));
     double *next = (double *)(void *)all + W * ROOM_OF(lane_single, 1);
     for (int l = 0; l < W; l++) {
         lane_single *const single = (lane_single *)(void *)((double *)(void *)all + l * ROOM_OF(lane_single, 1));
         eomgen_run *const run = &single->run;
         memset(single, 0, sizeof *single);
-        single->lanes = lanes, single->l = l, single->method = *method, single->method.prepare = prepare_single;
-        run->rhs = e->rhs, run->meeting = e->meeting, run->n_q = e->n_q;
-        run->signals = own->signals, run->n_u = e->model->n_u, run->n = n;
-        run->rtol = e->rtol, run->atol = e->atol, run->max_step = e->max_step;
+        single->lanes = lanes, single->l = l, single->method = *e->method, single->method.prepare = prepare_single;
+        next = eomgen_set_up(run, e, own, w, next);
         run->direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
-        run->w = w, run->closed = e->model->closed_at ? w + e->model->closed_at : NULL;
-        double **const rows[] = { &run->y, &run->y_old, &run->f, &run->failure_state, &run->next };
-        for (int i = 0; i < 5; i++, next += n) {
-            *rows[i] = next;
-        }
-        run->K = next, run->F = run->K + method->rows_K * n, next = run->F + method->rows_F * n;
-        run->c = next, run->u = next + e->model->n_const, next = run->u + e->model->n_u;
         if (own->events != NULL) {
-            next = lay_out_events(&single->events, own, n, next, shared);
+            next = lay_out_events(&single->events, own, e->n, next);
         }
         single->trajectory.t_eval = e->t_eval, single->trajectory.n_eval = e->n_eval, single->trajectory.times = times;
         single->trajectory.span = fabs(e->nodes[e->n_nodes - 1] - e->nodes[0]);
@@ -505,7 +485,7 @@ static ptrdiff_t lane_memory(const eomgen_ensemble *e, const eomgen_thread *own)
     const lane_method *const method = find_method(e->method->name);
     const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
     const ptrdiff_t each = e->model->n_work + e->model->n_u + e->model->n_const; /* single, and in every lane */
-    const ptrdiff_t single = has_single(e, own) ? single_shared(e, own->events) + W * single_each(e, own->events) : 0;
+    const ptrdiff_t single = has_single(e, own) ? single_shared(e) + W * single_each(e, own->events) : 0;
     return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further) + single;
 }
 

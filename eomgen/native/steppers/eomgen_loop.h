@@ -48,6 +48,16 @@ typedef struct {
     int for_slope;                 /* values are for a difference quotient, off the path of the run */
 } eomgen_events;
 
+/* The work of n events: 15 n numbers and a state; n; 5 n. */
+static inline void eomgen_lay_out_events(eomgen_events *ev, double *numbers, long *count, int *whole)
+{
+    const int n = ev->n;
+    ev->g = numbers, ev->g_new = numbers + n, ev->slope = numbers + 2 * n, ev->slope_new = numbers + 3 * n;
+    ev->size = numbers + 4 * n, ev->trial = numbers + 5 * n, ev->latest = numbers + 6 * n;
+    ev->bracket = numbers + 7 * n, ev->y = numbers + 15 * n;
+    ev->count = count, ev->leaving = whole, ev->fired = whole + n, ev->touch = whole + 2 * n, ev->whose = whole + 3 * n;
+}
+
 /* One trajectory: what is asked, and what came of it so far. */
 typedef struct {
     const double *nodes; /* n_nodes times in order, where the run must not step over; the last is its end */

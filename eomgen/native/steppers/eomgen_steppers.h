@@ -11,7 +11,7 @@
 #define restrict __restrict /* C++ has no such word */
 #endif
 
-/* Expressions given at run time: instructions in order, each with a result of its own; see tape.c for the operations. */
+/* Expressions given at run time: instructions in order, each with a result of its own; see control.c for the operations. */
 typedef struct {
     int n, n_out;          /* instructions, values handed out */
     const int *code;       /* rows of 4: operation, and its operands: earlier instructions, or an index for leaves */
@@ -90,6 +90,21 @@ typedef struct {
 static inline long eomgen_further(const eomgen_method *method, long n, const eomgen_series *series)
 {
     return (method->squares > 0 ? method->squares * n * n + 16 + n : 0) + (method->expands ? series->n_work : 0);
+}
+
+/* Doubles that the rows of a run take; a run gets its rows there, and returns what lies behind. */
+static inline long eomgen_rows(const eomgen_method *method, long n, const eomgen_series *series)
+{
+    return n * (5 + method->rows_K + method->rows_F) + eomgen_further(method, n, series);
+}
+
+static inline double *eomgen_lay_out(eomgen_run *run, const eomgen_method *method, double *memory)
+{
+    const int n = run->n;
+    double *const end = memory + eomgen_rows(method, n, run->series);
+    run->y = memory, run->y_old = memory + n, run->f = memory + 2 * n, run->failure_state = memory + 3 * n;
+    run->next = memory + 4 * n, run->K = memory + 5 * n, run->F = end - method->rows_F * n;
+    return end;
 }
 
 extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk4, eomgen_radau, eomgen_taylor;

@@ -3,6 +3,38 @@
 #include <math.h>
 #include <string.h>
 
+static void take_products(int rows, int depth, int columns, const double *restrict a, int a_step, const double *restrict b,
+                          int b_step, double *restrict c, int c_step)
+{
+    for (int k = 0; k < depth; k += PANEL) {
+        take_panel(rows, depth - k < PANEL ? depth - k : PANEL, columns, a + k, a_step, b + k * b_step, b_step, c, c_step);
+    }
+}
+
+/* x += a r of n x k numbers, rows of which are `step` apart; four rows at a time. */
+static void add_times(int n, int k, const double *restrict a, int step, const double *restrict r, double *restrict x)
+{
+    int i = 0;
+    for (; i + 4 <= n; i += 4) {
+        const double *const row = a + i * step;
+        double sum[4] = {0.0, 0.0, 0.0, 0.0};
+        for (int l = 0; l < k; l++) {
+            sum[0] += row[l] * r[l], sum[1] += row[step + l] * r[l];
+            sum[2] += row[2 * step + l] * r[l], sum[3] += row[3 * step + l] * r[l];
+        }
+        for (int m = 0; m < 4; m++) {
+            x[i + m] += sum[m];
+        }
+    }
+    for (; i < n; i++) {
+        double sum = 0.0;
+        for (int l = 0; l < k; l++) {
+            sum += a[i * step + l] * r[l];
+        }
+        x[i] += sum;
+    }
+}
+
 /* c = -a b: n x k by k x m, both of rows that are so many steps apart. */
 static void multiply(int n, int k, int m, const double *restrict a, int step, const double *restrict b, int b_step,
                      double *restrict c)
@@ -357,8 +389,8 @@ static void sparse_solve_complex(int n, int filled, double *rows, const double *
 }
 
 /* Systems (g - J) x = r of implicit methods. Where J = [0 1; K D], of a state [q; v] with q' = v, only
-   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g; other large ones by parts (newton_parts.c), or by what
-   of J is not 0 (newton_sparse.c), whatever takes the least work. */
+   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g; other large ones by parts, or by what of J is not 0,
+   whatever takes the least work. */
 
 #include "eomgen_steppers.h"
 
@@ -493,7 +525,7 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
     if (form_of(a) == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
         const int m = n - n_q;
         parts_matrices(n, n_q, a->J, a->real + m * m, a->re + m * m, g, x / square, -y / square, a->real, a->re, a->im);
-        return factor_real(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
+        return lu_factor(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
     }
     a->state[HALVED] = form_of(a) == HALF ? HALF : WHOLE;
     const int halved = form_of(a) == HALF, m = halved ? n / 2 : n;
@@ -508,7 +540,7 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
         }
         plain[i] += g, re[i] += x, im[i] += y;
     }
-    return factor_real(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
+    return lu_factor(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
 }
 
 static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
@@ -523,12 +555,12 @@ static void newton_solve(const eomgen_run *run, const newton_area *a, double g, 
         double *const room = a->im + n_v * n_v;
         parts_carry(n, n_q, a->J, g, NULL, r, room);
         add_times(n_v, n_q, a->J + n_q * n, n, r, r + n_q);
-        solve_real(n_v, a->real, a->order, r + n_q);
+        lu_solve(n_v, a->real, a->order, r + n_q);
         parts_carry(n, n_q, a->J, g, r + n_q, r, room);
         return;
     }
     if (form_of(a) == WHOLE) {
-        solve_real(n, a->real, a->order, r);
+        lu_solve(n, a->real, a->order, r);
         return;
     }
     const double inverse = 1.0 / g;
@@ -539,7 +571,7 @@ static void newton_solve(const eomgen_run *run, const newton_area *a, double g, 
         }
         r[m + i] += sum * inverse;
     }
-    solve_real(m, a->real, a->order, r + m);
+    lu_solve(m, a->real, a->order, r + m);
     for (int i = 0; i < m; i++) {
         r[i] = (r[i] + r[m + i]) * inverse;
     }

@@ -5,23 +5,18 @@
 
 static void rk4_attempt(eomgen_run *run, double h)
 {
+    static const double at[3] = {0.5, 0.5, 1.0};
     const int n = run->n;
-    const double t = run->t, *const y0 = run->y_old, *const k0 = run->K;
-    double *const y = run->y, *const k1 = run->K + n, *const k2 = k1 + n, *const k3 = k2 + n;
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + 0.5 * h * k0[i];
+    const double t = run->t, *const y0 = run->y_old, *const K = run->K;
+    double *const y = run->y;
+    for (int s = 0; s < 3; s++) {
+        for (int i = 0; i < n; i++) {
+            y[i] = y0[i] + at[s] * h * K[s * n + i];
+        }
+        eomgen_evaluate(run, t + at[s] * h, y, run->K + (s + 1) * n);
     }
-    eomgen_evaluate(run, t + 0.5 * h, y, k1);
     for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + 0.5 * h * k1[i];
-    }
-    eomgen_evaluate(run, t + 0.5 * h, y, k2);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * k2[i];
-    }
-    eomgen_evaluate(run, t + h, y, k3);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h / 6.0 * (k0[i] + 2.0 * (k1[i] + k2[i]) + k3[i]);
+        y[i] = y0[i] + h / 6.0 * (K[i] + 2.0 * (K[n + i] + K[2 * n + i]) + K[3 * n + i]);
     }
     eomgen_evaluate(run, t + h, y, run->f);
 }
