@@ -49,9 +49,8 @@ static void put_column(const eom_at *at, int column, int columns, const double *
 {
     double *const rates = AT(RATES);
     change_rates(at, AT(X), dq, dv, rates);
-    for (int k = 0; k < NX; k++) {
-        out[k * columns + column] = k < NQ ? rates[k] : da[k - NQ];
-    }
+    set_column(NQ, column, columns, rates, out);
+    set_column(N, column, columns, da, out + NQ * columns);
 }
 
 /* The projected state, its accelerations and multipliers, and the factors that derivatives need. */
@@ -243,9 +242,7 @@ static void every_column(const eom_at *at, double *restrict out)
     for (int column = 0; column < NX; column++) {
         turn_to(at, column < NQ ? column : column - NQ);
         change_along(at, column < NQ, change);
-        for (int i = 0; i < NX; i++) {
-            out[i * NX + column] = change[i];
-        }
+        set_column(NX, column, NX, change, out);
     }
 }
 
@@ -445,9 +442,7 @@ static void tree_rate_rows(const eom_at *at, const double *restrict x, double *r
         direction[column] = 1.0;
         change_rates(at, x, direction, direction + NQ, rates);
         direction[column] = 0.0;
-        for (int k = 0; k < NQ; k++) {
-            out[k * NX + column] = rates[k];
-        }
+        set_column(NQ, column, NX, rates, out);
     }
 }
 
@@ -572,9 +567,7 @@ static int contact_jacobian(const eom_at *at, const double *restrict x, double *
         residuals_along(at);
         take_column(at, column, N, out);
         change_rates(at, x, AT_DQ, AT_DV, rates);
-        for (int k = 0; k < NQ; k++) {
-            out[k * NX + column] = rates[k];
-        }
+        set_column(NQ, column, NX, rates, out);
     }
     return 0;
 }
@@ -621,9 +614,7 @@ int eom_dae_jacobian(const eom_at *at, const double *x, double *out)
         along[3 * n + column] = x[2 * n];
         (void)EVALUATE(dae_tangent, along, slope);
         along[2 * n + column] = along[3 * n + column] = 0.0;
-        for (int k = 0; k < n; k++) {
-            out[k * n + column] = slope[k];
-        }
+        set_column(n, column, n, slope, out);
     }
     return 0;
 }
@@ -637,9 +628,7 @@ int eom_inverse_dynamics_derivatives(const eom_at *at, const double *x, double *
     for (int column = 0; column < n; column++) {
         set_unit(n, column, along + n);
         (void)EVALUATE(inverse_tangent, along, slope);
-        for (int k = 0; k < N; k++) {
-            out[k * n + column] = slope[k];
-        }
+        set_column(N, column, n, slope, out);
     }
     return 0;
 }

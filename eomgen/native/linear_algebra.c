@@ -32,6 +32,14 @@ static void set_unit(int n, int k, double *to)
     }
 }
 
+/* Column `column` of the first rows of a matrix. */
+static void set_column(int rows, int column, int columns, const double *restrict from, double *restrict to)
+{
+    for (int i = 0; i < rows; i++) {
+        to[i * columns + column] = from[i];
+    }
+}
+
 /* x * s */
 static void multiply(int n, const double *restrict s, double *restrict x)
 {

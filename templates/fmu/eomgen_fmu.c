@@ -483,6 +483,20 @@ static double spacing_along(const fmu_memory *m, const double *dx, const double 
     return size > 0.0 ? 2e-3 / size : 0.0;
 }
 
+static void displace(fmu_memory *m, double way, const double *dx, const double *du, const double *dp)
+{
+    for (int i = 0; i < FMU_N_X; i++) {
+        m->x[i] += way * dx[i];
+    }
+    for (int i = 0; i < FMU_N_U; i++) {
+        m->u[i] += way * du[i];
+    }
+    for (int i = 0; i < FMU_N_P; i++) {
+        m->p[i] += way * dp[i];
+    }
+    m->constants_known = 0;
+}
+
 /* During initialization: dx of all states where those of the exact ones are given and the others follow. */
 static int of_start(fmu_instance *f, double *dx, const double *du, const double *dp)
 {
@@ -495,17 +509,10 @@ static int of_start(fmu_instance *f, double *dx, const double *du, const double 
     const double h = spacing_along(m, dx, du, dp);
     f->before = *m;
     for (int k = -3; k <= 3 && h > 0.0 && status == FMU_OK; k += k == -1 ? 2 : 1) {
+        displace(m, k * h, dx, du, dp);
         for (int i = 0; i < FMU_N_X; i++) {
-            m->x[i] += k * h * dx[i];
             m->guessed[i] = !FMU_INDEPENDENT[i];
         }
-        for (int i = 0; i < FMU_N_U; i++) {
-            m->u[i] += k * h * du[i];
-        }
-        for (int i = 0; i < FMU_N_P; i++) {
-            m->p[i] += k * h * dp[i];
-        }
-        m->constants_known = 0;
         status = fmu_close(f);
         for (int i = 0; i < FMU_N_X; i++) {
             sum[i] += weight_of(k, h) * m->x[i];
@@ -545,26 +552,19 @@ static int of_outputs(fmu_instance *f, const double *dx, const double *du, const
 static int of_outputs(fmu_instance *f, const double *dx, const double *du, const double *dp, const double *d_rates, double *sum)
 {
     fmu_memory *const m = &f->m;
-    double *const x = f->trial, *const p = f->values + FMU_N_Y, *const u = p + FMU_N_P, *const y = f->values;
     const double h = spacing_along(m, dx, du, dp);
     (void)d_rates;
     memset(sum, 0, FMU_N_Y * sizeof(double));
     int status = 0;
+    f->before = *m;
     for (int k = -3; k <= 3 && h > 0.0 && status == 0; k += k == -1 ? 2 : 1) {
-        for (int i = 0; i < FMU_N_X; i++) {
-            x[i] = m->x[i] + k * h * dx[i];
-        }
-        for (int i = 0; i < FMU_N_U; i++) {
-            u[i] = m->u[i] + k * h * du[i];
-        }
-        for (int i = 0; i < FMU_N_P; i++) {
-            p[i] = m->p[i] + k * h * dp[i];
-        }
-        status = FMU_MODEL(precompute)(p, f->matrix);
-        status = status == 0 ? FMU_MODEL(outputs)(m->t, x, u, f->matrix, y, f->w) : status;
+        displace(m, k * h, dx, du, dp);
+        status = FMU_MODEL(precompute)(m->p, m->c);
+        status = status == 0 ? FMU_MODEL(outputs)(m->t, m->x, m->u, m->c, f->values, f->w) : status;
         for (int i = 0; i < FMU_N_Y; i++) {
-            sum[i] += weight_of(k, h) * y[i];
+            sum[i] += weight_of(k, h) * f->values[i];
         }
+        *m = f->before;
     }
     return fmu_judge(f, status, "the directional derivatives");
 }

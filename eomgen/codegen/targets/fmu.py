@@ -323,7 +323,7 @@ def model_context(program: Program, start: Sequence[float], token: str) -> dict[
             "N_WORK": f"{prefix}_N_WORK",
             "N_VALUES": max(n_y + max(n_p + n_u, sizes.n_events), 3 * sizes.n_events),
             "N_TRIAL": max(3 * len(free) + 2 * sizes.n_q + 2 * n_v, sizes.n_resets, n_x + n_v + width),
-            "N_MATRIX": f"{max(n_x * max(n_x, n_u, n_p), n_y * width)} + {prefix}_N_CONST",
+            "N_MATRIX": max(n_x * max(n_x, n_u, n_p), n_y * width),
         },
         "tables": {
             "START_X": number_texts(start),

@@ -98,15 +98,13 @@ long eomgen_rigid_further(const eomgen_rigid *s);
 int eomgen_rigid_step(eomgen_rigid *s, double t, double h);
 
 /* Both texts. */
-void eomgen_plain_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
-                                 double tolerance, int most, double *work, int *numbers, int *count, double *residual);
-int eomgen_plain_rigid_step(eomgen_rigid *s, double t, double h);
-long eomgen_plain_rigid_fixed(const eomgen_rigid *s);
-long eomgen_plain_rigid_further(const eomgen_rigid *s);
-void eomgen_wide_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
-                                double tolerance, int most, double *work, int *numbers, int *count, double *residual);
-int eomgen_wide_rigid_step(eomgen_rigid *s, double t, double h);
-long eomgen_wide_rigid_fixed(const eomgen_rigid *s);
-long eomgen_wide_rigid_further(const eomgen_rigid *s);
+#define EOMGEN_CONTACT_TEXT(width) \
+    void eomgen_##width##_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P, \
+                                         double tolerance, int most, double *work, int *numbers, int *count, double *residual); \
+    int eomgen_##width##_rigid_step(eomgen_rigid *s, double t, double h); \
+    long eomgen_##width##_rigid_fixed(const eomgen_rigid *s); \
+    long eomgen_##width##_rigid_further(const eomgen_rigid *s);
+EOMGEN_CONTACT_TEXT(plain)
+EOMGEN_CONTACT_TEXT(wide)
 
 #endif

@@ -35,30 +35,6 @@ static real taylor_error(const lane_run *run, real h)
 static const lane_method lane_taylor = {"Taylor", 2 * (TAYLOR_MOST + 1), TAYLOR_MOST, 0, taylor_attempt, taylor_error,
                                         taylor_prepare, taylor_interpolate}; /* order 0: rejected steps are halved */
 
-/* taylor_log2, taylor_exp2 and taylor_reach of every lane; 2^52 and half as much again make integers of their last bits. */
-static inline real log2_of(real a)
-{
-    const numeral word = (numeral)a;
-    const real exponent = (real)((word >> 52 & 2047) | 0x4330000000000000u) - (0x1p52 + 1023.0);
-    a = (real)((word & 0xfffffffffffffu) | 0x3ff0000000000000u) - 1.0;
-    return exponent + a + a * (1.0 - a) * (0.44245418 + a * (-0.27016007 + a * (0.15202092 - a * 0.04584151)));
-}
-
-static inline real exp2_of(real a)
-{
-    const real nearest = (a + 0x1.8p52) - 0x1.8p52, whole = nearest - choose(nearest > a, same(1.0), same(0.0));
-    a -= whole;
-    const real power = (real)((numeral)(whole + (0x1.8p52 + 1023.0)) << 52);
-    return power * (1.0 + a + a * (a - 1.0) * (0.30691046 + a * (0.06561149 + a * 0.01371135)));
-}
-
-static inline real reach_of(real before, real last, int p)
-{
-    const real first = log2_of(before) * (-1.0 / (p - 1)), second = log2_of(last) * (-1.0 / p);
-    const real reach = exp2_of(choose(first < second, first, second) - TAYLOR_SAFETY / (p - 1));
-    return choose(before + last < 1e300, reach, same((double)NAN));
-}
-
 /* Coefficients at the states of all lanes, and the sizes of the steps to try; NaN where there is none. */
 static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
 {
@@ -82,7 +58,7 @@ static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
     real before, size;
     taylor_sizes(run, run->K, p, &before, &size);
     const real first = same(e->first_step);
-    real reach = reach_of(before, size, p);
+    real reach = taylor_reach(before, size, p);
     if (any_of((reach != reach) & (begins | moved))) {
         reach = taylor_straight(run, run->K, reach);
     }
@@ -196,31 +172,25 @@ static void fill_single(const eomgen_ensemble *e, const lane_run *lanes, int l, 
     }
 }
 
+/* The inputs of a lane at a time and state. */
+static const double *inputs_single(const lane_run *lanes, int l, double t, const real *y)
+{
+    eomgen_run *const run = &single_of(lanes, l)->run;
+    double *const state = run->failure_state; /* free until something fails */
+    take_lane(lanes->n, y, l, state);
+    run->hold = lanes->hold[l];
+    eomgen_force(run, t, state);
+    return run->u;
+}
+
 /* The inputs of every lane at its time and state. */
 static EOMGEN_APART void play_lanes(lane_run *lanes, real t, const real *y)
 {
     for (int l = 0; l < W; l++) {
-        eomgen_run *const run = &single_of(lanes, l)->run;
-        double *const state = run->failure_state; /* free until something fails */
-        if (!lanes->awake[l]) {
-            continue;
+        if (lanes->awake[l]) {
+            put_lane(lanes->n_u, inputs_single(lanes, l, t[l], y), l, lanes->u);
         }
-        take_lane(lanes->n, y, l, state);
-        run->hold = lanes->hold[l];
-        eomgen_force(run, t[l], state);
-        put_lane(lanes->n_u, run->u, l, lanes->u);
     }
-}
-
-/* The inputs of a lane where it stands. */
-static const double *inputs_single(const lane_run *lanes, int l)
-{
-    eomgen_run *const run = &single_of(lanes, l)->run;
-    double *const state = run->failure_state;
-    take_lane(lanes->n, lanes->y, l, state);
-    run->hold = lanes->hold[l];
-    eomgen_force(run, lanes->t[l], state);
-    return run->u;
 }
 
 /* The lane's part of a run, as it stands after a step or at the start. */
@@ -395,7 +365,7 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
     take_lane(run->n - e->n_q, run->f + e->n_q, l, x + run->n);
     for (int i = 0; i < run->n_u; i++) {
         const int table = run->signals != NULL && run->signals[i].n > 0 && !run->plays;
-        u[i] = run->plays ? inputs_single(run, l)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
+        u[i] = run->plays ? inputs_single(run, l, run->t[l], run->y)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
     }
     take_lane(model->n_const, run->c, l, c);
     const int status = e->meeting(run->t[l], x, u, c, found, w);

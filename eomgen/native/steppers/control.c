@@ -118,6 +118,13 @@ static int too_small(const eomgen_run *run, double h)
     return !(h >= RUNS_FINE * fabs(run->t) + ROUNDING_TINY) && !(h >= least_step(run)); /* nextafter takes its time */
 }
 
+/* Where a step of this size ends: not beyond the bound, nor short of it by less than the slack. */
+static double end_of_step(const eomgen_run *run, double h_abs, double slack)
+{
+    const double t_new = run->t + h_abs * run->direction;
+    return run->direction * (t_new - run->t_bound) > -slack ? run->t_bound : t_new;
+}
+
 double eomgen_longest(eomgen_run *run)
 {
     double longest = run->max_step;
@@ -170,12 +177,8 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
             run->y = run->y_old, run->y_old = spare;
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
-        double t_new = run->t + h_abs * run->direction;
-        const double slack = method->fixed ? -RUNS_SAME * h_abs : 0.0; /* no step for what rounding left over */
-        if (run->direction * (t_new - run->t_bound) > slack) {
-            t_new = run->t_bound;
-        }
-        const double h = t_new - run->t;
+        /* no step for what rounding left over */
+        const double t_new = end_of_step(run, h_abs, method->fixed ? RUNS_SAME * h_abs : 0.0), h = t_new - run->t;
         h_abs = fabs(h);
         EOMGEN_METHOD(method, attempt)(run, h);
         const double error = n > 0 ? EOMGEN_METHOD(method, error)(run, h) : 0.0;

@@ -220,7 +220,7 @@ static int radau_step(eomgen_run *run)
 {
     const int n = run->n;
     const newton_area area = newton_areas(run, RADAU_ROWS), *const a = &area;
-    const double least = 10.0 * fabs(nextafter(run->t, run->direction * HUGE_VAL) - run->t), entered = run->h_abs;
+    const double least = least_step(run), entered = run->h_abs;
     double h_abs = fmin(fmax(entered, least), eomgen_longest(run)), rate = -1.0, size;
     double h_old = a->state[RADAU_H_OLD], error_old = a->state[RADAU_ERROR_OLD];
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
@@ -233,11 +233,7 @@ static int radau_step(eomgen_run *run)
         if (run->stopped || !(h_abs >= least)) {
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
-        double t_new = run->t + h_abs * run->direction;
-        if (run->direction * (t_new - run->t_bound) > 0.0) {
-            t_new = run->t_bound;
-        }
-        const double h = t_new - run->t;
+        const double t_new = end_of_step(run, h_abs, 0.0), h = t_new - run->t;
         h_abs = fabs(h);
         if (!(fabs(h - a->state[RADAU_H_FACTORED]) <= RUNS_SAME * h_abs)) {
             a->state[RADAU_FACTORED] = 0.0;

@@ -66,11 +66,7 @@ static int taylor_step(eomgen_run *run)
             run->y = run->y_old, run->y_old = spare;
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
-        double t_new = run->t + h_abs * run->direction;
-        if (run->direction * (t_new - run->t_bound) > 0.0) {
-            t_new = run->t_bound;
-        }
-        const double h = t_new - run->t;
+        const double t_new = end_of_step(run, h_abs, 0.0), h = t_new - run->t;
         taylor_sum(run, rows, h, run->y, run->f);
         if (taylor_expand(run, t_new, run->y, after) == 0 && taylor_defect(run, h, run->f, after + n) <= 1.0) {
             run->t_old = run->t, run->t = t_new, run->step = h;

@@ -20,37 +20,52 @@ static int taylor_order(double rtol, int most)
     return order < TAYLOR_LEAST ? TAYLOR_LEAST : order > most ? most : order;
 }
 
-/* log2 of a positive number, within 6e-5, and 2^a, within 1e-5 of it: enough for the size of a step, and quick. */
-static inline double taylor_log2(double a)
+#ifdef EOMGEN_PLAIN
+typedef uint64_t numeral;
+
+static inline numeral bits_of(double a)
 {
-    uint64_t word;
+    numeral word;
     memcpy(&word, &a, sizeof a);
-    const double exponent = (double)(int)((word >> 52) & 2047) - 1023.0;
-    word = (word & 0xfffffffffffffu) | 0x3ff0000000000000u;
+    return word;
+}
+
+static inline double of_bits(numeral word)
+{
+    double a;
     memcpy(&a, &word, sizeof a);
-    a -= 1.0;
+    return a;
+}
+#else
+#define bits_of(a) (numeral)(a)
+#define of_bits(word) (real)(word)
+#endif
+
+/* log2 of a positive number, within 6e-5, and 2^a, within 1e-5 of it: enough for the size of a step, and quick; 2^52 and half
+   as much again make integers of their last bits. */
+static inline real taylor_log2(real a)
+{
+    const numeral word = bits_of(a);
+    const real exponent = of_bits((word >> 52 & 2047) | 0x4330000000000000u) - (0x1p52 + 1023.0);
+    a = of_bits((word & 0xfffffffffffffu) | 0x3ff0000000000000u) - 1.0;
     return exponent + a + a * (1.0 - a) * (0.44245418 + a * (-0.27016007 + a * (0.15202092 - a * 0.04584151)));
 }
 
-static inline double taylor_exp2(double a)
+static inline real taylor_exp2(real a)
 {
-    const double whole = floor(a);
+    const real nearest = (a + 0x1.8p52) - 0x1.8p52, whole = nearest - choose(nearest > a, same(1.0), same(0.0));
     a -= whole;
-    const uint64_t word = (uint64_t)((int64_t)whole + 1023) << 52;
-    double power;
-    memcpy(&power, &word, sizeof power);
+    const real power = of_bits(bits_of(whole + (0x1.8p52 + 1023.0)) << 52);
     return power * (1.0 + a + a * (a - 1.0) * (0.30691046 + a * (0.06561149 + a * 0.01371135)));
 }
 
 /* The step in which terms of order p - 1 and p, of these sizes for a step of 1 in parts of the tolerance, both come down to
    it, and some safety; NaN where one is not finite. */
-static inline double taylor_reach(double before, double last, int p)
+static inline real taylor_reach(real before, real last, int p)
 {
-    if (!(before + last < 1e300)) {
-        return (double)NAN;
-    }
-    const double first = -taylor_log2(before) / (p - 1), second = -taylor_log2(last) / p;
-    return taylor_exp2((first < second ? first : second) - TAYLOR_SAFETY / (p - 1));
+    const real first = -taylor_log2(before) / (double)(p - 1), second = -taylor_log2(last) / (double)p;
+    const real reach = taylor_exp2(choose(first < second, first, second) - TAYLOR_SAFETY / (p - 1));
+    return choose(before + last < 1e300, reach, same((double)NAN));
 }
 #endif
 
