@@ -56,11 +56,25 @@ def times(rows: Sequence[Mapping[int, Expr]], x: Sequence[Expr]) -> list[Expr]:
     return result
 
 
-def quadratic_form(columns: Sequence[Row], N: Sequence[Row]) -> dict[tuple[int, int], Expr]:
-    """The lower triangle of B^T N B of B by its columns and a symmetric N, zeros left out."""
-    across = [{k: x for k, row in enumerate(N) if (x := dot(row, column)) is not None} for column in columns]
-    pairs = {(i, k): dot(column, across[k]) for i, column in enumerate(columns) for k in range(i + 1)}
-    return {key: x for key, x in pairs.items() if x is not None}
+#: Coordinates that follow from a few rows: columns of K by the rows, columns of C, the rates of these rows; B has K C.
+Leg = tuple[set[int], list[Row], list[Row]]
+
+
+def quadratic_form(columns: Sequence[Row], N: Sequence[Row], legs: Sequence[Leg] = ()) -> list[Row]:
+    """B^T N B of B by its columns and a symmetric N, zeros left out; of legs as C^T (K^T N K) C."""
+    legs = [leg for leg in legs if all(N[k].keys() <= leg[0] for k in leg[0])]
+    apart = set().union(*(leg[0] for leg in legs))
+    rest = [{k: x for k, x in column.items() if k not in apart} for column in columns]
+    across = [{k: x for k, row in enumerate(N) if (x := dot(row, column)) is not None} for column in rest]
+    found: list[Row] = [{} for _ in columns]
+    for i, column in enumerate(rest):
+        for k, other in enumerate(across[: i + 1]):
+            if (entry := dot(column, other)) is not None:
+                found[i][k] = found[k][i] = entry
+    for _, K, C in legs:
+        for row, more in zip(found, quadratic_form(C, quadratic_form(K, N)), strict=True):
+            row |= {k: row[k] + x if k in row else x for k, x in more.items()}
+    return found
 
 
 def gram(rows: Sequence[Mapping[int, Expr]]) -> list[Row]:

@@ -19,6 +19,7 @@ from ..base.limits.crossings import NEAR_SQUARE
 from ..expr.core import Expr, substitute
 from ..expr.schedule import count
 from .linear_algebra import (
+    Leg,
     OrthogonalFactor,
     Row,
     SparseFactor,
@@ -26,6 +27,7 @@ from .linear_algebra import (
     factorize,
     fronts,
     quadratic_form,
+    rows_of,
     times,
     transpose,
     work,
@@ -94,15 +96,27 @@ class MotionLoops:
         return transpose(self._motions, self.terms.n_dof)
 
     @cached_property
+    def _legs(self) -> list[Leg]:
+        """The parts that fewer rows hold than freedoms drive."""
+        zero, one, found = self.terms.graph.zero, self.terms.graph.one, list[Leg]()
+        for part in self._factor.parts:
+            held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
+            rows = [self.loops.rows[i] for i in held]
+            C = [{r: -row[k] for r, row in enumerate(rows) if k in row} for k in self.terms.preferred]
+            if len(held) < sum(map(bool, C)):
+                units = [[one if j == i else zero for j in range(len(self._left))] for i in held]
+                K = rows_of([self._particular(unit)[0] for unit in units])
+                found.append(({self.dependent[k] for k in part}, K, C))
+        return found
+
+    @cached_property
     def _weighted(self) -> list[Row]:
         return [{i: x * self.weights[i] for i, x in column.items()} for column in self._columns]
 
     @cached_property
     def _products(self) -> list[Row]:
         """B^T W B."""
-        f = range(self.terms.n_dof)
-        lower = quadratic_form(self._columns, [{k: x} for k, x in enumerate(self.weights)])
-        return [{j: lower[key] for j in f if (key := (max(i, j), min(i, j))) in lower} for i in f]
+        return quadratic_form(self._columns, [{k: x} for k, x in enumerate(self.weights)], self._legs)
 
     @cached_property
     def _nearest(self) -> SparseFactor:
@@ -192,7 +206,7 @@ class MotionLoops:
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, self.moved, strict=True)))
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
         given, _ = self._particular([-x for x in gamma])
-        a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
+        a, checks = embedded_accelerations(terms, self._motions, given, here[: terms.n_v], self._legs)
         conditions = [*self._follows(), *self._far(), self.loops.long_rows()]
         if self.loops.redundant:  # whose rates may contradict each other
             conditions += [self.loops.is_met(self.moved, self._rate), self.loops.is_met(a, gamma)]

@@ -20,6 +20,7 @@ from ..mechanics.constraint_functions import ALL, UNIT
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
 from .factor import exceeding, outward
 from .linear_algebra import (
+    Leg,
     Row,
     SparseFactor,
     dot,
@@ -313,15 +314,14 @@ SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast 
 
 
 def embedded_accelerations(
-    terms: SystemTerms, scales: Sequence[Expr], B: Sequence[Row], a: Sequence[Expr], bias: Sequence[Expr]
+    terms: SystemTerms, B: Sequence[Row], a: Sequence[Expr], bias: Sequence[Expr], legs: Sequence[Leg] = ()
 ) -> tuple[list[Expr], list[Expr]]:
     """Accelerations a + B y with B^T (M (a + B y) + bias) = 0, and checks of the inertia B^T M B."""
-    graph, f = terms.graph, range(terms.n_dof)
+    graph, f, scales = terms.graph, range(terms.n_dof), terms.coordinate_scales
     M = rows_of(terms.mass_matrix)
     force = [x + y for x, y in zip(bias, times(M, a), strict=True)]
     columns = transpose(B, terms.n_dof)
-    embedded = quadratic_form(columns, M)
-    factor = factorize([{k: embedded.get((max(i, k), min(i, k)), graph.zero) for k in f} for i in f])
+    factor = factorize([{k: row.get(k, graph.zero) for k in f} for row in quadratic_form(columns, M, legs)])
     y = factor.solve([-x for x in times(columns, force)])
     diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
     squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
@@ -361,7 +361,7 @@ class EmbeddedLoops(LoopBlocks):
             B, _ = self._partition(None, conditions)
         else:
             B, a = self._partition([-x for x in gamma], conditions)
-        a, checks = embedded_accelerations(terms, self.s, B, a, here[: terms.n_v])
+        a, checks = embedded_accelerations(terms, B, a, here[: terms.n_v])
         return a, checks
 
     def _far(self) -> Expr:
