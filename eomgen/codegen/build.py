@@ -20,6 +20,7 @@ from ..base.numeric.user_functions import Curve, Surface
 from ..errors import UsageError, ill_placed, no_such
 from ..expr.core import Expr, Graph, reachable, symbols_of
 from ..expr.functions import Function, NativeCode
+from ..expr.schedule import count
 from ..mechanics import Kinematics
 from ..mechanics.methods.positive import require_inertia
 from ..mechanics.methods.tree_equations import TreeEquations
@@ -28,7 +29,7 @@ from ..runtime.layout import ABI, ModelInfo
 from .contact_columns import COLUMNS
 from .kernels import BlockMaker
 from .metadata import collect_metadata
-from .program import SHIFTS, Block, KernelDriver, Limits, Program, count_apart, hoist
+from .program import SHIFTS, Block, KernelDriver, Limits, Program, hoist
 from .terms import SystemTerms
 
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
@@ -87,8 +88,8 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
             blocks[other] = (maker.public(other) if other in NAMED else None) or maker.internal(other)
     made = {*(d.name for d in drivers), *(b.name for b in blocks.values() if b.public)}
     hoisted, parameter_only = hoist(terms.graph, [y for block in blocks.values() for y in block.roots], terms.p)
-    counts = {b.name: count_apart((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
-    counts["precompute"] = count_apart(hoisted, frozenset())
+    counts = {b.name: count((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
+    counts["precompute"] = count(hoisted)
     derivatives = [b for b in blocks.values() if b.outputs and b.name in SPARSE]
     info = ModelInfo(
         **metadata,

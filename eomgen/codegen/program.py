@@ -15,7 +15,7 @@ from typing import Any
 from ..base.kernel_table import Sizes
 from ..base.records import dataclass
 from ..expr.core import LEAVES, Expr, Graph, reachable
-from ..expr.schedule import Operations, count
+from ..expr.schedule import Operations
 from ..mechanics.methods.tree_equations import LinearSystem
 from .contact_columns import ContactColumns
 
@@ -59,27 +59,6 @@ def hoist(graph: Graph, roots: Sequence[Expr], parameters: Sequence[str]) -> tup
             hoisted.update(k for k in node[1:] if k in inner)
     hoisted.update(y.id for y in roots if y.id in inner)
     return tuple(Expr(graph, i) for i in sorted(hoisted)), frozenset(inner)
-
-
-def count_apart(outputs: Sequence[Expr], parameter_only: frozenset[int]) -> Operations:
-    """Operations of the outputs without those of parameters only."""
-    if not outputs:
-        return Operations()
-    graph = outputs[0].graph
-    used = reachable(graph, (y.id for y in outputs))
-    every, apart = count(outputs), count([Expr(graph, i) for i in used if i in parameter_only])
-    return Operations(
-        every.multiplications - apart.multiplications,
-        every.additions - apart.additions,
-        every.divisions - apart.divisions,
-        every.negations - apart.negations,
-        _difference(every.functions, apart.functions),
-        _difference(every.choices, apart.choices),
-    )
-
-
-def _difference(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
-    return {name: n - b.get(name, 0) for name, n in a.items() if n != b.get(name, 0)}
 
 
 @dataclass(frozen=True)

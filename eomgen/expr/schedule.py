@@ -69,13 +69,13 @@ def _sum(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
     return {name: a.get(name, 0) + b.get(name, 0) for name in sorted({*a, *b})}
 
 
-def count(outputs: Sequence[Expr]) -> Operations:
-    """Count the distinct operations that the outputs are made of."""
+def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
+    """Count the distinct operations that the outputs are made of, but for those ``skipped``."""
     graph = common_graph(outputs)
     if graph is None:
         return Operations()
     nodes = graph.nodes
-    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
+    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)) if i not in skipped)
     found = _with_pairs(graph, found)
     bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
