@@ -190,9 +190,9 @@ FAULTS = (
     ),
     Fault(
         "c-columns-jacobian", "C put_column",
-        "k < NQ ? rates[k] : da[k - NQ]",
-        "k < NQ ? rates[k] : da[NX - 1 - k]",
-        "the Jacobian of a long chain: rows in the wrong order",
+        "set_column(N, column, columns, da, out + NQ * columns);",
+        "set_column(N, columns - 1 - column, columns, da, out + NQ * columns);",
+        "the Jacobian of a long chain: columns in the wrong order",
         "tests/mechanics/test_jacobians.py::test_jacobian_of_models[slider_crank-embedding]",
     ),
     Fault(

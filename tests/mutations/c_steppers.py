@@ -224,9 +224,9 @@ FAULTS = (
     ),
     Fault(
         "rk4-node", "C rk4_attempt",
-        "eomgen_evaluate(run, t + 0.5 * h, y, k2);",
-        "eomgen_evaluate(run, t + h, y, k2);",
-        "the third stage of RK4 is evaluated at the end of the step",
+        "{0.5, 0.5, 1.0}",
+        "{0.5, 1.0, 1.0}",
+        "the third stage of RK4 is taken at the end of the step",
         "tests/runs/test_integrators.py::test_steps_of_one_size",
     ),
 )  # fmt: skip
