@@ -47,28 +47,17 @@ def compile_sources(
     kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None = None,
     key: str | None = None,
 ) -> CacheEntry:  # fmt: skip
-    """Compile a model, or find it in the cache.
+    """Compile the C files and headers of a model, or find it in the cache; ``progress`` takes a line for each step.
 
-    Parameters
-    ----------
-    kind : {'model', 'library'}
-        ``model``: for this session, a library that shows its table alone and takes the solvers of ``eomgen._native``;
-        without the option ``lanes``, lanes and series are left to :func:`compile_lanes`. ``library``: for C programs
-        or ctypes; every function that is not static can be called, and C files that all models share are compiled once.
-    sources : mapping of str to str
-        Texts by file name: C files and headers, ``eomgen.h`` among them.
-    name : str
-        Name of the model.
-    options : Options
-    progress : callable, optional
-        Takes a line for each step.
-    key : str, optional
-        Of the entry, from :func:`key_of_program`; that of the sources and flags by default.
+    Kind ``model`` is for this session, a library that shows its table and takes the solvers of ``eomgen._native``;
+    without the option ``lanes``, lanes and series are left to :func:`compile_lanes`.  ``library`` is for C programs or
+    ctypes: every function that is not static can be called, and C files that all models share are compiled once.  The
+    key of the entry may come from :func:`key_of_program`; by default it is that of the sources and flags.
 
     Raises
     ------
     ToolchainError
-        If there is no compiler, the compiler fails, or the cache cannot be used.
+        There is no compiler, the compiler fails, or the cache cannot be used.
     """
     for file in (name, *sources):
         if not re.fullmatch(r"\w[\w.-]*", file):
@@ -166,30 +155,10 @@ def compile_and_link(
     directory: Path, name: str, files: Mapping[Path, Sequence[str]], link: Sequence[str], compiler: CompilerInfo,
     jobs: int | None = None, progress: Progress | None = None, objects: Sequence[Task] = (), suffix: str = SUFFIX,
 ) -> str:  # fmt: skip
-    """Compile C files into a library.
+    """Compile C files, given by their places in a directory with their flags, into a library there; its file's name.
 
-    Parameters
-    ----------
-    directory : Path
-        Where to work; of what is made nothing but the product stays there.
-    name, suffix : str
-        Of the library.
-    files : mapping of Path to sequence of str
-        Place of every C file, from the directory, and its flags.
-    link : sequence of str
-        Flags of the linker.
-    compiler : CompilerInfo
-    jobs : int, optional
-        Files compiled at a time.
-    progress : callable, optional
-        Told what is being done.
-    objects : sequence of callable, optional
-        Each makes a further object file, which stays.
-
-    Returns
-    -------
-    str
-        Name of the library's file.
+    ``jobs`` files are compiled at a time, ``link`` are flags of the linker.  Of what is made nothing but the library
+    stays in the directory; ``objects`` make further object files, which stay where they are.
 
     Raises
     ------
@@ -253,15 +222,7 @@ def _format(head: bytes) -> bytes:
 def compile_lanes(file: Path) -> CacheEntry | None:
     """The library with the lanes and series of a model, compiled now if need be, by the flags of the model.
 
-    Parameters
-    ----------
-    file : Path
-        The model's library in the cache, where its sources are kept too.
-
-    Returns
-    -------
-    CacheEntry or None
-        None if the model has no lanes that this processor takes.
+    The model's sources lie beside its library, ``file``, in the cache.  None if no lanes are for this processor.
 
     Raises
     ------

@@ -65,34 +65,16 @@ def compute_key(parts: Mapping[str, Any]) -> str:
 
 
 class CacheEntry(NamedTuple):
-    """A published build.
+    """A published build."""
 
-    Attributes
-    ----------
-    key : str
-        SHA-256 of everything it depends on.
-    kind : str
-        ``model``, ``library``, ``lanes``, ``object`` or ``numpy``.
-    name : str
-        Name of the model.
-    directory : Path
-        Where it lies; ``sources/`` in it holds the texts that a model was made from.
-    product : Path
-        The file to load or link.
-    size : int
-        Bytes of all its files.
-    created, used : float
-        When it was built and last used, in seconds since 1970.
-    """
-
-    key: str
-    kind: str
-    name: str
-    directory: Path
-    product: Path
-    size: int
-    created: float
-    used: float
+    key: str  #: SHA-256 of everything it depends on
+    kind: str  #: ``model``, ``library``, ``lanes``, ``object`` or ``numpy``
+    name: str  #: of the model
+    directory: Path  #: where it lies; ``sources/`` in it holds the texts that a model was made from
+    product: Path  #: the file to load or link
+    size: int  #: bytes of all its files
+    created: float  #: when it was built, in seconds since 1970
+    used: float  #: when it was last used
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,21 +163,10 @@ class Cache:
     def publish(
         self, attempt: Path, key: str, kind: str, name: str, product: str, recipe: Mapping[str, Any]
     ) -> CacheEntry:
-        """Make the entry of a key from an attempt, by one rename.
+        """Make the entry of a key from an attempt, by one rename; or that of another process which was faster.
 
-        Parameters
-        ----------
-        attempt : Path
-            Directory from :meth:`attempt`, with the files to keep and nothing else.
-        key, kind, name, product : str
-            As in :class:`CacheEntry`; `product` is a file name.
-        recipe : mapping
-            How it was made: compiler, flags, options.
-
-        Returns
-        -------
-        CacheEntry
-            The new entry, or that of another process that was faster.
+        The attempt, a directory from :meth:`attempt`, holds the files to keep, one named `product`, and nothing else.
+        `recipe` says how it was made: compiler, flags, options.
         """
         paths = sorted(attempt.rglob("*"))
         for path in paths:  # whatever the umask of the compiler

@@ -52,16 +52,9 @@ class Commands:
     ) -> CompletedProcess[str]:
         """Run a command and collect what it prints, in English, both streams in one.
 
-        Parameters
-        ----------
-        command : sequence of str
-            Program and arguments.
-        directory : Path, optional
-            Working directory, also for temporary files, so that a killed compiler leaves nothing elsewhere.
-        seconds : float
-            That it may take, unless EOMGEN_COMPILER_SECONDS says otherwise.
-        task : str, optional
-            What it is for; if this is given, an exit status other than 0 is an error.
+        The directory is for temporary files too, so that a killed compiler leaves nothing elsewhere.  The command may
+        take so many seconds, unless EOMGEN_COMPILER_SECONDS says otherwise.  An exit status other than 0 is an error if
+        it is said what the command is for, by ``task``.
 
         Raises
         ------
@@ -171,9 +164,8 @@ def _listen(process: Popen[bytes], seconds: float) -> tuple[bytes, str]:
         end = min(end, monotonic() + LINGER) if ended else end
         if len(printed) > OUTPUT or monotonic() >= end:
             _kill(process)
-            return bytes(printed), f"{OUTPUT / 1e6:g} MB of output" if len(
-                printed
-            ) > OUTPUT else "" if ended else overdue
+            excess = "" if ended else overdue
+            return bytes(printed), f"{OUTPUT / 1e6:g} MB of output" if len(printed) > OUTPUT else excess
     try:
         process.wait(max(end - monotonic(), LINGER))
     except TimeoutExpired:
@@ -202,36 +194,20 @@ or set CC to the command of your compiler, or use target="numpy", which needs no
 
 @dataclass(frozen=True, slots=True)
 class CompilerInfo:
-    """A C compiler that has answered.
+    """A C compiler that has answered."""
 
-    Attributes
-    ----------
-    path : str
-        The executable.
-    command : tuple of str
-        Words that start every command line; the first is ``path``.
-    kind : str
-        ``gcc``, ``clang``, ``zig`` or ``other``; it decides which flags are understood.
-    version : str
-        What it says of itself.
-    """
-
-    path: str
-    command: tuple[str, ...]
-    kind: str
-    version: str
+    path: str  #: the executable
+    command: tuple[str, ...]  #: words that start every command line; the first is ``path``
+    kind: str  #: ``gcc``, ``clang``, ``zig`` or ``other``; it decides which flags are understood
+    version: str  #: what it says of itself
 
 
 def find_compiler(command: str | None = None) -> CompilerInfo:
     """Find the C compiler.
 
-    Tried in this order: `command`, the environment variable CC, the compiler Python was built with, gcc, clang, cc, zig
-    on the path and zig from the package ziglang. If one of the first two is set, no other is tried.
-
-    Parameters
-    ----------
-    command : str, optional
-        Command line of a compiler, e.g. ``"clang-18"`` or ``"ccache gcc"``.
+    Tried in this order: `command`, a command line such as ``"clang-18"`` or ``"ccache gcc"``, the environment variable
+    CC, the compiler Python was built with, gcc, clang, cc, zig on the path and zig from the package ziglang. If one of
+    the first two is set, no other is tried.
 
     Raises
     ------
@@ -416,19 +392,7 @@ class Options:
 
 
 def compile_flags(options: Options, compiler: CompilerInfo, size: int, *, portable: bool = False) -> list[str]:
-    """Flags that compile one C file.
-
-    Parameters
-    ----------
-    options : Options
-        How to compile.
-    compiler : CompilerInfo
-        Who compiles.
-    size : int
-        Length of all C files in bytes.
-    portable : bool, optional
-        The code may go to other computers.
-    """
+    """Flags that compile one of C files of so many bytes together; ``portable``: the code may go to other computers."""
     best = GCC_LEVEL if compiler.kind == "gcc" else 1 if size > LARGE_SOURCE else 2
     level = best if options.optimize is None else options.optimize
     flags = ["-std=c99", f"-O{level}", "-fPIC", *machine_flags(options, compiler)]

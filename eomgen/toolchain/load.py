@@ -100,21 +100,10 @@ CODES = {**{error: status for status, error in STATUS.items()}, EvaluationError:
 
 
 def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] | None = None) -> Any:
-    """Open the emitted NumPy functions of a model, kept in the cache like a library; no compiler is needed.
+    """Open the NumPy functions of a model, kept in the cache like a library: a ``Model`` of ``eomgen._native``.
 
-    Parameters
-    ----------
-    sources : mapping of str to str
-        From :func:`eomgen.codegen.targets.numpy.emit_numpy`.
-    name : str
-        Name of the model.
-    twins : mapping of str to callable, optional
-        What the text calls but does not define: the Python twins of native functions.
-
-    Returns
-    -------
-    Model
-        Of ``eomgen._native``.
+    The sources come from :func:`eomgen.codegen.targets.numpy.emit_numpy`; ``twins`` are what the text calls and does
+    not define, the Python twins of native functions.  No compiler is needed.
     """
     text = sources[NUMPY]
     key = compute_key({"numpy": text})
@@ -138,20 +127,10 @@ def open_functions(
     name: str, file: str, metadata: str, table: Mapping[str, Any], blocks: Mapping[str, tuple[Any, int, int]],
     precompute: Callable[[Array], Array],
 ) -> Any:  # fmt: skip
-    """The core of functions of NumPy arrays.
+    """The core of functions of NumPy arrays, of the module of this name and file; metadata is the text of model.json.
 
-    Parameters
-    ----------
-    name, file : str
-        Of the module that has them.
-    metadata : str
-        The JSON of model.json.
-    table : mapping
-        name, sizes, kernels and equations, as ``eomgen._native.Functions`` takes them.
-    blocks : mapping of str to (callable, int, int)
-        ``f(t, x, u, c) -> out``, and the lengths of x and out.
-    precompute : callable
-        ``p -> c``
+    The table holds name, sizes, kernels and equations, as ``eomgen._native.Functions`` takes them; blocks are
+    ``f(t, x, u, c) -> out`` with the lengths of x and out, and precompute is ``p -> c``.
     """
 
     @wraps(precompute)
@@ -172,13 +151,7 @@ class Linear:
     """A block that is linear in its last entries, the directions of derivatives.
 
     Solvers want one direction after the other at the same place; one call for all of them takes little longer than one.
-
-    Parameters
-    ----------
-    block : callable
-        ``f(t, x, u, c) -> out``
-    along : int
-        How many entries those are.
+    ``block`` is ``f(t, x, u, c) -> out``, and ``along`` says how many entries the directions are.
     """
 
     def __init__(self, block: Callable[..., Array], along: int) -> None:
