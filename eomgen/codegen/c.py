@@ -40,25 +40,17 @@ UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:-]")
 def emit_c(program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True) -> SourceSet:
     """The C sources of a program.
 
-    Parameters
-    ----------
-    precision : {'double', 'float'}, optional
-        Of a library that stands alone: its header says what calls cost, and it has a semi-implicit stepper too.  One
-        in single precision has neither lanes nor Taylor series.
-    lanes : bool, optional
-        Whether there are functions for several states at a time, and Taylor series.
-    separate : bool, optional
-        Whether functions that analyses alone need, and the pieces of a large model, go into files of their own.
+    ``<name>.c``, ``<name>.h``, ``eomgen.h`` and other headers that are the same for all models, ``model.json``; C99, no
+    dependency but libm; ``eomgen_solvers.c``, which is the same for all models, unless all functions are straight-line
+    code; ``<name>_analyses.c`` with what runs do without; ``<name>_metadata.c`` with the table of functions;
+    ``<name>_lanes2.c`` and so on for several states at a time.  A large model has further files ``<name>_part1.c`` and
+    so on, so that they can be compiled side by side; tables stand in ``<name>_tables.c``, native functions in
+    ``<name>_native_<first of them>.c``.
 
-    Returns
-    -------
-    SourceSet
-        ``<name>.c``, ``<name>.h``, ``eomgen.h`` and other headers that are the same for all models, ``model.json``;
-        C99, no dependency but libm; ``eomgen_solvers.c``, which is the same for all models, unless all functions are
-        straight-line code; ``<name>_analyses.c`` with what runs do without; ``<name>_metadata.c`` with the table of
-        functions; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has further files
-        ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in ``<name>_tables.c``, native
-        functions in ``<name>_native_<first of them>.c``.
+    ``precision``, 'double' or 'float', is that of a library that stands alone: its header says what calls cost, and it
+    has a semi-implicit stepper too; one in single precision has neither lanes nor Taylor series.  Without ``lanes``
+    there are no functions for several states at a time, nor Taylor series; unless ``separate``, functions that analyses
+    alone need, and the pieces of a large model, are in the main file.
     """
     single = precision == "float"
     if single:

@@ -136,19 +136,9 @@ def places_again(program: Program, block: Block) -> dict[str, str]:
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
-    """Areas of the work array; the header eomgen_solvers.h says what each holds.
+    """Name, start and length of the areas of the work array, as eomgen_solvers.h has them, and its length.
 
-    Parameters
-    ----------
-    program : Program
-    blocks : int
-        Doubles at the start of the work array that blocks use.
-
-    Returns
-    -------
-    areas : list of (name, start, length)
-    total : int
-        Length of the work array.
+    ``blocks``: doubles at its start that blocks use.
     """
     if not program.drivers:
         return [], blocks

@@ -72,16 +72,8 @@ def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dic
     """Bytes on the stack that each function of C sources needs at most, with all that it calls of them.
 
     Every variable and every operation is counted with a place of its own, which compilers need not give it, and every
-    function with a frame of its own, also where it becomes a part of its caller.
-
-    Parameters
-    ----------
-    sources : iterable of str
-        Texts of the files.
-    name : str
-        Of the model, which stands before names of functions that another file calls.
-    sizes : mapping of str to str
-        Further numbers that lengths of arrays are made of.
+    function with a frame of its own, also where it becomes a part of its caller.  The model's name stands before names
+    of functions that another file calls; sizes are further numbers that lengths of arrays are made of.
     """
     texts = [_KERNEL.sub(_CALLED, text) for text in sources]
     numbers = {word: value for text in texts for word, value in _NUMBER.findall(text)} | dict(sizes)
