@@ -43,32 +43,13 @@ cdef cnp.ndarray numbers_of(list given):
     return result
 
 
-cdef class Interpolant:
-    """The solution within one step: ``f(t)`` for t (k,) gives (n, k), for one number (n,)."""
+cdef class Dense:
+    """The solution of a run, or within one step: ``f(t)`` for times (k,) gives (n_x, k), for one number (n_x,)."""
 
     cdef eomgen_run run
     cdef const eomgen_method *method
-    cdef cnp.ndarray memory
+    cdef readonly cnp.ndarray pieces
     cdef readonly double t_old, t
-
-    def __call__(self, t):
-        cdef cnp.ndarray flat = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError)), result
-        cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
-        cdef int j
-        cdef double *at = <double *>cnp.PyArray_DATA(flat)
-        cdef cnp.ndarray state = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)  # of this call: threads may share the object
-        cdef double *y = <double *>cnp.PyArray_DATA(state)
-        cdef double *out
-        if cnp.PyArray_NDIM(flat) == 0:
-            self.method.interpolate(&self.run, at[0], y)
-            return state
-        result = rows(n, k)
-        out = <double *>cnp.PyArray_DATA(result)
-        for i in range(k):
-            self.method.interpolate(&self.run, at[i], y)
-            for j in range(n):
-                out[j * k + i] = y[j]
-        return result
 
     @property
     def t_min(self):
@@ -77,6 +58,32 @@ cdef class Interpolant:
     @property
     def t_max(self):
         return max(self.t_old, self.t)
+
+    def __call__(self, t):
+        cdef cnp.ndarray at = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError))
+        sign = 1.0 if self.pieces[0, 1] >= 0.0 else -1.0
+        which = np.searchsorted(sign * self.pieces[:, 2], sign * at.ravel())
+        cdef cnp.ndarray chosen = np.minimum(which, len(self.pieces) - 1).astype(np.intp)
+        cdef cnp.npy_intp k = cnp.PyArray_SIZE(at), i
+        cdef int n = self.run.n
+        cdef cnp.ndarray result = rows(k, n)
+        cdef double *piece
+        cdef eomgen_run run = self.run  # of this call: threads may share the object
+        for i in range(k):
+            piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
+                3 + n * (1 + self.method.rows_F))
+            run.t_old, run.step, run.y_old, run.F = piece[0], piece[1], piece + 3, piece + 3 + n
+            self.method.interpolate(&run, (<double *>cnp.PyArray_DATA(at))[i],
+                                    <double *>cnp.PyArray_DATA(result) + i * n)
+        return result[0] if cnp.PyArray_NDIM(at) == 0 else np.ascontiguousarray(result.T)
+
+
+cdef Dense dense_of(const eomgen_method *method, int n, cnp.ndarray pieces):
+    """The solution from rows t_old, step, end, y_old (n) and coefficients."""
+    cdef Dense dense = Dense.__new__(Dense)
+    dense.method, dense.run.n, dense.pieces = method, n, pieces
+    dense.t_old, dense.t = pieces[0, 0], pieces[len(pieces) - 1, 2]
+    return dense
 
 
 cdef const eomgen_signal *make_signals(signals, int n_u, list held) except? NULL:
@@ -192,18 +199,15 @@ cdef class Stepper:
 
     def interpolant(self):
         """The solution within the last step."""
-        cdef Interpolant result = Interpolant.__new__(Interpolant)
         cdef int n = self.run.n
-        eomgen_between(self.method, &self.run, self.run.t, self.run.next)  # forms the coefficients
+        cdef cnp.ndarray piece = rows(1, 3 + n * (1 + self.method.rows_F))
+        cdef double *data = <double *>cnp.PyArray_DATA(piece)
+        eomgen_between(self.method, &self.run, self.run.t, data + 3)  # forms the coefficients
         tell_raised()
-        result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
-        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
-        result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
-        cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
-        memcpy(data, self.run.y_old, n * sizeof(double))
-        memcpy(data + n, self.run.F, n * self.method.rows_F * sizeof(double))
-        result.run.y_old, result.run.F = data, data + n
-        return result
+        data[0], data[1], data[2] = self.run.t_old, self.run.step, self.run.t
+        memcpy(data + 3, self.run.y_old, n * sizeof(double))
+        memcpy(data + 3 + n, self.run.F, n * self.method.rows_F * sizeof(double))
+        return dense_of(self.method, n, piece)
 
     @property
     def t(self):
@@ -308,37 +312,6 @@ cdef long call_python(void *callback_data, const double *t) noexcept with gil:
 
 cdef int ask_outside(void *asker, double t, const double *y, double *g) noexcept with gil:
     return (<Run>asker).ask(t, y, g)
-
-
-cdef class Dense:
-    """The solution of a run: ``f(t)`` for times (k,) gives (n_x, k)."""
-
-    cdef eomgen_run run
-    cdef const eomgen_method *method
-    cdef readonly cnp.ndarray pieces
-
-    @property
-    def ends(self):
-        """First and last time."""
-        return self.pieces[0, 0], self.pieces[len(self.pieces) - 1, 2]
-
-    def __call__(self, t):
-        cdef cnp.ndarray at = np.ascontiguousarray(t, dtype=float)
-        sign = 1.0 if self.pieces[0, 1] >= 0.0 else -1.0
-        which = np.searchsorted(sign * self.pieces[:, 2], sign * at)
-        cdef cnp.ndarray chosen = np.minimum(which, len(self.pieces) - 1).astype(np.intp)
-        cdef cnp.npy_intp k = cnp.PyArray_DIM(at, 0), i
-        cdef int n = self.run.n
-        cdef cnp.ndarray result = rows(k, n)
-        cdef double *piece
-        cdef eomgen_run run = self.run  # of this call: threads may share the object
-        for i in range(k):
-            piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
-                3 + n * (1 + self.method.rows_F))
-            run.t_old, run.step, run.y_old, run.F = piece[0], piece[1], piece + 3, piece + 3 + n
-            self.method.interpolate(&run, (<double *>cnp.PyArray_DATA(at))[i],
-                                    <double *>cnp.PyArray_DATA(result) + i * n)
-        return np.ascontiguousarray(result.T)
 
 
 cdef class Run(Stepper):
@@ -550,9 +523,7 @@ cdef class Run(Stepper):
         """The solution between steps, after outcome(); None if there is none."""
         if not self.stored[2]:
             return None
-        cdef Dense dense = Dense.__new__(Dense)
-        dense.method, dense.run.n, dense.pieces = self.method, self.run.n, np.concatenate(self.stored[2])
-        return dense
+        return dense_of(self.method, self.run.n, np.concatenate(self.stored[2]))
 
     @property
     def resets(self):
