@@ -156,9 +156,9 @@ class Cache:
         shutil.rmtree(directory, ignore_errors=True)
 
     def _make_attempt(self, prefix: str) -> Path:
-        import tempfile
+        from tempfile import mkdtemp
 
-        return Path(tempfile.mkdtemp(prefix=f"{prefix}-", dir=self._attempts))
+        return Path(mkdtemp(prefix=f"{prefix}-", dir=self._attempts))
 
     def publish(
         self, attempt: Path, key: str, kind: str, name: str, product: str, recipe: Mapping[str, Any]
@@ -205,13 +205,7 @@ class Cache:
         return sorted(found, key=lambda entry: entry.used, reverse=True)
 
     def prune(self, older_than: float | None = None, max_size: int | None = None) -> list[CacheEntry]:
-        """Remove what was not used for so many seconds, and from the oldest on until so many bytes are left.
-
-        Returns
-        -------
-        list of CacheEntry
-            What was removed.
-        """
+        """Remove and return what was not used for so many seconds, and the oldest until so many bytes are left."""
         self.require_own()
         now, total, removed = time.time(), 0, []
         for entry in self.entries():
