@@ -326,8 +326,8 @@ def helper(row: Operation) -> str:
         return f"{head}    return {row.body};\n}}\n"
     if not name.startswith("each_"):
         return ""
-    if row.arity < 3:
-        return f"EOMGEN_EACH{'_PAIR' if row.arity == 2 else ''}({name}, {row.name})\n"
+    if row.arity == 1:
+        return f"EOMGEN_EACH({name}, {row.name})\n"
     return f"{head}    real y = same(0.0);\n    {each_lane(row.name, letters)}\n    return y;\n}}\n"
 
 

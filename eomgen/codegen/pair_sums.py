@@ -308,6 +308,5 @@ def contact_tables(program: Program) -> dict[str, Any] | None:
         "states": states,
         "firsts": list(accumulate((len(held.rows[k]) for k in states), initial=0)),
         "rows": [row for k in states for row in held.rows[k]],
-        "record": STATE_RECORD,
         "loads": len(held.loads),
     }

@@ -120,19 +120,12 @@ static inline both both_turned(both a) { return both_of(a.first, -a.second); }
     real *restrict out, real *restrict w
 #define EOMGEN_UNUSED (void)t, (void)x, (void)u, (void)c, (void)out, (void)w;
 
-/* NAME(a), NAME(a, b): a function of doubles in every lane; of files that include eomgen.h. */
+/* NAME(a): a function of doubles in every lane; of files that include eomgen.h. */
 #define EOMGEN_EACH(NAME, FUNCTION) \
     EOMGEN_SHARED inline real NAME(real a) \
     { \
         real y = same(0.0); \
         for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k)); } \
-        return y; \
-    }
-#define EOMGEN_EACH_PAIR(NAME, FUNCTION) \
-    EOMGEN_SHARED inline real NAME(real a, real b) \
-    { \
-        real y = same(0.0); \
-        for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k), EOMGEN_LANE(b, k)); } \
         return y; \
     }
 
