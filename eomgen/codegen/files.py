@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from ..base import algebra, texts
 from ..base.algebra import Array
 from ..base.files import Kept, shipped
-from ..errors import EomgenError
+from ..errors import EomgenError, bad_file
 from ..expr.evaluate import Evaluator
 from .program import Program
 
@@ -49,6 +51,15 @@ def environment() -> Environment:
         "listing": lambda names: repr(tuple(names)),
     }
     return made
+
+
+def own_file(directory: Path, name: str, ours: Callable[[Path], bool]) -> Path:
+    """The place of a file in a folder that is made, where there is none or one that eomgen wrote."""
+    where = directory / name
+    if os.path.lexists(where) and not ours(where):
+        raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")
+    directory.mkdir(parents=True, exist_ok=True)
+    return where
 
 
 def keep_bytecode(kept: Kept) -> None:

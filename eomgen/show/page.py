@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from html import escape
 from typing import Any
+from zlib import compress
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from .symbols import Rope, Shifted, Stretched
 
 LAYER = 0.15  #: by which items of a planar mechanism lie before each other: the last digits of their order
 RIM, BEHIND = 1.3, 0.98  #: size of the dark edge of a joint in the page, and thickness, of the joint's
+MESHES = 24  #: of the grid under a spatial mechanism, along its longer side, at most
 MARKERS = 200  #: whose ways a page offers to draw
 
 
@@ -61,7 +63,12 @@ class Numbers:
         return [self.length - len(flat), len(flat)]
 
     def text(self) -> str:
-        return b64encode(np.concatenate([*self.parts, np.empty(0, "<f4")]).tobytes()).decode()
+        return packed(np.concatenate([*self.parts, np.empty(0, "<f4")]).tobytes())
+
+
+def packed(content: bytes) -> str:
+    """Bytes as a page holds them."""
+    return b64encode(compress(content, 9)).decode()
 
 
 def _stops(item: Item) -> list[tuple[PlacedFrame, float, int]]:
@@ -105,6 +112,23 @@ def _drawn(scene: Scene) -> list[Item]:
             found.append(item._replace(points=points, color=color_of(item)))
         found.append(item)
     return found
+
+
+def _floor(scene: Scene) -> Array:
+    """Lines of a grid under a spatial mechanism."""
+    k = int(np.abs(scene.up).argmax())
+    sides = [axis for axis in range(3) if axis != k]
+    reach = float((scene.high - scene.low)[sides].max())
+    step = 10.0 ** np.floor(np.log10(reach / 2.0)) / 2.0
+    low, high = np.floor(scene.low / step), np.ceil(scene.high / step)
+    apart, lines = int(np.ceil((high - low)[sides].max() / MESHES)), []
+    for along, across in (sides, sides[::-1]):
+        for at in np.arange(low[across], high[across] + 1.0, apart):
+            line = np.full((3, 3), np.nan)
+            line[:2, k] = (scene.low if scene.up[k] > 0.0 else scene.high)[k]
+            line[:2, across], line[:2, along] = at * step, (low[along] * step, high[along] * step)
+            lines.append(line)
+    return np.concatenate(lines)
 
 
 def _item(scene: Scene, item: Item, shape: int, numbers: Numbers) -> dict[str, Any]:
@@ -198,10 +222,11 @@ def page_html(
         "labels": [{"text": label.text, "body": label.body} for label in scene.labels], "labelShape": len(items),
         "markers": [[name, frame.body, len(items) + 1 + k] for k, (name, frame) in enumerate(markers)],
         "morphs": [] if model is None else _morphs(module, scene, shapes, model["ranges"], numbers),
+        "floor": numbers.add(_floor(scene) if scene.view is None else []),
         "curves": [
             {"name": one.plain, "over": one.over.tolist(), "values": one.values.tolist()} for one in curves
         ],
-        "motion": None, "model": model, "wasm": b64encode(wasm).decode(),
+        "motion": None, "model": model, "wasm": packed(wasm) if wasm else "",
     }  # fmt: skip
     if motion is not None:
         data["motion"] = {

@@ -1,45 +1,43 @@
 "use strict";
 // A page in which a mechanism runs: the model in WebAssembly, its picture, and what moves both. DATA stands in the page.
 
-const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+// Bytes of what is packed as text.
+async function unpacked(text) {
+  const packed = new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]);
+  return new Response(packed.stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
+}
+
 const CLOSED = 1e-9; // scaled residual of loops that count as closed
 const DECLARED = "as declared"; // of an input, whatever the model has
+const ENERGIES = ["kinetic energy", "potential energy", "energy"];
 
 // -- the model ------------------------------------------------------------------------------------------------------------
 
 class Model {
   static async open(info, text) {
-    const { instance } = await WebAssembly.instantiate(bytesOf(text), {});
+    const { instance } = await WebAssembly.instantiate(await unpacked(text), {});
     return new Model(info, instance.exports);
   }
 
   constructor(info, exports) {
+    const { events, resets } = info, n = info.x.length;
     this.info = info;
     this.f = exports;
-    if (exports._initialize) exports._initialize();
-    const { events, resets } = info;
+    this.n = n;
+    exports._initialize?.();
     const column = (rows, k) => this.integers(rows.map((row) => row[k]));
     exports.web_open(
       info.q.length, info.slots.length, this.integers(info.slots.flat()), events.length, column(events, 1),
       column(events, 2), column(events, 3), resets.length, column(resets, 0), column(resets, 1),
     );
-    const n = info.x.length;
-    this.n = n;
-    this.spare = { x: this.room(3 * n + 64), p: this.room(info.p.length), mask: exports.web_room(4 * n + 16) };
-    this.kernels = {};
-    for (let k = 0; k < exports.web_count(); k += 1) {
-      const size = exports.web_length(k);
-      this.kernels[this.text(exports.web_name(k))] = [k, size, this.room(size)];
-    }
-    this.operations = [];
-    const names = new Int32Array(exports.memory.buffer, exports.web_operations(), 400);
-    for (let k = 0; names[k] !== 0; k += 1) this.operations.push(this.text(names[k]));
+    this.spare = { x: this.room(3 * n + 64), p: this.room(info.p.length), mask: this.room(n), atol: this.room(n) };
+    this.kernels = Object.fromEntries(info.kernels.map(([name, size], k) => [name, [k, size, this.room(size)]]));
     this.setParameters(info.pValues);
     exports.web_scales();
     this.inputs = [];
     info.u.forEach((_, k) => this.setInput(k, DECLARED));
-    this.atol = this.room(n);
-    this.write(this.atol, info.atol);
+    this.write(this.spare.atol, info.atol);
+    [this.method, this.stepSize] = [info.method, info.step];
   }
 
   room(count) { return this.f.web_room(8 * Math.max(count, 1)); }
@@ -50,13 +48,6 @@ class Model {
     const at = this.f.web_room(4 * values.length + 4);
     new Int32Array(this.f.memory.buffer, at, values.length).set(values);
     return at;
-  }
-
-  text(at) {
-    const bytes = new Uint8Array(this.f.memory.buffer);
-    let end = at;
-    while (bytes[end] !== 0) end += 1;
-    return String.fromCharCode(...bytes.subarray(at, end));
   }
 
   setParameters(p) {
@@ -77,19 +68,19 @@ class Model {
   }
 
   setTape(k, code, constants, last) {
-    const rows = code.flatMap(([name, a, b, c]) => [this.operations.indexOf(name), a, b, c]);
     const numbers = this.room(constants.length);
     this.write(numbers, constants);
-    this.f.web_signal(k, code.length, this.integers(rows), numbers, last);
+    this.f.web_signal(k, code.length, this.integers(code.flat()), numbers, last);
   }
 
-  // Values of a function of the model at a time and a state; null where it has none.
+  // Values of a function of the model at a time and a state; null where it has none. Parts of outputs may be NaN.
   call(name, t, x) {
     if (!(name in this.kernels)) return null;
-    const [k, size, out] = this.kernels[name];
+    const [k, size, out] = this.kernels[name], parts = name === "outputs";
     this.write(this.spare.x, x);
+    if (parts) this.write(out, new Float64Array(size).fill(NaN));
     this.f.web_force(t, this.spare.x);
-    return this.f.web_call(k, t, this.spare.x, out) === 0 ? this.read(out, size) : null;
+    return this.f.web_call(k, t, this.spare.x, out) === 0 || parts ? this.read(out, size) : null;
   }
 
   mask(held) {
@@ -149,10 +140,13 @@ class Model {
     return this.info.rows ? this.close(t, now, this.info.independent) : now;
   }
 
+  // A run by a method of info.methods: the first watches its steps, those of the others are of one size.
   begin(t, x) {
-    const { info } = this;
-    this.write(this.spare.x, x);
-    this.f.web_begin(t, this.spare.x, info.rtol, this.atol, info.maxStep ?? Infinity, info.firstStep ?? 0, info.end);
+    const { info, method, spare } = this, { stepSize = 0 } = method > 0 ? this : {};
+    this.write(spare.x, x);
+    this.f.web_begin(
+      t, spare.x, info.rtol, spare.atol, stepSize || (info.maxStep ?? Infinity), stepSize || (info.firstStep ?? 0), info.end, method,
+    );
     this.ended = "";
     this.happened = [];
   }
@@ -202,45 +196,47 @@ class Model {
 const FUNCTIONS = { min: 2, max: 2, atan2: 2, hypot: 2 }; // numbers that each takes, the first two or more
 for (const name of "abs sign sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh".split(" ")) FUNCTIONS[name] = 1;
 
+const INFIX = { "+": ["add", 1], "-": ["sub", 1], "*": ["mul", 2], "/": ["div", 2], "**": ["pow", 4] }; // how tight
+
 // The instructions of a text such as 2*sin(3*t): [code, numbers, last], as the model plays them.
 function parseExpression(text, names) {
   const code = [], numbers = [], words = text.match(/\d+\.?\d*(?:e[-+]?\d+)?|\.\d+(?:e[-+]?\d+)?|\w+|\*\*|\S/gi) ?? [];
   let at = 0;
-  const emit = (name, a = 0, b = 0, c = 0) => code.push([name, a, b, c]) - 1;
-  const number = (value) => emit("const", numbers.push(value) - 1);
+  const emit = (name, a = 0, b = 0, c = 0) => code.push([names.operations.indexOf(name), a, b, c]) - 1;
   const take = (word) => words[at] === word && (at += 1);
-  const need = (word) => { if (!take(word)) throw new Error(`${word} is missing in ${text}`); };
+  const fail = (why) => { throw new Error(`${why} in ${text}`); };
   function atom() {
     const word = words[at];
     at += 1;
-    if (word === "(") { const inside = sum(); need(")"); return inside; }
-    if (Number.isFinite(Number(word))) return number(Number(word));
+    if (word === "-") return emit("neg", chain(3));
+    if (word === "+") return chain(3);
+    if (word === "(") return inside(1)[0];
+    if (Number.isFinite(Number(word))) return emit("const", numbers.push(Number(word)) - 1);
     if (word === "t") return emit("t");
-    if (word === "pi") return number(Math.PI);
+    if (word === "pi") return emit("const", numbers.push(Math.PI) - 1);
     for (const kind of ["x", "p"]) if (names[kind].includes(word)) return emit(kind, names[kind].indexOf(word));
-    if (!Object.hasOwn(FUNCTIONS, word) || words[at] !== "(") throw new Error(`${word ?? "the end"} is not known in ${text}`);
-    at += 1;
-    const given = [sum()];
-    while (take(",")) given.push(sum());
-    need(")");
-    const count = FUNCTIONS[word], most = ["min", "max"].includes(word) ? Infinity : count;
-    if (given.length < count || given.length > most) throw new Error(`${word}() takes ${count}${most > count ? " or more" : ""}, not ${given.length} in ${text}`);
-    return most > count ? given.reduce((a, b) => emit(word, a, b)) : emit(word, ...given);
+    if (!Object.hasOwn(FUNCTIONS, word) || !take("(")) fail(`${word ?? "the end"} is not known`);
+    const given = inside(Infinity), count = FUNCTIONS[word], more = ["min", "max"].includes(word);
+    if (given.length < count || (given.length > count && !more)) fail(`${word}() takes ${count}${more ? " or more" : ""}, not ${given.length}`);
+    return given.length > 1 && more ? given.reduce((a, b) => emit(word, a, b)) : emit(word, ...given);
   }
-  function power() {
-    const base = atom();
-    return take("**") ? emit("pow", base, unary()) : base;
-  }
-  function unary() { return take("-") ? emit("neg", unary()) : (take("+"), power()); }
-  function chain(part, signs) {
-    let found = part();
-    for (let sign = words[at]; Object.hasOwn(signs, sign); sign = words[at]) { at += 1; found = emit(signs[sign], found, part()); }
+  function inside(most) {
+    const found = [chain(1)];
+    while (found.length < most && take(",")) found.push(chain(1));
+    if (!take(")")) fail(") is missing");
     return found;
   }
-  function product() { return chain(unary, { "*": "mul", "/": "div" }); }
-  function sum() { return chain(product, { "+": "add", "-": "sub" }); }
-  const last = sum();
-  if (at < words.length) throw new Error(`${words[at]} is not expected in ${text}`);
+  function chain(least) {
+    let found = atom();
+    while (Object.hasOwn(INFIX, words[at] ?? "") && INFIX[words[at]][1] >= least) {
+      const [name, own] = INFIX[words[at]];
+      at += 1;
+      found = emit(name, found, chain(own === 4 ? 3 : own + 1));
+    }
+    return found;
+  }
+  const last = chain(1);
+  if (at < words.length) fail(`${words[at]} is not expected`);
   return [code, numbers, last];
 }
 
@@ -306,28 +302,21 @@ precision highp float; uniform vec4 color; out vec4 seen; void main() { seen = c
 
 class Picture {
   constructor(data, numbers, canvas, over) {
-    this.data = data;
-    this.numbers = numbers;
-    this.canvas = canvas;
-    this.pen = over.getContext("2d");
     const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
-    this.gl = gl;
+    Object.assign(this, { data, numbers, canvas, gl, pen: over.getContext("2d"), low: data.low, high: data.high });
     if (!gl) return;
     this.programs = [MESH, LINE].map((texts) => this.program(texts));
-    this.corner = gl.createBuffer();
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.corner);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, -1, 1, -1, 0, 1, 1, 1]), gl.STATIC_DRAW);
+    this.corner = this.filled(new Float32Array([0, -1, 1, -1, 0, 1, 1, 1]), gl.ARRAY_BUFFER);
     this.shapes = data.shapes.map(([at, count]) => numbers.slice(at, at + count));
-    this.items = data.items.map((item) => ({ ...item, buffer: gl.createBuffer(), faceBuffer: gl.createBuffer() }));
-    this.items.sort((a, b) => a.layer - b.layer);
+    this.items = data.items.map((item) => ({ ...item, buffer: gl.createBuffer() })).sort((a, b) => a.layer - b.layer);
     for (const item of this.items.filter((one) => one.faces)) {
-      const [at, count] = item.faces;
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, item.faceBuffer);
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from(numbers.subarray(at, at + count)), gl.STATIC_DRAW);
+      item.corners = Uint32Array.from(numbers.subarray(item.faces[0], item.faces[0] + item.faces[1]));
+      item.faceBuffer = this.filled(item.corners, gl.ELEMENT_ARRAY_BUFFER);
     }
-    this.trace = { points: [], buffer: gl.createBuffer(), kind: "line", color: "#999999", alpha: 1, width: 1.2, body: -1 };
-    this.floor = this.grid();
-    [this.low, this.high] = [data.low, data.high];
+    const line = (color, width, alpha = 1) => ({ points: [], buffer: gl.createBuffer(), color, width, alpha, body: -1 });
+    this.trace = line("#999999", 1.2);
+    this.arrows = [{ ...line("#d6006c", 2), front: true }, { ...line("#7b2fbe", 2), front: true }];
+    this.floor = { ...line("#888888", 1, 0.35), points: numbers.slice(data.floor[0], data.floor[0] + data.floor[1]) };
     this.fit();
     this.change({});
   }
@@ -345,19 +334,22 @@ class Picture {
     return { made, at: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(made, name)])) };
   }
 
+  filled(values, kind, buffer = this.gl.createBuffer()) {
+    this.gl.bindBuffer(kind, buffer);
+    this.gl.bufferData(kind, values, this.gl.DYNAMIC_DRAW);
+    return buffer;
+  }
+
   // Shapes at values of parameters: each moves along with those that it depends on.
   change(values) {
-    const { data, numbers } = this;
-    this.points = this.shapes.map((shape) => shape);
+    const { data, numbers, shapes } = this;
+    this.points = [...shapes];
     for (const { name, at, low, high, moved } of data.morphs) {
       const value = values[name] ?? at, below = value < at, end = below ? low : high;
       if (value === at || end === at) continue;
-      const part = (value - at) / (end - at);
       for (const [shape, ...places] of moved) {
-        const [first, count] = places[below ? 0 : 1];
-        const changed = this.points[shape] === this.shapes[shape] ? this.shapes[shape].slice() : this.points[shape];
-        for (let k = 0; k < count; k += 1) changed[k] += part * numbers[first + k];
-        this.points[shape] = changed;
+        const [first, count] = places[below ? 0 : 1], before = this.points[shape];
+        this.points[shape] = before.map((x, k) => (k < count ? x + ((value - at) / (end - at)) * numbers[first + k] : x));
       }
     }
     for (const item of this.items) if (!item.follow && !item.frames) this.load(item, this.points[item.shape]);
@@ -365,41 +357,55 @@ class Picture {
 
   // The points of an item into its buffer; of a line, its segments.
   load(item, points) {
-    const { gl } = this;
-    let data = points;
+    let values = points;
     if (!item.faces) {
-      data = [];
+      values = [];
       for (let k = 0; k + 5 < points.length; k += 3) {
         const pair = points.slice(k, k + 6);
-        if (!pair.some(Number.isNaN)) data.push(...pair);
+        if (!pair.some(Number.isNaN)) values.push(...pair);
       }
     }
-    item.count = data.length;
+    item.count = values.length;
     item.drawn = points;
-    gl.bindBuffer(gl.ARRAY_BUFFER, item.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, data instanceof Float32Array ? data : Float32Array.from(data), gl.DYNAMIC_DRAW);
+    this.filled(Float32Array.from(values), this.gl.ARRAY_BUFFER, item.buffer);
   }
 
   // Points in ground axes of what is fixed to no body.
   followed(item, poses) {
-    const points = this.points[item.shape], { view } = this.data;
-    const row = (k) => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
-    const stops = item.stops.map((stop, k) => place(poses[stop.body], row(k)));
-    const rest = Array.from({ length: points.length / 3 - stops.length }, (_, k) => row(k + stops.length));
+    const points = this.points[item.shape], rows = [];
+    for (let k = 0; k < points.length; k += 3) rows.push([points[k], points[k + 1], points[k + 2]]);
+    const stops = item.stops.map((stop, k) => place(poses[stop.body], rows[k])), rest = rows.slice(stops.length);
     if (item.follow === "Shifted") return rest.flatMap((point) => plus(stops[0], point));
     if (item.follow === "Stretched") {
       const way = plus(stops[1], stops[0], -1), long = Math.hypot(...way), [stop] = item.stops;
-      const axis = [stop.rotation[0][2], stop.rotation[1][2], stop.rotation[2][2]];
-      const [across, other] = acrossOf(long > 0 ? scaled(way, 1 / long) : turn(poses[stop.body], axis), item.flat ? view : null);
+      const along = long > 0 ? scaled(way, 1 / long) : turn(poses[stop.body], stop.rotation.map((row) => row[2]));
+      const [across, other] = acrossOf(along, item.flat ? this.data.view : null);
       return rest.flatMap(([s, x, y]) => plus(plus(plus(stops[0], way, s), across, x), other, y));
     }
-    const found = [stops[0]];
-    for (let k = 1; k < stops.length; k += 1) {
-      const stop = item.stops[k];
-      if (!stop.radius || k + 1 === stops.length) found.push(stops[k]);
-      else found.push(...wound(poses[stop.body], stop, stops[k], stops[k - 1], stops[k + 1]));
-    }
-    return found.flat();
+    return stops.flatMap((stop, k) => {
+      const { radius, body } = item.stops[k], bends = k > 0 && k + 1 < stops.length && radius;
+      return bends ? wound(poses[body], item.stops[k], stop, stops[k - 1], stops[k + 1]).flat() : stop;
+    });
+  }
+
+  // Arrows for vectors at places: straight ones of forces, arcs of moments, each as long as it is of the largest so far.
+  point(list, values, most) {
+    const { view } = this.data, size = Math.hypot(...this.high.map((x, k) => x - this.low[k]));
+    for (const item of this.arrows) item.points = [];
+    list.forEach(([, reaction, turns], k) => {
+      const at = [...values.slice(6 * k, 6 * k + 3)], way = [...values.slice(6 * k + 3, 6 * k + 6)], much = Math.hypot(...way);
+      most[+turns] = Math.max(most[+turns], much || 0);
+      if (!(much > 1e-3 * most[+turns])) return;
+      let ahead = scaled(way, 1 / much), [side, other] = acrossOf(ahead, view), points = [at, plus(at, way, (0.2 * size) / most[0])];
+      if (turns) {
+        const angle = (4.5 * much) / most[1], on = (a) => plus(scaled(side, Math.cos(a)), other, Math.sin(a));
+        points = Array.from({ length: 25 }, (_, j) => plus(at, on((angle * j) / 24), 0.05 * size));
+        [side, ahead] = [on(angle), cross(ahead, on(angle))];
+      }
+      const tip = points.at(-1), back = plus(tip, ahead, -0.02 * size), gap = [NaN, NaN, NaN];
+      this.arrows[+reaction].points.push(...points, plus(back, side, 0.01 * size), tip, plus(back, side, -0.01 * size), gap);
+    });
+    for (const item of this.arrows) item.points = item.points.flat();
   }
 
   // -- camera --
@@ -411,7 +417,7 @@ class Picture {
       for (const poses of follow || frames || body < 0 ? [[]] : several) {
         for (let k = 0; k + 2 < drawn.length; k += 3) {
           const at = place(poses[body] ?? IDENTITY, drawn.slice(k, k + 3)), seen = view ? view.map((axis) => dot(axis, at)) : at;
-          if (!seen.some(Number.isNaN)) seen.forEach((x, i) => { low[i] = Math.min(low[i], x); high[i] = Math.max(high[i], x); });
+          seen.forEach((x, i) => { if (x < low[i]) low[i] = x; if (x > high[i]) high[i] = x; });
         }
       }
     }
@@ -420,60 +426,55 @@ class Picture {
   }
 
   fit() {
-    const { view, up } = this.data, { low, high } = this, middle = low.map((x, k) => 0.5 * (x + high[k]));
-    this.target = view ? [0, 1, 2].map((k) => middle[0] * view[0][k] + middle[1] * view[1][k] + middle[2] * view[2][k]) : middle;
+    const { view, up } = this.data, middle = this.low.map((x, k) => 0.5 * (x + this.high[k]));
+    const depth = unit(cross(Math.abs(up[0]) > 0.5 ? [0, 1, 0] : [1, 0, 0], up));
     this.zoom = 1;
-    this.free = 0;
-    const side = Math.abs(up[0]) > 0.5 ? [0, 1, 0] : [1, 0, 0];
-    const depth = unit(cross(side, up));
+    this.target = view ? [0, 1, 2].map((k) => dot(middle, view.map((axis) => axis[k]))) : middle;
     this.toward = view ? view[2] : unit(plus(plus(scaled(depth, 0.75), cross(up, depth), 0.45), up, 0.4));
     this.up = view ? view[1] : up;
   }
 
   look() {
-    const { data, canvas } = this, wide = canvas.clientWidth || 1, tall = canvas.clientHeight || 1;
-    const size = this.high.map((x, k) => x - this.low[k]), right = unit(cross(this.up, this.toward));
-    const up = cross(this.toward, right), span = Math.hypot(...size);
-    const half = data.view ? 0.53 * Math.max(size[1], (size[0] * tall) / wide) : 0.46 * span * Math.max(1, 0.9 * tall / wide);
-    this.half = half / this.zoom; // half of what is seen upwards at the target
-    const far = 4 * this.half + span, near = data.view ? 0 : 3.2 * this.half, aspect = tall / wide, h = this.half;
-    const eye = plus(this.target, this.toward, data.view ? 0 : near);
-    const rows = [scaled(right, aspect / h), scaled(up, 1 / h), scaled(this.toward, -1 / far)];
-    const w = data.view ? [0, 0, 0, 1] : [...scaled(this.toward, -1 / near), dot(this.toward, eye) / near];
-    const m = rows.map((row) => [...row, -dot(row, this.target)]);
+    const { canvas, toward, target, data } = this, wide = canvas.clientWidth || 1, tall = canvas.clientHeight || 1;
+    const size = this.high.map((x, k) => x - this.low[k]), span = Math.hypot(...size), right = unit(cross(this.up, toward));
+    const half = data.view ? 0.53 * Math.max(size[1], (size[0] * tall) / wide) : 0.46 * span * Math.max(1, (0.9 * tall) / wide);
+    const h = half / this.zoom, near = 3.2 * h, up = cross(toward, right); // h: half of what is seen upwards at the target
+    const row = (axis, constant) => [...axis, constant - dot(axis, target)];
+    const w = data.view ? [0, 0, 0, 1] : row(scaled(toward, -1 / near), 1);
+    let z = row(scaled(toward, -1 / (4 * h + span)), 0);
     if (!data.view) { // depth between 0.02 and far of the eye, as a fraction
       const close = 0.02 * near, end = near + 2 * span, a = (end + close) / (end - close), b = (2 * end * close) / (end - close);
-      m[2] = w.map((x, k) => a * x - (k === 3 ? b / near : 0));
+      z = w.map((x, k) => a * x - (k === 3 ? b / near : 0));
     }
-    this.axes = { right, up };
-    this.matrix = new Float32Array(16);
-    for (let k = 0; k < 4; k += 1) [m[0][k], m[1][k], m[2][k], w[k]].forEach((x, r) => { this.matrix[4 * k + r] = x; });
+    const rows = [row(scaled(right, tall / wide / h), 0), row(scaled(up, 1 / h), 0), z, w];
+    Object.assign(this, { half: h, axes: { right, up } });
+    this.matrix = Float32Array.from({ length: 16 }, (_, k) => rows[k % 4][k >> 2]);
   }
 
   // Where a point is seen: dots from the left and from the top, and how far away.
   seen(point) {
-    const m = this.matrix, at = [0, 1, 2, 3].map((r) => m[r] * point[0] + m[4 + r] * point[1] + m[8 + r] * point[2] + m[12 + r]);
-    return [(0.5 + (0.5 * at[0]) / at[3]) * this.canvas.clientWidth, (0.5 - (0.5 * at[1]) / at[3]) * this.canvas.clientHeight, at[2] / at[3], at[3]];
+    const m = this.matrix, { clientWidth, clientHeight } = this.canvas;
+    const at = [0, 1, 2, 3].map((r) => m[r] * point[0] + m[4 + r] * point[1] + m[8 + r] * point[2] + m[12 + r]);
+    return [(0.5 + (0.5 * at[0]) / at[3]) * clientWidth, (0.5 - (0.5 * at[1]) / at[3]) * clientHeight, at[2] / at[3], at[3]];
   }
 
   // The body under a dot, and the point of it that is nearest to the reader.
   pick(x, y) {
     let best = null;
-    for (const item of this.items) {
-      if (!item.faces || item.body < 0 || item.follow) continue;
-      const pose = this.poses[item.body], points = item.drawn, seen = [], [at, count] = item.faces;
-      for (let k = 0; k < points.length; k += 3) seen.push(this.seen(place(pose, points.subarray(k, k + 3))));
-      for (let k = at; k < at + count; k += 3) {
-        const [a, b, c] = [0, 1, 2].map((j) => this.numbers[k + j]), [p, q, r] = [seen[a], seen[b], seen[c]];
+    for (const { corners, body, follow, drawn, layer } of this.items) {
+      if (!corners || body < 0 || follow) continue;
+      const local = Array.from({ length: drawn.length / 3 }, (_, k) => drawn.subarray(3 * k, 3 * k + 3));
+      const seen = local.map((point) => this.seen(place(this.poses[body], point)));
+      for (let k = 0; k < corners.length; k += 3) {
+        const [a, b, c] = corners.subarray(k, k + 3), [p, q, r] = [seen[a], seen[b], seen[c]];
         const area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         const s = ((x - p[0]) * (r[1] - p[1]) - (y - p[1]) * (r[0] - p[0])) / area;
         const u = ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) / area;
         if (!(s >= 0 && u >= 0 && s + u <= 1)) continue;
-        const depth = this.data.view ? -item.layer : p[2] + s * (q[2] - p[2]) + u * (r[2] - p[2]);
+        const depth = this.data.view ? -layer : p[2] + s * (q[2] - p[2]) + u * (r[2] - p[2]);
         if (best && depth > best.depth) continue;
-        const corner = (i) => [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
-        const local = plus(plus(corner(a), plus(corner(b), corner(a), -1), s), plus(corner(c), corner(a), -1), u);
-        best = { body: item.body, local, depth };
+        const at = [0, 1, 2].map((j) => (1 - s - u) * local[a][j] + s * local[b][j] + u * local[c][j]);
+        best = { body, local: at, depth };
       }
     }
     return best;
@@ -481,68 +482,52 @@ class Picture {
 
   // -- drawing --
 
-  grid() {
-    const { view, low, high, up } = this.data;
-    if (view) return null;
-    const k = up.map(Math.abs).indexOf(Math.max(...up.map(Math.abs))), [i, j] = [0, 1, 2].filter((axis) => axis !== k);
-    const reach = Math.max(high[i] - low[i], high[j] - low[j]), step = 10 ** Math.floor(Math.log10(reach / 2)) / 2 || 1;
-    const ends = [i, j].map((axis) => [Math.floor(low[axis] / step), Math.ceil(high[axis] / step)]), points = [];
-    const put = (a, b) => { const point = [0, 0, 0]; point[i] = a * step; point[j] = b * step; point[k] = up[k] > 0 ? low[k] : high[k]; points.push(...point); };
-    const many = Math.ceil(Math.max(ends[0][1] - ends[0][0], ends[1][1] - ends[1][0]) / 24);
-    for (let a = ends[0][0]; a <= ends[0][1]; a += many) { put(a, ends[1][0]); put(a, ends[1][1]); points.push(NaN, NaN, NaN); }
-    for (let b = ends[1][0]; b <= ends[1][1]; b += many) { put(ends[0][0], b); put(ends[0][1], b); points.push(NaN, NaN, NaN); }
-    const item = { buffer: this.gl.createBuffer(), color: "#888888", alpha: 0.35, width: 1, body: -1 };
-    this.load(item, Float32Array.from(points));
-    return item;
-  }
-
   colored(color, alpha, dark, paper) {
     let rgb = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16) / 255);
     const grey = Math.max(...rgb) - Math.min(...rgb) < 0.06 && (this.data.view || rgb[0] < 0.6);
     if (dark && grey) rgb = rgb.map((x) => 0.95 - 0.85 * x);
-    if (this.data.view) return [...rgb.map((x, k) => alpha * x + (1 - alpha) * paper[k]), 1];
-    return [...rgb, alpha];
+    return this.data.view ? [...rgb.map((x, k) => alpha * x + (1 - alpha) * paper[k]), 1] : [...rgb, alpha];
   }
 
   draw(poses, frame, dark, names) {
-    const { gl, canvas, data } = this, ratio = window.devicePixelRatio || 1;
-    const wide = Math.round(canvas.clientWidth * ratio), tall = Math.round(canvas.clientHeight * ratio);
-    if (canvas.width !== wide || canvas.height !== tall) { canvas.width = this.pen.canvas.width = wide; canvas.height = this.pen.canvas.height = tall; }
+    const { gl, canvas, data, pen, numbers } = this, ratio = window.devicePixelRatio || 1;
+    const size = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+    for (const one of [canvas, pen.canvas]) if (one.width !== size[0] || one.height !== size[1]) [one.width, one.height] = size;
     this.poses = poses;
     this.look();
     const paper = dark ? [0.09, 0.1, 0.12] : [1, 1, 1];
-    gl.viewport(0, 0, wide, tall);
+    gl.viewport(0, 0, ...size);
     gl.clearColor(...paper, 1);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    (data.view ? gl.disable : gl.enable).call(gl, gl.DEPTH_TEST);
-    const list = [...(this.floor ? [this.floor] : []), ...this.items];
-    if (this.trace.points.length > 3) { this.load(this.trace, this.trace.points); list.push(this.trace); }
+    const list = [this.floor, ...this.items, this.trace];
     if (!data.view) list.sort((a, b) => b.alpha - a.alpha);
-    for (const item of list) {
-      if (item.frames) this.load(item, this.numbers.subarray(item.frames + frame * item.size, item.frames + (frame + 1) * item.size));
+    for (const item of [...list, ...this.arrows]) {
+      const { frames, size: length } = item;
+      if (frames) this.load(item, numbers.subarray(frames + frame * length, frames + (frame + 1) * length));
       else if (item.follow) this.load(item, Float32Array.from(this.followed(item, poses)));
-      if (item.count) this.drawItem(item, poses, [wide, tall], ratio, this.colored(item.color, item.alpha, dark, paper));
+      else if (item.points && item.points !== item.drawn) this.load(item, item.points);
+      (data.view || item.front ? gl.disable : gl.enable).call(gl, gl.DEPTH_TEST);
+      if (item.count) this.drawItem(item, poses, size, ratio, this.colored(item.color, item.alpha, dark, paper));
     }
     this.label(poses, ratio, dark, names);
   }
 
   drawItem(item, poses, size, ratio, color) {
     const { gl } = this, { made, at } = this.programs[item.faces ? 0 : 1];
-    const pose = item.follow || item.frames ? IDENTITY : poses[item.body] ?? IDENTITY;
     gl.useProgram(made);
-    gl.uniformMatrix4fv(at.pose, true, pose);
+    gl.uniformMatrix4fv(at.pose, true, (item.follow || item.frames ? null : poses[item.body]) ?? IDENTITY);
     gl.uniformMatrix4fv(at.camera, false, this.matrix);
     gl.uniform4f(at.color, ...color);
     (color[3] < 1 ? gl.enable : gl.disable).call(gl, gl.BLEND);
     gl.depthMask(color[3] === 1);
     const bind = (name, buffer, count, stride, offset, each) => {
-      const place_ = gl.getAttribLocation(made, name);
+      const there = gl.getAttribLocation(made, name);
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.enableVertexAttribArray(place_);
-      gl.vertexAttribPointer(place_, count, gl.FLOAT, false, stride, offset);
-      gl.vertexAttribDivisor(place_, each);
+      gl.enableVertexAttribArray(there);
+      gl.vertexAttribPointer(there, count, gl.FLOAT, false, stride, offset);
+      gl.vertexAttribDivisor(there, each);
     };
     if (item.faces) {
       gl.uniform3f(at.light, ...unit(plus(this.toward, this.up, 0.6)));
@@ -563,33 +548,33 @@ class Picture {
 
   // Names beside what they name, where none covers another and none is cut.
   label(poses, ratio, dark, names) {
-    const { pen, data } = this, points = this.points[data.labelShape], placed = [];
+    const { pen, data } = this, { clientWidth, clientHeight } = this.canvas, tall = 16, placed = [];
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
+    pen.clearRect(0, 0, clientWidth, clientHeight);
     if (!names) return;
-    pen.font = "13px system-ui, sans-serif";
-    pen.textBaseline = "middle";
-    pen.lineJoin = "round";
+    Object.assign(pen, { font: "13px system-ui, sans-serif", textBaseline: "middle", lineJoin: "round", lineWidth: 4 });
+    [pen.strokeStyle, pen.fillStyle] = dark ? ["#17191e", "#e6e6e6"] : ["#ffffff", "#222222"];
     data.labels.forEach(({ text, body }, k) => {
-      const [x, y, , w] = this.seen(place(poses[body] ?? IDENTITY, points.subarray(3 * k, 3 * k + 3)));
+      const point = this.points[data.labelShape].subarray(3 * k, 3 * k + 3), wide = pen.measureText(text).width;
+      const [x, y, , w] = this.seen(place(poses[body] ?? IDENTITY, point));
       if (!(w > 0)) return;
-      const wide = pen.measureText(text).width, tall = 16;
-      let best = null;
+      const within = (at, most) => Math.min(Math.max(at, 2), most - 2);
+      let best = [Infinity];
       for (const away of [16, 28, 42]) {
-        for (let j = 0; j < 8; j += 1) {
-          const angle = -Math.PI / 4 + (j * Math.PI) / 4, side = Math.cos(angle);
-          const left = Math.min(Math.max(x + away * side - (side < -0.1 ? wide : side < 0.1 ? wide / 2 : 0), 2), this.canvas.clientWidth - wide - 2);
-          const top = Math.min(Math.max(y + away * Math.sin(angle) - tall / 2, 2), this.canvas.clientHeight - tall - 2);
-          const over = placed.reduce((sum, [l, t, r]) => sum + Math.max(0, Math.min(r, left + wide + 4) - Math.max(l, left)) * Math.max(0, tall - Math.abs(t - top)), 0);
-          if (!best || over + away < best[0]) best = [over + away, left, top];
+        for (let angle = -Math.PI / 4; angle < 1.7 * Math.PI; angle += Math.PI / 4) {
+          const side = Math.cos(angle), begin = side < -0.1 ? wide : side < 0.1 ? wide / 2 : 0;
+          const left = within(x + away * side - begin, clientWidth - wide);
+          const top = within(y + away * Math.sin(angle) - tall / 2, clientHeight - tall);
+          const over = ([l, t]) => Math.max(0, tall - Math.abs(t - top)); // of heights
+          const common = ([l, , r]) => Math.max(0, Math.min(r, left + wide + 4) - Math.max(l, left)); // of widths
+          const covered = placed.reduce((sum, box) => sum + common(box) * over(box), 0);
+          if (covered + away < best[0]) best = [covered + away, left, top];
         }
       }
-      placed.push([best[1], best[2], best[1] + wide + 4]);
-      pen.strokeStyle = dark ? "#17191e" : "#ffffff";
-      pen.lineWidth = 4;
-      pen.strokeText(text, best[1], best[2] + tall / 2);
-      pen.fillStyle = dark ? "#e6e6e6" : "#222222";
-      pen.fillText(text, best[1], best[2] + tall / 2);
+      const [, left, top] = best;
+      placed.push([left, top, left + wide + 4]);
+      pen.strokeText(text, left, top + tall / 2);
+      pen.fillText(text, left, top + tall / 2);
     });
   }
 }
@@ -611,31 +596,24 @@ function element(kind, parent, properties = {}) {
 }
 
 class Page {
-  constructor(data, model) {
-    this.data = data;
-    this.model = model;
-    this.numbers = new Float32Array(bytesOf(data.numbers).buffer);
-    this.picture = new Picture(data, this.numbers, get("picture"), get("over"));
-    this.frames = [];
-    this.cursor = 0;
-    this.playing = true;
+  constructor(data, numbers, model) {
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    Object.assign(this, { data, model, numbers, dark, frames: [], cursor: 0, playing: true, count: 0, last: null });
+    this.picture = new Picture(data, numbers, get("picture"), get("over"));
     this.names = data.labels.length > 0;
-    this.dark = window.matchMedia("(prefers-color-scheme: dark)").matches;
-    this.count = 0;
     if (!this.picture.gl) {
       this.say("This page needs WebGL 2, which this browser does not offer here. Switch on hardware acceleration, open the page in another browser, or write the animation as .gif.");
       return;
     }
-    this.columns = model ? [...data.model.x, ...data.model.y, "kinetic energy", "potential energy", "energy", "loop residual"] : data.curves.map((one) => one.name);
+    this.columns = model ? [...model.info.x, ...model.info.y, ...ENERGIES, "loop residual"] : data.curves.map((one) => one.name);
     this.fill();
     this.listen();
-    if (model) {
-      this.start = Float64Array.from(data.model.x0);
+    if (!model) this.frames = data.motion.t.map((t, k) => ({ t, clock: data.motion.clock[k] }));
+    else {
+      this.start = Float64Array.from(model.info.x0);
       this.recorded(data.motion);
-      if (!this.frames.length) this.restart();
-      else this.replayed = true;
-    } else this.frames = data.motion.t.map((t, k) => ({ t, clock: data.motion.clock[k], row: [] }));
-    this.last = null;
+      if (!this.replayed) this.restart();
+    }
     requestAnimationFrame((stamp) => this.step(stamp));
   }
 
@@ -647,32 +625,29 @@ class Page {
   // -- states over time --
 
   recorded(motion) {
-    if (!motion) return;
-    const { model } = this, n = model.n;
-    motion.t.forEach((t, k) => {
-      const x = new Float64Array(this.numbers.subarray(motion.states + k * n, motion.states + (k + 1) * n));
+    const { model, numbers } = this;
+    motion?.t.forEach((t, k) => {
+      const x = new Float64Array(numbers.subarray(motion.states + k * model.n, motion.states + (k + 1) * model.n));
       this.keep(t, model.call("project", t, x) ?? x);
     });
+    this.most = [0, 0];
+    this.replayed = this.frames.length > 0;
   }
 
   keep(t, x) {
-    const { model } = this, energy = model.call("energy", t, x) ?? [NaN, NaN];
-    const row = [...x, ...(model.call("outputs", t, x) ?? []), energy[0], energy[1], energy[0] + energy[1], model.residual(t, x)];
-    this.frames.push({ t, clock: t, x, row });
+    const { model } = this, [T, V] = model.call("energy", t, x) ?? [NaN, NaN], { length } = model.info.y;
+    const outputs = length ? model.call("outputs", t, x).subarray(0, length) : [];
+    this.frames.push({ t, clock: t, x, row: [...x, ...outputs, T, V, T + V, model.residual(t, x)] });
     if (this.frames.length > 20000) this.frames.splice(0, 5000);
   }
 
   // Begin anew from a start.
   restart(x = this.start, words = "") {
-    const { model } = this, open = model.residual(0, x);
-    this.start = x;
-    this.replayed = false;
-    this.frames = [];
-    this.cursor = 0;
-    this.event = "";
+    const open = this.model.residual(0, x);
+    Object.assign(this, { start: x, frames: [], cursor: 0, event: "", most: [0, 0] });
     this.say(words || open <= 1e-6 ? words : `the loops are open at the start, by ${shown(open)}`);
-    model.begin(0, x);
     this.keep(0, x);
+    this.goOn();
   }
 
   // What is shown from here on begins at the state shown.
@@ -710,17 +685,17 @@ class Page {
       return;
     }
     const { end } = model.info, stops = now < end && next >= end; // the declared run; play goes on
-    const span = stops ? end - now : passed;
-    const begun = performance.now(), count = Math.ceil(passed * 60 / get("speed").value);
+    const begun = performance.now(), count = Math.ceil((passed * 60) / get("speed").value);
     for (let k = 1; k <= count; k += 1) { // no coarser than the eye sees, however slowly pages are drawn
-      const wanted = stops && k === count ? end : now + (span * k) / count, reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
-      if (model.ended && t <= this.frames.at(-1).t) {
+      const wanted = stops && k === count ? end : now + ((stops ? end - now : passed) * k) / count;
+      const reached = model.advance(wanted, 14), t = reached ? wanted : model.f.web_time();
+      if (model.ended && t <= frames.at(-1).t) {
         this.play(false);
         this.say(model.ended);
         break;
       }
       this.keep(t, model.state(t));
-      this.cursor = this.frames.length - 1;
+      this.cursor = frames.length - 1;
       this.clock = t;
       this.slow = !reached || performance.now() - begun > 60;
       if (this.slow) break;
@@ -744,43 +719,39 @@ class Page {
   }
 
   poses(k = this.cursor) {
-    const frame = this.frames[k], { model, data } = this, found = [];
-    if (model) {
-      const all = model.call("poses", frame.t, frame.x);
-      if (!all) return this.picture.poses;
-      data.bodies.forEach((_, body) => found.push(all.subarray(16 * body, 16 * body + 16)));
-    } else {
-      const at = data.motion.poses + 12 * data.bodies.length * k;
-      data.bodies.forEach((_, body) => found.push([...this.numbers.subarray(at + 12 * body, at + 12 * body + 12), 0, 0, 0, 1]));
-    }
+    const { model, data, numbers } = this, { t, x } = this.frames[k], { poses, bodies } = { ...data.motion, ...data };
+    const all = model?.call("poses", t, x), at = poses + 12 * bodies.length * k;
+    if (model && !all) return this.picture.poses;
+    const found = bodies.map((_, body) => all ? all.subarray(16 * body, 16 * body + 16)
+      : [...numbers.subarray(at + 12 * body, at + 12 * body + 12), 0, 0, 0, 1]);
     found[-1] = IDENTITY;
     return found;
   }
 
   show() {
-    const frame = this.frames[this.cursor], poses = this.poses(), trace = get("trace").value;
-    if (trace) this.follow(trace);
-    else this.picture.trace.points = [];
-    this.picture.draw(poses, this.cursor, this.dark, this.names);
+    const { model, picture, data, cursor } = this, frame = this.frames[cursor], poses = this.poses(), time = get("time");
+    this.follow(get("trace").value);
+    this.point(frame);
+    picture.draw(poses, cursor, this.dark, this.names);
     if (this.changed) this.fit(false);
-    const time = get("time");
     time.max = this.frames.length - 1;
-    time.value = this.cursor;
-    const words = this.model ? `t = ${frame.t.toFixed(2)} s` : this.data.motion.words[this.cursor];
-    const pace = this.model && this.playing && this.slow ? "  slower than real time" : "";
+    time.value = cursor;
+    const words = model ? `t = ${frame.t.toFixed(2)} s` : data.motion.words[cursor];
+    const pace = model && this.playing && this.slow ? "  slower than real time" : "";
     get("words").textContent = words + pace + (this.event ? `  ${this.event}` : "");
-    if (this.count % 3 === 0 || !this.playing) this.plot();
-    if (this.model && this.count % 6 === 0) this.measure(frame);
+    if (this.count % 3 === 0 || !this.playing) for (const k of [1, 2]) this.plot(get(`plot${k}`), get(`choice${k}`).value);
+    if (model && this.count % 6 === 0) this.measure(frame);
   }
 
   // The view on the run so far, or on all of a film; after a change, wider where the mechanism leaves the view.
   fit(anew) {
     const { picture, data, model, frames } = this, every = anew ? Math.ceil(frames.length / 40) : Infinity;
-    const several = model ? frames.map((_, k) => k).filter((k) => k % every === 0 || k === this.cursor).map((k) => this.poses(k)) : [];
-    const { low, high } = model ? picture.extent(several) : data, old = anew ? { low, high } : picture;
-    this.changed = false;
+    const some = [...frames.keys()].filter((k) => k % every === 0 || k === this.cursor);
+    const { low, high } = model ? picture.extent(some.map((k) => this.poses(k))) : data, old = anew ? { low, high } : picture;
     const margin = 0.1 * Math.max(...old.high.map((x, k) => x - old.low[k]));
-    if (!(low[0] <= high[0]) || (!anew && low.every((x, k) => x >= old.low[k] - margin && high[k] <= old.high[k] + margin))) return;
+    const inside = low.every((x, k) => x >= old.low[k] - margin && high[k] <= old.high[k] + margin);
+    this.changed = false;
+    if (!(low[0] <= high[0]) || (!anew && inside)) return;
     picture.low = low.map((x, k) => Math.min(x, old.low[k]));
     picture.high = high.map((x, k) => Math.max(x, old.high[k]));
     picture.fit();
@@ -788,14 +759,25 @@ class Page {
 
   // The way of a marker, through all frames since it was last drawn.
   follow(name) {
-    const [, body, shape] = this.data.markers.find((one) => one[0] === name), { trace, points } = this.picture;
+    const { trace, points } = this.picture, [, body, shape] = this.data.markers.find((one) => one[0] === name) ?? [];
     if (this.traced !== name || this.cursor < this.tracedAt) {
       trace.points = [];
       this.tracedAt = this.cursor - 1;
     }
     this.traced = name;
-    while (this.tracedAt < this.cursor) trace.points.push(...place(this.poses(this.tracedAt += 1)[body], points[shape]));
-    if (trace.points.length > 9000) trace.points.splice(0, 3000);
+    if (!name) return;
+    const found = [];
+    while (this.tracedAt < this.cursor) found.push(...place(this.poses(this.tracedAt += 1)[body], points[shape]));
+    if (found.length) trace.points = [...trace.points.slice(-9000), ...found];
+  }
+
+  // Arrows of the forces and reactions that are asked for, now.
+  point({ t, x }) {
+    const { model, most } = this, wanted = get("arrows").value, { arrows = [], y } = model?.info ?? {};
+    const values = wanted && model ? model.call("outputs", t, x).subarray(y.length) : [];
+    this.picture.point(wanted ? arrows : [], values.map((v, k) => (wanted === "both" || arrows[Math.floor(k / 6)][1] === (wanted === "reactions") ? v : NaN)), most);
+    const [force, moment] = most ?? [], longest = [force > 0 && `${shown(force, 3)} N`, moment > 0 && `${shown(moment, 3)} N m`];
+    get("scale").textContent = wanted ? `longest arrow ${longest.filter(Boolean).join(", ")}` : "";
   }
 
   measure(frame) {
@@ -805,88 +787,85 @@ class Page {
     if (this.model.info.rows) get("residual").textContent = `loop residual ${this.model.residual(frame.t, frame.x).toExponential(1)}`;
   }
 
-  // -- plots --
+  // -- curves --
 
-  plot() {
-    for (const k of [1, 2]) {
-      const canvas = get(`plot${k}`), choice = get(`choice${k}`).value, pen = canvas.getContext("2d"), ratio = window.devicePixelRatio || 1;
-      if (!canvas.clientWidth || canvas.clientWidth < 10) continue;
-      const wide = canvas.clientWidth, tall = canvas.clientHeight;
-      canvas.width = wide * ratio;
-      canvas.height = tall * ratio;
-      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-      const lines = choice === "energies" ? ["kinetic energy", "potential energy", "energy"] : [choice];
-      const rows = lines.map((name) => this.series(name));
-      const over = rows[0][0], first = Math.max(0, this.model && !this.replayed ? this.cursor - 1200 : 0);
-      const last = this.model && !this.replayed ? this.cursor : over.length - 1, values = rows.flatMap(([, v]) => v.slice(first, last + 1)).filter(Number.isFinite);
-      if (!values.length) continue;
-      let low = Math.min(...values), high = Math.max(...values);
-      if (high - low < 1e-6 * Math.max(1e-3, Math.abs(high))) { low -= 0.5 * (Math.abs(low) || 1); high += 0.5 * (Math.abs(high) || 1); }
-      const ink = this.dark ? "#e6e6e6" : "#222222", span = over[last] - over[first] || 1;
-      const X = (t) => 52 + ((wide - 60) * (t - over[first])) / span, Y = (v) => tall - 18 - ((tall - 26) * (v - low)) / (high - low);
-      pen.font = "11px system-ui, sans-serif";
-      pen.fillStyle = ink;
-      pen.textAlign = "right";
-      for (const v of [low, high]) pen.fillText(shown(v, 3), 48, Math.min(tall - 16, Math.max(10, Y(v) + 3)));
-      pen.fillText(`${shown(over[last], 3)}`, wide - 6, tall - 4);
-      pen.textAlign = "left";
-      pen.fillText(shown(over[first], 3), 52, tall - 4);
-      rows.forEach(([times, column], j) => {
-        pen.strokeStyle = ["#0072B2", "#D55E00", "#009E73"][j];
-        pen.lineWidth = 1.6;
-        pen.beginPath();
-        for (let i = first; i <= last; i += 1) pen.lineTo(X(times[i]), Y(column[i]));
-        pen.stroke();
-        if (lines.length > 1) { pen.fillStyle = pen.strokeStyle; pen.fillText(["T", "V", "T + V"][j], 120 + 34 * j, tall - 4); }
-      });
-      const here = this.model ? this.frames[this.cursor].t : this.data.motion.over[this.cursor];
-      pen.strokeStyle = ink;
-      pen.lineWidth = 1;
-      pen.strokeRect(X(here), 4, 0.01, tall - 20);
-    }
-  }
-
-  series(name) {
-    const k = this.columns.indexOf(name);
-    if (!this.model) return [this.data.curves[k].over, this.data.curves[k].values];
-    return [this.frames.map((frame) => frame.t), this.frames.map((frame) => frame.row[k])];
+  plot(canvas, choice) {
+    const { model, cursor, frames, data } = this, pen = canvas.getContext("2d"), ratio = window.devicePixelRatio || 1;
+    const { clientWidth: wide, clientHeight: tall } = canvas, scrolls = model && !this.replayed, last = scrolls ? cursor + 1 : Infinity;
+    if (wide < 10) return;
+    [canvas.width, canvas.height] = [wide * ratio, tall * ratio];
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const part = frames.slice(scrolls ? Math.max(0, cursor - 1200) : 0, last);
+    const rows = (choice === "energies" ? ENERGIES : [choice]).map((name) => this.columns.indexOf(name));
+    const over = model ? part.map((frame) => frame.t) : data.curves[rows[0]].over;
+    const lines = rows.map((k) => (model ? part.map((frame) => frame.row[k]) : data.curves[k].values));
+    const values = lines.flat().filter(Number.isFinite);
+    if (!values.length) return;
+    let low = Math.min(...values), high = Math.max(...values);
+    if (high - low < 1e-6 * Math.max(1e-3, Math.abs(high))) { low -= 0.5 * (Math.abs(low) || 1); high += 0.5 * (Math.abs(high) || 1); }
+    const span = over.at(-1) - over[0] || 1, X = (t) => 52 + ((wide - 60) * (t - over[0])) / span;
+    const Y = (v) => tall - 18 - ((tall - 26) * (v - low)) / (high - low);
+    const write = (text, x, y, align, color = this.dark ? "#e6e6e6" : "#222222") => {
+      [pen.textAlign, pen.fillStyle] = [align, color];
+      pen.fillText(text, x, y);
+    };
+    pen.font = "11px system-ui, sans-serif";
+    for (const v of [low, high]) write(shown(v, 3), 48, Math.min(tall - 16, Math.max(10, Y(v) + 3)), "right");
+    write(shown(over.at(-1), 3), wide - 6, tall - 4, "right");
+    write(shown(over[0], 3), 52, tall - 4, "left");
+    pen.lineWidth = 1.6;
+    lines.forEach((line, j) => {
+      pen.strokeStyle = ["#0072B2", "#D55E00", "#009E73"][j];
+      pen.beginPath();
+      line.forEach((v, i) => pen.lineTo(X(over[i]), Y(v)));
+      pen.stroke();
+      if (lines.length > 1) write(["T", "V", "T + V"][j], 120 + 34 * j, tall - 4, "left", pen.strokeStyle);
+    });
+    pen.fillRect(X(model ? frames[cursor].t : data.motion.over[cursor]), 4, 1, tall - 20);
   }
 
   // -- controls --
 
   fill() {
-    const { data, model } = this;
-    const option = (list, value, text = value) => element("option", list, { value, textContent: text });
-    for (const [name] of data.markers) option(get("trace"), name);
-    get("trace").parentElement.hidden = !data.markers.length || !model;
-    const energies = model && "energy" in model.kernels ? ["energies"] : [], columns = this.columns;
-    const units = { energies: "J", "kinetic energy": "J", "potential energy": "J", energy: "J", ...data.units }, label = (name) => (units[name] ? `${name} (${units[name]})` : name);
-    for (const k of [1, 2]) for (const name of [...energies, ...columns]) option(get(`choice${k}`), name, label(name));
-    if (columns.length) get("choice1").value = columns[0];
-    if (columns.length > 1) get("choice2").value = energies[0] ?? columns[1];
+    const { data, model } = this, columns = [...this.columns], units = { ...data.units };
+    const option = (list, value, text = value) => element("option", get(list), { value, textContent: text });
+    for (const name of [...ENERGIES, "energies"]) units[name] = "J";
+    const label = (name) => (units[name] ? `${name} (${units[name]})` : name);
+    if (model && "energy" in model.kernels) columns.splice(0, 0, "energies");
+    for (const name of columns) for (const k of [1, 2]) option(`choice${k}`, name, label(name));
+    if (columns.length > 1) [get("choice1").value, get("choice2").value] = columns[0] === "energies" ? [columns[1], columns[0]] : columns;
     get("plots").hidden = !columns.length;
-    for (const factor of [0.1, 0.25, 0.5, 1, 2, 4]) option(get("speed"), factor, `\u00d7${shown(factor * (model ? 1 : data.motion.pace), 2)}`);
+    for (const factor of [0.1, 0.25, 0.5, 1, 2, 4]) option("speed", factor, `\u00d7${shown(factor * (model ? 1 : data.motion.pace), 2)}`);
     get("speed").value = 1;
     get("named").hidden = !data.labels.length;
+    for (const id of ["trace", "arrows", "branch", "method"]) get(id).parentElement.hidden = true;
     if (!model) return;
+    const { info } = model, { docs, ranges } = info, home = info.q.length;
+    const offer = (list, entries, least) => {
+      entries.forEach(([value, text]) => option(list, value, text));
+      get(list).parentElement.hidden = entries.length < least;
+    };
+    offer("trace", data.markers, 1);
+    offer("branch", info.branches.map((_, k) => [k, `assembly ${k + 1}`]), 2);
+    offer("method", info.methods.map((name, k) => [k, name]), 1);
+    get("arrows").parentElement.hidden = !info.arrows.length;
+    get("method").value = model.method;
+    get("size").value = model.stepSize;
     this.fields = {};
-    const { info } = model;
-    const starts = info.independentQ.map((k) => [k, info.x[k], ...info.ranges[info.x[k]]]);
-    for (const [k, name, low, high] of starts) this.fields[k] = this.field("starts", label(name), info.x0[k], low, high, (value) => this.setStart(k, value));
-    for (const j of info.independent) {
-      const k = info.q.length + j, speed = Math.max(10, 2 * Math.abs(info.x0[k]));
-      this.fields[k] = this.field("starts", label(info.x[k]), info.x0[k], -speed, speed, (value) => this.setStart(k, value));
+    for (const k of [...info.independentQ, ...info.independent.map((j) => home + j)]) {
+      const speed = Math.max(10, 2 * Math.abs(info.x0[k])), range = k < home ? ranges[info.x[k]] : [-speed, speed];
+      this.fields[k] = this.field("starts", label(info.x[k]), info.x0[k], range, (value) => this.setStart(k, value));
     }
-    this.settings = info.p.map((name, k) => this.field("parameters", label(name), info.pValues[k], ...info.ranges[name], (value) => this.setParameter(k, value), info.docs[name]));
-    this.forces = info.u.map((name, k) => this.field("inputs", label(name), model.inputs[k], ...info.ranges[name], (value) => this.setInput(k, value), info.docs[name]));
+    const several = (id, names, values, set) => names.map((name, k) => (
+      this.field(id, label(name), values[k], ranges[name], (value) => set(k, value), docs[name])));
+    this.settings = several("parameters", info.p, info.pValues, (k, value) => this.setParameter(k, value));
+    this.forces = several("inputs", info.u, model.inputs, (k, value) => this.setInput(k, value));
     for (const id of ["parameters", "inputs", "starts"]) get(id).parentElement.hidden = !get(id).children.length;
-    info.branches.forEach((_, k) => option(get("branch"), k, `assembly ${k + 1}`));
-    get("branch").parentElement.hidden = info.branches.length < 2;
     get("copying").hidden = get("reset").hidden = false;
   }
 
-  // A slider and a box for one value.
-  field(home, text, value, low, high, set, about = "") {
+  // A slider and a box for one value; typed values widen the slider.
+  field(home, text, value, [low, high], set, about = "") {
     const row = element("label", get(home), { className: "field", title: about });
     element("span", row, { textContent: text });
     const slide = element("input", row, { type: "range", min: low, max: high, step: (high - low) / 500 || 1, value: 0 });
@@ -896,6 +875,7 @@ class Page {
     box.onchange = () => {
       const typed = box.value.trim(), entered = typed ? Number(typed) : NaN, words = home === "inputs" && typed && Number.isNaN(entered);
       if (!words && !Number.isFinite(entered)) { this.settle(); this.say(`${text} must be a finite number, not ${typed || "nothing"}`); return; }
+      if (!words) [slide.min, slide.max] = [Math.min(slide.min, entered), Math.max(slide.max, entered)];
       if (!words) slide.value = entered;
       set(words ? typed : entered);
     };
@@ -960,12 +940,12 @@ class Page {
     const { model } = this;
     try {
       model.setInput(k, value);
-      this.put(this.forces[k], model.inputs[k]);
-      this.say("");
     } catch (error) {
       this.say(error.message);
       return;
     }
+    this.put(this.forces[k], model.inputs[k]);
+    this.say("");
     this.goOn();
   }
 
@@ -978,6 +958,17 @@ class Page {
     this.restart(closed, reached ? "" : "these loops do not close with the parameters set; the boxes show those that they close with");
   }
 
+  // How the run goes on: by watched steps, or by steps of one size.
+  setMethod() {
+    const { model } = this, size = Number(get("size").value);
+    model.method = Number(get("method").value);
+    get("size").parentElement.hidden = model.method === 0;
+    if (size > 0 && size < Infinity) model.stepSize = size;
+    else this.say("the step must be a finite positive number of seconds");
+    get("size").value = model.stepSize;
+    this.goOn();
+  }
+
   reset() {
     if (this.model) this.restart();
     else this.cursor = 0;
@@ -985,43 +976,50 @@ class Page {
   }
 
   copy(kind) {
-    const { model, start } = this, { info } = model, number = (x) => String(Number(x.toPrecision(15)));
-    const initial = [...info.independentQ, ...info.independent.map((j) => info.q.length + j)].map((k) => [info.x[k], number(start[k])]);
-    const parameters = info.p.map((name, k) => [name, number(model.p[k])]);
-    const inputs = info.u.map((name, k) => [name, model.inputs[k]]).filter(([, value]) => value !== DECLARED)
-      .map(([name, value]) => [name, typeof value === "number" ? number(value) : JSON.stringify(value)]);
-    const set = (pairs) => pairs.map(([name, value]) => `${JSON.stringify(name)}: ${value}`).join(", ");
-    const text = kind === "python"
-      ? `run = mod.simulate(${number(info.end)}, initial={${set(initial)}},\n    parameters={${set(parameters)}}, inputs={${set(inputs)}})`
-      : `parameters: {${parameters.map(([name, value]) => `${name}: ${value}`).join(", ")}}\ninitial: {${initial.map(([name, value]) => `${name}: ${value}`).join(", ")}}`;
+    const { model, start } = this, { info, method, stepSize } = model, number = (x) => String(Number(x.toPrecision(15)));
+    const value = (x) => (typeof x === "number" ? number(x) : JSON.stringify(x)), python = kind === "python";
+    const places = [...info.independentQ, ...info.independent.map((j) => info.q.length + j)];
+    const initial = places.map((k) => [info.x[k], number(start[k])]), parameters = info.p.map((name, k) => [name, number(model.p[k])]);
+    const changed = info.u.map((name, k) => [name, model.inputs[k]]).filter(([, input]) => input !== DECLARED);
+    const inputs = changed.map(([name, x]) => [name, python ? value(x) : `{${typeof x === "number" ? "value" : "signal"}: ${value(x)}}`]);
+    const set = (pairs) => `{${pairs.map(([name, x]) => `${python ? JSON.stringify(name) : name}: ${x}`).join(", ")}}`;
+    const how = method > 0 ? [["method", python ? `"${info.methods[method]}"` : info.methods[method]], ["step", stepSize]] : [];
+    const run = [`mod.simulate(${number(info.end)}`, `initial=${set(initial)}`, `\n    parameters=${set(parameters)}`, `inputs=${set(inputs)}`];
+    const entries = [["parameters", parameters], ["inputs", inputs], ["initial", initial], ["simulation", how.length ? [["end", info.end], ...how] : []]];
     const box = get("copied");
-    box.value = text;
+    box.value = python ? `run = ${[...run, ...how.map(([name, x]) => `${name}=${x}`)].join(", ")})`
+      : entries.filter(([, pairs]) => pairs.length).map(([name, pairs]) => `${name}: ${set(pairs)}`).join("\n");
     box.hidden = false;
     box.select();
-    if (navigator.clipboard) navigator.clipboard.writeText(text).catch(() => {});
+    navigator.clipboard?.writeText(box.value).catch(() => {});
   }
 
   listen() {
-    const canvas = get("over"), fingers = new Map(), fit = () => this.fit(true);
-    get("picture").addEventListener("webglcontextlost", (event) => { event.preventDefault(); this.say("the browser took the picture's memory; it is drawn again when the browser allows, else reload the page"); });
+    const canvas = get("over"), fingers = new Map(), fit = () => this.fit(true), click = (id, act) => { get(id).onclick = act; };
+    get("picture").addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.say("the browser took the picture's memory; it is drawn again when the browser allows, else reload the page");
+    });
     get("picture").addEventListener("webglcontextrestored", () => {
       this.picture = new Picture(this.data, this.numbers, get("picture"), canvas);
-      this.traced = "";
+      this.traced = undefined;
       if (this.model) this.settle();
       this.say("");
     });
-    get("declared").onclick = () => this.declare();
-    get("play").onclick = () => this.play(!this.playing);
-    get("back").onclick = () => this.move(-1);
-    get("forth").onclick = () => this.move(1);
-    get("reset").onclick = () => this.reset();
+    const light = () => { document.documentElement.dataset.theme = this.dark ? "dark" : "light"; };
+    light();
+    click("declared", () => this.declare());
+    click("play", () => this.play(!this.playing));
+    click("back", () => this.move(-1));
+    click("forth", () => this.move(1));
+    click("reset", () => this.reset());
+    click("theme", () => { this.dark = !this.dark; light(); });
+    click("named", () => { this.names = !this.names; });
+    click("python", () => this.copy("python"));
+    click("yaml", () => this.copy("yaml"));
     get("time").oninput = () => { this.play(false); this.cursor = Number(get("time").value); };
-    get("theme").onclick = () => { this.dark = !this.dark; document.documentElement.dataset.theme = this.dark ? "dark" : "light"; };
-    get("named").onclick = () => { this.names = !this.names; };
     get("branch").onchange = () => this.setBranch(Number(get("branch").value));
-    get("python").onclick = () => this.copy("python");
-    get("yaml").onclick = () => this.copy("yaml");
-    document.documentElement.dataset.theme = this.dark ? "dark" : "light";
+    get("method").onchange = get("size").onchange = () => this.setMethod();
     const at = (event) => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
     canvas.onpointerdown = (event) => {
       canvas.setPointerCapture(event.pointerId);
@@ -1030,27 +1028,33 @@ class Page {
       if (this.grip) this.play(false);
     };
     canvas.onpointermove = (event) => {
-      const before = fingers.get(event.pointerId);
+      const before = fingers.get(event.pointerId), now = at(event);
       if (!before) return;
-      const now = at(event), by = [now[0] - before[0], now[1] - before[1]];
-      if (fingers.size === 2) {
-        const [other] = [...fingers].filter(([id]) => id !== event.pointerId).map(([, place_]) => place_);
-        this.picture.zoom *= Math.hypot(now[0] - other[0], now[1] - other[1]) / (Math.hypot(before[0] - other[0], before[1] - other[1]) || 1);
-      } else if (this.grip) this.drag(now);
+      const by = [now[0] - before[0], now[1] - before[1]], other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+      const apart = (point) => Math.hypot(point[0] - other[0], point[1] - other[1]) || 1;
+      if (other) this.picture.zoom *= apart(now) / apart(before);
+      else if (this.grip) this.drag(now);
       else if (this.data.view || event.shiftKey) this.pan(by);
       else this.orbit(by);
       fingers.set(event.pointerId, now);
     };
     canvas.onpointerup = canvas.onpointercancel = (event) => { fingers.delete(event.pointerId); this.grip = null; };
-    canvas.onwheel = (event) => { event.preventDefault(); this.picture.zoom = Math.min(50, Math.max(0.1, this.picture.zoom * Math.exp(-event.deltaY / 500))); };
+    canvas.onwheel = (event) => {
+      event.preventDefault();
+      this.picture.zoom = Math.min(50, Math.max(0.1, this.picture.zoom * Math.exp(-event.deltaY / 500)));
+    };
     canvas.ondblclick = fit;
+    const faster = (by) => { get("speed").selectedIndex = Math.min(5, Math.max(0, get("speed").selectedIndex + by)); };
+    const keys = {
+      " ": () => this.play(!this.playing), ArrowLeft: () => this.move(-1), ArrowRight: () => this.move(1), 0: fit,
+      r: () => this.reset(), n: () => get("named").click(), "+": () => faster(1), "-": () => faster(-1),
+    };
     document.onkeydown = (event) => {
-      const { tagName, type } = event.target, own = { BUTTON: [" "], SUMMARY: [" "], range: ["ArrowLeft", "ArrowRight"] }[type === "range" ? type : tagName];
-      if (event.ctrlKey || event.metaKey || event.altKey || own?.includes(event.key)) return;
-      if (!own && ["INPUT", "SELECT", "TEXTAREA"].includes(tagName)) return;
-      const speeds = get("speed"), faster = (by) => { speeds.selectedIndex = Math.min(5, Math.max(0, speeds.selectedIndex + by)); };
-      const keys = { " ": () => this.play(!this.playing), ArrowLeft: () => this.move(-1), ArrowRight: () => this.move(1), r: () => this.reset(), 0: fit, "+": () => faster(1), "-": () => faster(-1), n: () => { this.names = !this.names; } };
-      if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
+      const { tagName, type } = event.target, kind = type === "range" ? type : tagName;
+      const taken = { BUTTON: [" "], SUMMARY: [" "], range: ["ArrowLeft", "ArrowRight"], INPUT: keys, SELECT: keys, TEXTAREA: keys }[kind] ?? [];
+      if (event.ctrlKey || event.metaKey || event.altKey || taken === keys || taken.includes(event.key) || !keys[event.key]) return;
+      event.preventDefault();
+      keys[event.key]();
     };
   }
 
@@ -1060,12 +1064,10 @@ class Page {
   }
 
   orbit(by) {
-    const { picture } = this, { up } = this.data, c = Math.cos(-by[0] / 150), s = Math.sin(-by[0] / 150);
-    const about = (v) => plus(plus(scaled(v, c), cross(up, v), s), up, dot(up, v) * (1 - c));
-    let toward = about(picture.toward);
-    const lifted = unit(plus(toward, unit(cross(toward, cross(up, toward))), by[1] / 150));
-    if (Math.abs(dot(lifted, up)) < 0.99) toward = lifted;
-    picture.toward = toward;
+    const { picture } = this, { up } = this.data, c = Math.cos(-by[0] / 150), s = Math.sin(-by[0] / 150), v = picture.toward;
+    const about = plus(plus(scaled(v, c), cross(up, v), s), up, dot(up, v) * (1 - c));
+    const lifted = unit(plus(about, unit(cross(about, cross(up, about))), by[1] / 150));
+    picture.toward = Math.abs(dot(lifted, up)) < 0.99 ? lifted : about;
   }
 
   drag([x, y]) {
@@ -1075,14 +1077,14 @@ class Page {
     const target = plus(plus(here, right, (x - seen[0]) * size), up, (seen[1] - y) * size);
     const axes = [...right, ...up], reach = Math.max(...picture.high.map((h, k) => h - picture.low[k]));
     const moved = model.pull(0, frame.x, grip.body, grip.local, axes, [dot(right, target), dot(up, target)], reach);
-    if (!moved || moved.some(Number.isNaN)) { this.say("the loops do not close there"); return; }
-    this.restart(moved);
+    if (!moved || moved.some(Number.isNaN)) this.say("the loops do not close there");
+    else this.restart(moved);
   }
 }
 
 if (typeof document === "undefined") globalThis.Model = Model;
 else {
-  const data = JSON.parse(get("data").textContent);
-  const open = data.wasm ? Model.open(data.model, data.wasm) : Promise.resolve(null);
-  open.then((model) => { window.page = new Page(data, model); }, (error) => { get("message").textContent = String(error); get("message").hidden = false; });
+  const data = JSON.parse(get("data").textContent), say = Page.prototype.say;
+  Promise.all([unpacked(data.numbers), data.wasm ? Model.open(data.model, data.wasm) : null])
+    .then(([numbers, model]) => { window.page = new Page(data, new Float32Array(numbers), model); }).catch((error) => say(String(error)));
 }

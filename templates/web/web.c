@@ -62,21 +62,6 @@ static int length(const eomgen_kernel *kernel)
 
 /* Functions of the model, and what they are evaluated with. */
 
-EXPORT(web_count) int web_count(void)
-{
-    return model->n_kernels;
-}
-
-EXPORT(web_name) const char *web_name(int kernel)
-{
-    return model->kernels[kernel].name;
-}
-
-EXPORT(web_length) int web_length(int kernel)
-{
-    return model->kernels[kernel].n_out;
-}
-
 EXPORT(web_inputs) double *web_inputs(void)
 {
     return u;
@@ -103,11 +88,6 @@ EXPORT(web_force) void web_force(double t, const double *x)
     if (run.signals != NULL) {
         eomgen_force(&run, t, x);
     }
-}
-
-EXPORT(web_operations) const char *const *web_operations(void)
-{
-    return eomgen_operations;
 }
 
 /* An input over time: an expression of n instructions; its value is constant where n is 0. */
@@ -340,6 +320,32 @@ EXPORT(web_pull) int web_pull(double t, double *q, const int *held, int body, co
 
 /* A run. */
 
+/* Semi-implicit Euler with steps of one size: velocities first, then coordinates by the new ones, then back onto the
+   constraints, as <name>_step_semi_implicit of a C library. */
+static void semi_implicit_attempt(eomgen_run *r, double h)
+{
+    double *const rates = r->K + r->n;
+    for (int i = 0; i < r->n; i++) {
+        r->y[i] = r->y_old[i] + (i >= n_q ? h * r->K[i] : 0.0);
+    }
+    eomgen_evaluate(r, r->t, r->y, rates);
+    for (int i = 0; i < n_q; i++) {
+        r->y[i] += h * rates[i];
+    }
+    if (n_c > 0 && call(find("project"), r->t + h, r->y, rates) == 0) {
+        memcpy(r->y, rates, 8 * (unsigned long)r->n);
+    }
+    eomgen_evaluate(r, r->t + h, r->y, r->f);
+}
+
+static eomgen_method semi_implicit; /* the rest is that of RK4 */
+static const eomgen_method *const methods[] = {&WEB_METHOD, &eomgen_rk4, &semi_implicit}, *method;
+
+static int larger(int a, int b)
+{
+    return a > b ? a : b;
+}
+
 EXPORT(web_open) void web_open(int coordinates, int count, const int *pairs, int n_events, const int *direction,
     const long *most, const int *action, int n_resets, const int *reset_of, const int *reset_x)
 {
@@ -355,14 +361,16 @@ EXPORT(web_open) void web_open(int coordinates, int count, const int *pairs, int
     solver.e = numbers(m), solver.ridge = numbers(m), solver.J = numbers((long)m * n_v), solver.G = numbers((long)m * m);
     solver.dz = numbers(n_v), solver.trial = numbers(n_q), solver.poses = numbers(length(poses));
 
-    const eomgen_method *const method = &WEB_METHOD;
-    double *const free = numbers(n * (5L + method->rows_K + method->rows_F) + eomgen_further(method, n, NULL));
+    semi_implicit = eomgen_rk4, semi_implicit.attempt = semi_implicit_attempt, method = methods[0];
+    const int rows_F = larger(method->rows_F, eomgen_rk4.rows_F);
+    const long size_K = (long)n * larger(method->rows_K, eomgen_rk4.rows_K) + eomgen_further(method, n, NULL);
+    double *const free = numbers(n * (5L + rows_F) + size_K);
     run.rhs = function("rhs"), run.jacobian = function("jacobian"), run.meeting = function("meeting_time");
     run.c = c, run.u = u, run.n_u = model->n_u, run.w = w, run.n = n, run.n_q = n_q, run.atol = atol;
     run.y = free, run.y_old = free + n, run.f = free + 2 * n, run.failure_state = free + 3 * n, run.next = free + 4 * n;
-    run.K = free + 5 * n, run.F = run.K + n * method->rows_K + eomgen_further(method, n, NULL);
+    run.K = free + 5 * n, run.F = run.K + size_K;
     run.closed = model->closed_at != 0 ? w + model->closed_at : NULL;
-    path.nodes = &node, path.n_nodes = 1, path.pieces_room = 1, path.pieces = numbers(3 + n * (1L + method->rows_F));
+    path.nodes = &node, path.n_nodes = 1, path.pieces_room = 1, path.pieces = numbers(3 + n * (1L + rows_F));
     if (n_events == 0) {
         return;
     }
@@ -389,9 +397,10 @@ EXPORT(web_scales) double *web_scales(void)
 }
 
 EXPORT(web_begin) void web_begin(double t, const double *x, double rtol, const double *tolerances, double longest,
-    double first, double span)
+    double first, double span, int number)
 {
     const int n = run.n;
+    method = methods[number];
     memcpy(run.y, x, 8 * (unsigned long)n);
     memcpy(atol, tolerances, 8 * (unsigned long)n);
     run.t = run.t_old = t, run.rtol = rtol, run.max_step = longest, run.h_abs = first, run.until_callback = -1;
@@ -415,7 +424,7 @@ EXPORT(web_advance) int web_advance(double target, int most)
             return 0;
         }
         path.n_pieces = 0;
-        const int status = eomgen_advance(&WEB_METHOD, &run, &path);
+        const int status = eomgen_advance(method, &run, &path);
         if (status != EOMGEN_FULL) {
             return 10 * status; /* told from the above */
         }
@@ -432,7 +441,7 @@ EXPORT(web_state) void web_state(double t, double *y)
     }
     eomgen_run at = run;
     at.t_old = path.pieces[0], at.step = path.pieces[1], at.y_old = path.pieces + 3, at.F = path.pieces + 3 + run.n;
-    WEB_METHOD.interpolate(&at, t, y);
+    method->interpolate(&at, t, y);
 }
 
 EXPORT(web_time) double web_time(void)

@@ -57,10 +57,12 @@ const text = require("fs").readFileSync(process.argv[1], "utf8"), times = JSON.p
 const data = JSON.parse(text.match(/id="data">([^<]*)<.script>/)[1]);
 require("vm").runInThisContext(text.match(/<script>([^]*?)<.script>/)[1]);
 Model.open(data.model, data.wasm).then((model) => {
+  Object.assign(model, JSON.parse(process.argv[3] ?? "{}"));
   model.begin(0, Float64Array.from(data.model.x0));
   const states = times.map((t) => (model.advance(t), [...model.state(t)]));
+  const arrows = times.map((t, k) => [...model.call("outputs", t, states[k]).subarray(model.info.y.length)]);
   const energies = states.map((x, k) => [...model.call("energy", times[k], x)]);
-  console.log(JSON.stringify({ inputs: model.inputs, states, energies, happened: model.happened }));
+  console.log(JSON.stringify({ inputs: model.inputs, states, energies, arrows, happened: model.happened }));
 });
 """
 
@@ -70,9 +72,9 @@ def slider_crank() -> eg.Module:
     return eg.load_example("slider_crank").compile()
 
 
-def in_node(page: Path, times: np.ndarray) -> Any:
-    """States, energies and events of a page's model at some times, by node."""
-    words = ["node", "-e", IN_NODE, str(page), json.dumps(times.tolist())]
+def in_node(page: Path, times: np.ndarray, **how: Any) -> Any:
+    """States, energies, events and arrows of a page's model at some times, by node."""
+    words = ["node", "-e", IN_NODE, str(page), json.dumps(times.tolist()), json.dumps(how)]
     return json.loads(subprocess.run(words, check=True, capture_output=True, text=True, timeout=300).stdout)
 
 
@@ -106,6 +108,38 @@ def test_a_page_takes_the_steps_of_simulate(page: Path) -> None:
     seen = in_node(page, times)
     assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
     assert np.abs(np.array(seen["energies"]).sum(axis=1) - run["energy"]).max() < SAME
+
+
+@pytest.mark.needs("node")
+@pytest.mark.slow
+def test_steps_of_one_size_and_arrows_are_those_of_the_module(page: Path) -> None:
+    module, times, step = slider_crank(), np.linspace(0.0, 0.4, 9), 1e-3
+    run = module.simulate(0.4, method="RK4", step=step, t_eval=times)
+    seen = in_node(page, times, method=1, stepSize=step)
+    assert np.abs(np.array(seen["states"]).T - run.x).max() < SAME
+    forces = module.reactions(run.t, run.x)[:, :3] * [[1.0], [1.0], [0.0]]  # those in the plane are determined
+    arrows = np.array(seen["arrows"]).reshape(len(times), -1, 6)[:, -4:, 3:]  # after the motor's and the spring's
+    assert np.abs(np.moveaxis(arrows, 0, 2) - forces).max() < SAME * np.abs(forces).max()
+    x, n = module.x0(), module.n_q
+    for _ in range(400):  # velocities first, as step_semi_implicit of a C library
+        y = x + np.append(np.zeros(n), step * module.rhs(0.0, x)[n:])
+        x = module.project(np.append(x[:n] + step * module.rhs(0.0, y)[:n], y[n:]))
+    seen = in_node(page, times, method=2, stepSize=step)
+    assert np.abs(seen["states"][-1] - x).max() < SAME
+
+
+@pytest.mark.needs("node")
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["double_wishbone", "planetary_gear"])
+def test_loops_and_gears_run_as_in_simulate(name: str, tmp_path: Path) -> None:
+    module, times = eg.load_example(name).compile(), np.linspace(0.0, 1.0, 41)
+    page = module.page(tmp_path / "it.html")
+    run = module.simulate(1.0, t_eval=times)
+    size = np.abs(run.x).max()
+    assert np.abs(np.array(in_node(page, times)["states"]).T - run.x).max() < SAME * size
+    run = module.simulate(1.0, t_eval=times, method="RK4", step=1e-3)  # no step size that rounding decides on
+    seen = in_node(page, times, method=1, stepSize=1e-3)
+    assert np.abs(np.array(seen["states"]).T - run.x).max() < 1e-3 * SAME * size
 
 
 @pytest.mark.needs("node")

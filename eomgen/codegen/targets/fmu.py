@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 import platform
 import re
 import sys
@@ -36,7 +35,7 @@ from ...toolchain.build import compile_sources
 from ...toolchain.compiler import Options
 from ...toolchain.layer import read_layer
 from ..c import emit_c
-from ..files import number_texts, read_template, render
+from ..files import number_texts, own_file, read_template, render
 from ..program import Program
 
 
@@ -465,11 +464,7 @@ def generate_fmu(program: Program, module: BoundModel, directory: Path, version:
     UsageError
         There is another file of this name.
     """
-    where = directory / f"{program.name}.fmu"
-    if os.path.lexists(where) and not _is_ours(where):
-        raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")
-    directory.mkdir(parents=True, exist_ok=True)
-    return write_fmu(program, module, where, version)
+    return write_fmu(program, module, own_file(directory, f"{program.name}.fmu", _is_ours), version)
 
 
 def _is_ours(path: Path) -> bool:

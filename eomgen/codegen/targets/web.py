@@ -5,9 +5,15 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
+import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
+from math import prod
 from pathlib import Path
+from threading import Timer
 from typing import Any, overload
 
 import numpy as np
@@ -15,7 +21,19 @@ import numpy as np
 from ...base.algebra import Array
 from ...base.files import as_path, open_plain, write_whole
 from ...base.limits.in_c import definitions
+from ...base.operations import OPERATIONS
+from ...base.picture_data import read_picture
+from ...elements.frames import GROUND
 from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot, ill_typed
+from ...expr import vectors as vec
+from ...expr.core import Expr
+from ...expr.vectors import Vec3
+from ...mechanics import Kinematics
+from ...mechanics.methods import TreeEquations
+from ...mechanics.mobility import Mobility
+from ...mechanics.motion import dot, force_and_moment
+from ...mechanics.wrenches import JointWrenches, carried_reactions
+from ...model.mechanism import Output
 from ...runtime.bound_model import BoundModel
 from ...runtime.drawing import module_of
 from ...runtime.layout import bounds_of
@@ -30,21 +48,28 @@ from ...toolchain.compiler import run
 from ...toolchain.layer import read_layer
 from ..build import program_of
 from ..c import emit_c
-from ..files import read_template
+from ..factor import factorize, solve
+from ..files import own_file, read_template
 from ..program import Program
 from .fmu import refuse_impacts
 
 #: Functions that a page calls.
 KERNELS = ("rhs", "energy", "constraints", "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs",
            "events", "resets", "alignment", "scales")  # fmt: skip
-METHODS = {"DOP853": "dop853", "RK45": "rk45", "Radau": "radau"}  #: of runs in a page; DOP853 stands for others
+METHODS = {"DOP853": "dop853", "RK45": "rk45", "Radau": "radau"}  #: with watched steps; DOP853 stands for others
 STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_steppers.c")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-mexec-model=reactor", "-s", "-DEOMGEN_LANES=0",
          "-DEOMGEN_PORTABLE", "-DEOMGEN_WITHOUT_METADATA")  # fmt: skip
 SECONDS = 1800.0  #: that the compiler may take: the first time zig builds its C library, once for all
+CODES = ("const", "t", "x", "u", "p", *OPERATIONS)  #: operations of tapes, by their numbers in the library
+FIXED = ("RK4", "semi-implicit Euler")  #: methods of a page with steps of one size
 GENERATOR = b'<meta name="generator" content="eomgen">'  #: what a page says of itself
 BODIES = 200  #: more take too long for a page
 BRANCHES = 8  #: ways of closing the loops that are offered
+STEP = 1e-3  #: s, of methods with steps of one size, unless the model declares it
+ARROWS = 120  #: of forces and of reactions; where there are more, none is drawn
+ROWS = 24  #: of constraints; with more, reactions are not computed in a page
+READ = 12_000  #: operations of the equations; longer ones take minutes to write, and no one reads them
 
 
 def find_compiler() -> list[str]:
@@ -91,6 +116,88 @@ def refuse(program: Program) -> None:
                                 remedy, code="EG-UNSUPPORTED"))  # fmt: skip
     if problems:
         raise ModelError(problems)
+
+
+@contextmanager
+def _phase(what: str) -> Iterator[None]:
+    """Say on stderr what is being done, once it takes longer than a second."""
+    timer = Timer(1.0, lambda: print(f"{what} ...", file=sys.stderr, flush=True))
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+Arrow = tuple[str, bool, bool, Vec3, Vec3]  #: of what, whether a reaction, whether a moment; where, how much
+
+
+def _loads(kinematics: Kinematics) -> list[Arrow]:
+    """What the force elements exert on bodies, ground axes."""
+    graph, poses, motion = kinematics.graph, kinematics.poses, kinematics.motion
+    found: list[Arrow] = []
+    for terms in kinematics.forces:
+        for load in terms.marker_loads:
+            if load.marker.body != GROUND:
+                at = poses.marker(load.marker).position
+                parts = enumerate((load.force, load.torque))
+                found += [(terms.force.name, False, k == 1, at, part) for k, part in parts]
+        for pushed in terms.coordinate_loads:
+            spec = next((one for one in kinematics.mechanism.joints if one.coordinates == (pushed.coordinate,)), None)
+            if spec is not None:
+                marker, value = poses.marker(spec.successor), motion.coordinates[pushed.coordinate][0]
+                angular, linear = spec.joint.subspace(graph, [value])[0]
+                turns = not all(part.is_zero for part in angular)
+                way = vec.scale(pushed.value, vec.times(marker.rotation, angular if turns else linear))
+                found.append((terms.force.name, False, turns, marker.position, way))
+    return found
+
+
+def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Arrow]:
+    """What joints exert on their successors, ground axes, as far as rigid bodies determine it.
+
+    The multipliers l of the independent rows follow from C_q^T l = -(M a + h) with the accelerations of the run.
+    """
+    graph, poses, constraints = kinematics.graph, kinematics.poses, kinematics.constraints
+    if len(mobility.independent_rows) > ROWS or not tree.inverse_dynamics:
+        return []
+    try:
+        open_ = module.undetermined_reactions(0.0, module.x0())
+    except EomgenError:
+        return []
+    rows = [constraints.jacobian[i] for i in mobility.independent_rows]
+    right = [-dot(row, tree.inverse_dynamics) for row in rows]
+    values: list[Expr] = []
+    if rows:
+        gram = [[dot(one, other) for other in rows] for one in rows]
+        values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
+    wrenches = JointWrenches(kinematics)
+    labels = [constraints.labels[i] for i in mobility.independent_rows]
+    every = carried_reactions(wrenches, dict(zip(labels, values, strict=True)))
+    found: list[Arrow] = []
+    for spec, unknown in zip(wrenches.specs, open_, strict=True):
+        if spec.name not in every:
+            continue
+        marker = poses.marker(spec.successor)
+        for k, part in enumerate(force_and_moment(kinematics.motion, spec, every[spec.name])):
+            known = [graph.zero if lost else x for x, lost in
+                     zip(vec.times(marker.rotation, part), unknown[3 * k : 3 * k + 3], strict=True)]  # fmt: skip
+            found.append((spec.name, True, k == 1, marker.position, (known[0], known[1], known[2])))
+    return found
+
+
+def with_arrows(
+    module: Any, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations
+) -> tuple[Kinematics, list[tuple[str, bool, bool]]]:
+    """The model whose outputs end with the places and parts (6 numbers) of arrows, and what these are."""
+    every: list[Arrow] = []
+    for found in (_loads(kinematics), _reactions(module, kinematics, mobility, tree)):
+        found = [one for one in found if not all(x.is_zero for x in one[4])]
+        every += found if len(found) <= ARROWS else []
+    numbers = [x for *_, at, way in every for x in (*at, *way)]
+    outputs = [Output(f"arrow[{k}]", x) for k, x in enumerate(numbers)]
+    mechanism = replace(kinematics.mechanism, outputs=(*kinematics.mechanism.outputs, *outputs))
+    return replace(kinematics, mechanism=mechanism), [one[:3] for one in every]
 
 
 def compile_wasm(program: Program, method: str) -> bytes:
@@ -143,7 +250,11 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         low, high = bounds_of(info).get(name, (-np.inf, np.inf))
         ends = sorted((0.5 * value, 2.0 * value)) if value else [-1.0, 1.0]
         ranges[name] = [float(np.clip(end, low, high)) for end in ends]
-    ranges |= {name: [-10.0 * (abs(u) or 1.0), 10.0 * (abs(u) or 1.0)] for name, u in inputs.items()}
+    weight = float(9.81 * read_picture(module.metadata, module.p).mass.sum()) or 10.0
+    usual = {"N": weight, "N*m": weight * size, "m": 0.5 * size, "rad": np.pi, "m/s": size}
+    for name, value in inputs.items():  # of 0: what such a mechanism notices, of one digit
+        most = 10.0 * abs(value) or float(f"{usual.get(layout.unit(name), 10.0):.0e}")
+        ranges[name] = [-most, most]
     for k in places:
         limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
         ends = [limits.get("lower", x0[k] - reach), limits.get("upper", x0[k] + reach)]
@@ -165,7 +276,8 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         "ranges": ranges, "bounds": finite, "signals": signals, "branches": [[float(x) for x in q] for q in found],
         "events": [list(row) for row in rows], "resets": [list(row) for row in info.resets], "end": float(plan.end),
         "rtol": float(settings["rtol"]), "atol": np.broadcast_to(settings["atol"], layout.n_x).tolist(),
-        "maxStep": settings.get("max_step"), "firstStep": settings.get("first_step"), "method": method,
+        "maxStep": settings.get("max_step"), "firstStep": settings.get("first_step"),
+        "methods": [method, *FIXED], "operations": CODES,
     }  # fmt: skip
 
 
@@ -184,7 +296,7 @@ def _way(module: BoundModel) -> Array:
 def _tape(tape: Any) -> list[Any]:
     """Code, numbers and the last instruction of a tape of one value."""
     code, numbers, out = tape
-    return [[list(row) for row in code], [float(x) for x in numbers], int(out[0])]
+    return [[[CODES.index(op), *places] for op, *places in code], [float(x) for x in numbers], int(out[0])]
 
 
 def page_text(module: BoundModel, trajectory: Any = None) -> str:
@@ -192,25 +304,36 @@ def page_text(module: BoundModel, trajectory: Any = None) -> str:
     equations = module.equations
     if equations is None:
         raise cannot("a page is made from a model; this module comes of a generated package, which has no equations")
-    method = str(plan_run(module, None, None, None, None, None, {}, {}).title)
-    method = method if method in METHODS else "DOP853"
+    plan = plan_run(module, None, None, None, None, None, {}, {})
+    method = plan.title if plan.title in METHODS else "DOP853"
     kernels = (*KERNELS, *(("jacobian",) if method == "Radau" else ()))
     about = {"target": "web", "model_digest": module.info.model_digest, "eomgen": module.info.eomgen}
-    kinematics, mobility, tree = equations.fresh()
-    program = program_of(kinematics, mobility, tree, about, False, kernels)
-    refuse(program)
-    wasm = compile_wasm(program, method)
+    with _phase("writing the model in C"):
+        kinematics, mobility, tree = equations.fresh()
+        kinematics, arrows = with_arrows(module, kinematics, mobility, tree)
+        program = program_of(kinematics, mobility, tree, about, False, kernels)
+        refuse(program)
+    with _phase("compiling it to WebAssembly"):
+        wasm = compile_wasm(program, method)
     motion = None
     if trajectory is not None:
         bound = module_of(trajectory, module, "a page")
         motion = sample(trajectory, partial(states_at, trajectory, bound), 25.0, None)
-    scene = build_scene(module, _way(module) if motion is None else motion.x[: module.n_q])
-    model = describe_model(module, method)
+    with _phase("running it, for what the picture must hold"):
+        scene = build_scene(module, _way(module) if motion is None else motion.x[: module.n_q])
+    sizes = [(name, prod(shape)) for name, shape in program.metadata["kernels"].items()]
+    model = describe_model(module, method) | {"arrows": arrows, "kernels": sizes}
+    model |= {"method": int(plan.title == "RK4"), "step": plan.size or STEP}
     if motion is not None:
         model["x0"] = motion.x[:, 0].tolist()
         reached = {name: float(np.abs(trajectory[name]).max()) for name in module.layout.u}
         model["ranges"] |= {name: [-most, most] for name, most in reached.items() if 0.0 < most < np.inf}
-    return page_html(module, scene, motion, (), model, wasm, getattr(equations, "_equations_html", ""))
+    length = sum(count.total for count in equations.operations.values())
+    with _phase("writing the equations"):
+        text = f"<p>too long to be shown: {length} operations</p>"
+        text = text if length > READ else getattr(equations, "_equations_html", "")
+    with _phase("drawing it"):
+        return page_html(module, scene, motion, (), model, wasm, text)
 
 
 @overload
@@ -263,10 +386,9 @@ def generate_web(program: Program, module: BoundModel, directory: Path, version:
     UsageError
         There is another file of this name.
     """
-    where = directory / f"{program.name}.html"
-    if os.path.lexists(where):
-        with open_plain(where, follow=False) as file:
-            if GENERATOR not in file.read(2000):
-                raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")
-    directory.mkdir(parents=True, exist_ok=True)
-    return page(module, where)
+    return page(module, own_file(directory, f"{program.name}.html", _is_ours))
+
+
+def _is_ours(path: Path) -> bool:
+    with open_plain(path, follow=False) as file:
+        return GENERATOR in file.read(2000)
