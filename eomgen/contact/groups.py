@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
@@ -59,11 +59,11 @@ class ContactGroups(Force):
     The force of a pair is that of :class:`~.point.Contact`.  Shapes of one body do not meet.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "Contact of every shape of one group with every shape of another: a force along the normal from the "
         "penetration $d$ and its rate, and friction against the sliding."
     )
-    by_power: ClassVar[bool] = True
+    by_power = True
     first: tuple[ContactShape, ...]
     second: tuple[ContactShape, ...]
     normal_law: NormalLaw

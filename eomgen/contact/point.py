@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE
@@ -50,7 +50,7 @@ class Contact(Force):
     first body at the same point.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "Contact at one point: a force along the normal from the penetration $d$ and its rate, and friction "
         "against the sliding."
     )

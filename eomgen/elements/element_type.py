@@ -2,12 +2,11 @@
 
 The tables of types (:data:`~.forces.FORCES` ...) drive the check of model files, their JSON Schema, the methods
 of Model and their documentation, so that a new type is one row, in the file of its class.  The keys of most are fields
-of their class, which :func:`key` marks.  The reader of entries is :class:`~eomgen.model.element_entry.ElementEntry`.
+of their class, which :func:`key` marks.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -38,18 +37,20 @@ class Meaning(NamedTuple):
     measure: str = ""
 
 
-class Entry(ABC):
+class Entry:
     """An entry on its way to an element.
 
     Every method reads one key, notes what is wrong with it as a fault of that key, and returns None or a stand-in then,
-    so that one pass finds all faults.  What the keys mean to the model is known by its subclass there.
+    so that one pass finds all faults.
 
     Attributes
     ----------
+    reader : Reader
+        What is read of the model so far (:class:`~eomgen.model.values.Reader`).
     values : dict
         What the user gave, by key.
-    fields : Fields
-        The keys of its type.
+    found : ElementType
+        Its type, and ``fields`` all keys of that.
     stand_in : Expr
         In place of an expression that is at fault.
     """
@@ -58,7 +59,7 @@ class Entry(ABC):
         self.reader, self.name, self.path, self.values = reader, name, path, values
         self.graph: Graph = reader.graph
         self.stand_in: Expr = reader.stand_in
-        self.fields: Fields = {}
+        self.found, self.fields = ElementType("", "", {}), Fields()
 
     # -- faults ---------------------------------------------------------------------------------------------------
     def _at(self, key: str) -> str:
@@ -139,37 +140,49 @@ class Entry(ABC):
         """The model's names of a kind."""
         return [*self.reader.names.of(kind)]
 
-    @abstractmethod
     def states(self) -> tuple[Expr, ...]:
         """The symbols of its own first-order states, in the order in which its type names them."""
+        return tuple(self.graph.symbol(f"{self.name}_{suffix}") for suffix in self.found.states(self.values))
 
-    @abstractmethod
     def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
         """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
+        if key not in self.values:
+            return None
+        value = self.values[key]
+        joint = next((one for one in self.reader.joints if isinstance(value, str) and one.entry.name == value), None)
+        if joint is None:
+            found = self.reader.coordinate(self._at(key), value)
+            return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)
+        if not joint.joint.velocities:
+            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has", "EG-REFERENCE")
+        names = [value + v.suffix if v.of is None else joint.coordinates[v.of] for v in joint.joint.velocities]
+        return tuple(
+            (name, self.graph.symbol(name if v.of is None else f"{name}_dot"), v.kind)
+            for name, v in zip(names, joint.joint.velocities, strict=True)
+        )
 
-    @abstractmethod
     def require_one_carrier(self, key: str, a: Found, b: Found) -> None:
         """Note two coordinates that are measured from different bodies."""
+        first, second = self.carrier(a), self.carrier(b)
+        if first is None or second is None or first == second:
+            return
+        message = f"{a.name!r} and {b.name!r} are not measured from the same body"
+        remedy = "give both joints the body that carries the two axes as predecessor; for a carrier that turns "
+        self.fault(key, message, remedy + "use planetary, or a coupling", "EG-REFERENCE")
 
-    @abstractmethod
-    def carrier(self, coordinate: Found) -> int | None:
-        """The body from which a coordinate is measured, bodies that are welded together counting as one."""
-
-    @abstractmethod
-    def carried(self, coordinate: Found) -> int | None:
-        """The body that a coordinate moves."""
-
-    @abstractmethod
-    def meaning(self, name: str) -> Meaning:
-        """What a name in an expression stands for."""
-
-    @abstractmethod
-    def table_kind(self, function: str) -> str | None:
-        """The kind of a function that is a table."""
-
-    @abstractmethod
-    def contact_point(self, axis: Marker) -> tuple[Marker, Expr] | None:
-        """A massless body about a marker's axis, whose x axis points to a contact, and the angle that turns it."""
+    def carrier(self, coordinate: Found, end: str = "predecessor") -> int | None:
+        """The body from which a coordinate is measured, or that it moves; welded ones count as one, the least."""
+        spec = next((joint for joint in self.reader.specs if joint.name == coordinate.joint), None)
+        if spec is None:
+            return None
+        before, group = 0, {int(getattr(spec, end).body)}
+        while len(group) > before:
+            before = len(group)
+            for joint in self.reader.specs:
+                ends = {joint.predecessor.body, joint.successor.body}
+                if not joint.coordinates and ends & group:
+                    group |= ends
+        return min(group)
 
 
 class ElementType(NamedTuple):

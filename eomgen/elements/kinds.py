@@ -440,10 +440,6 @@ class Value(Scalar):
     argument, annotation = "scalar or sequence of three", "Value | Sequence[Value]"
     schema = any_of(ref("expression"), ref("vector"))
 
-    def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
-        """Three for a body, or one."""
-        raise NotImplementedError
-
 
 class Scalars(Field):
     """A list of expressions."""

@@ -31,7 +31,7 @@ from .build_states import (
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
-from .element_entry import Surroundings, build_elements, check_turns, declare_contacts, own_states
+from .element_entry import build_elements, check_turns, declare_contacts, own_states
 from .equations import (
     build_equations,
     build_lagrangian,
@@ -43,7 +43,7 @@ from .equations import (
 )
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
-from .input_rates import add_rates, clock
+from .input_rates import add_rates, clock, list_differentiated
 from .mechanism import Body, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .quantities import SUMS, CarriedQuantity, WrenchQuantity
@@ -91,8 +91,8 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
     reader.requirements.declare({p.name: p.value for p in parameters})
     build_functions(reader, sections["functions"])
-    reader.joints = specs = declare_coordinates(reader, sections["joints"])
-    contacts = declare_contacts(reader, sections["constraints"])
+    reader.joints = declare_coordinates(reader, sections["joints"])
+    declare_contacts(reader, sections["constraints"])
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
     )
@@ -100,31 +100,33 @@ def build(description: Description) -> Mechanism:
         reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
     )
 
-    declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
+    declared, by_clock = declare_states(
+        reader, sections["states"], given_values is not None or lagrangian_values is not None
+    )
     held, state_rates = own_states(reader, sections["forces"])
     switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     reader.mass_data = bodies = _bodies(reader, sections["bodies"])
-    joints = build_joints(reader, specs)
+    reader.specs = joints = build_joints(reader, reader.joints)
     reader.shapes = partial(read_shapes, reader)
-    around = Surroundings(reader, specs, joints, bodies, contacts)
-    forces = build_elements(around, "force", sections["forces"], FORCES)
+    forces = build_elements(reader, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     given = build_equations(reader, given_values)
     if lagrangian is not None:
         given = differentiate(graph, lagrangian, clock(graph, inputs))
         require_quadratic(reader, given)
-    constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
+    constraints = build_elements(reader, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
-    states, begun, clocks, samplings = build_states(reader, declared)
+    states, begun, clocks, samplings = build_states(reader, declared, by_clock)
     outputs = read_outputs()
     switched = build_switches(reader, switching, constraints)
     constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
     own_events = build_events(reader, sections["events"])
     check_resets(reader, own_events, clocks, switched)
     events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
-    inputs = add_rates(reader, inputs, lagrangian, given, constraints, switched, events, outputs)
+    differentiated = list_differentiated(reader, lagrangian, given, constraints, switched, events, outputs)
+    inputs = add_rates(reader, inputs, differentiated)
     moves = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*moves, "output"))
     moving = set(reader.names.of(*moves))
@@ -152,7 +154,7 @@ def build(description: Description) -> Mechanism:
     outputs = with_units(reader, joints, outputs)
     exerted, carried = _wrenches(reader)
     described = len(bodies)
-    bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
+    bodies, joints = (*bodies, *reader.added[0]), (*joints, *reader.added[1])
     return Mechanism(
         name=str(name),
         graph=graph,

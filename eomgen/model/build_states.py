@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..base.value_rules import POSITIVE
 from ..elements import kinds
@@ -158,33 +158,21 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
 COUNTER, SAMPLED = "_samples", "_sampled"  #: what follows the name of a clock's first state
 
 
-class Timing(NamedTuple):
-    """The sampled states of one period and offset, the first of which gives the clock its name."""
-
-    entries: tuple[DescribedEntry, ...]
-
-    @property
-    def name(self) -> str:
-        """The name of the first state."""
-        return str(self.entries[0].name)
-
-
-def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[Timing]:
-    """Sampled states by period and offset as they are written, the names of their clocks taken in."""
+def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[list[DescribedEntry]]:
+    """Sampled states by period and offset as they are written, the first of which names their clock."""
     groups: dict[tuple[str, str], list[DescribedEntry]] = {}
     for entry in entries:
         if "sampled" in entry.values or ("period" in entry.values and "rate" not in entry.values):
             written = (_shown_time(entry.values.get("period")), _shown_time(entry.values.get("offset", 0)))
             groups.setdefault(written, []).append(entry)
-    timings = [Timing(tuple(group)) for group in groups.values()]
-    for timing in timings:
-        reader.names.declare("state", timing.name + COUNTER, timing.entries[0].path)
-        reader.names.declare("event", timing.name + SAMPLED, timing.entries[0].path)
-    return timings
+    for first, *_ in groups.values():
+        reader.names.declare("state", f"{first.name}{COUNTER}", first.path)
+        reader.names.declare("event", f"{first.name}{SAMPLED}", first.path)
+    return [*groups.values()]
 
 
 def build_clocks(
-    reader: Reader, timings: Sequence[Timing], new: Mapping[str, Expr]
+    reader: Reader, groups: Sequence[Sequence[DescribedEntry]], new: Mapping[str, Expr]
 ) -> tuple[tuple[Clock, ...], tuple[Event, ...]]:
     """The clocks and their events.
 
@@ -195,10 +183,10 @@ def build_clocks(
     """
     graph, time = reader.graph, reader.graph.symbol("t")
     clocks, events = [], []
-    for timing in timings:
-        period, offset = _sampling_times(reader, timing)
-        names = tuple(str(entry.name) for entry in timing.entries)
-        clock = Clock(timing.name + COUNTER, timing.name + SAMPLED, names, period, offset)
+    for entries in groups:
+        period, offset = _sampling_times(reader, entries)
+        names = tuple(str(entry.name) for entry in entries)
+        clock = Clock(names[0] + COUNTER, names[0] + SAMPLED, names, period, offset)
         count = graph.symbol(clock.counter)
         renewed: dict[Expr, Expr] = {}
         for name in names:
@@ -210,10 +198,10 @@ def build_clocks(
     return tuple(clocks), tuple(events)
 
 
-def _sampling_times(reader: Reader, timing: Timing) -> tuple[Expr, Expr]:
+def _sampling_times(reader: Reader, entries: Sequence[DescribedEntry]) -> tuple[Expr, Expr]:
     """Period and offset of a clock, read in each entry so that each fault has its place."""
     found = []
-    for entry in timing.entries:
+    for entry in entries:
         path, given = f"{entry.path}.period", entry.values.get("period")
         if given is None:
             reader.faults.missing(path, "give the time from one sampling time to the next, in s")
@@ -233,27 +221,10 @@ def _shown_time(given: Any) -> str:
         return "".join(str(given).split())
 
 
-class DeclaredStates(NamedTuple):
-    """The entries whose names are taken in, and those that are sampled by clock."""
-
-    entries: list[DescribedEntry]
-    timings: list[Timing]
-
-    def __bool__(self) -> bool:
-        return bool(self.entries)
-
-
-class BuiltStates(NamedTuple):
-    """The states in the order of their declaration, counters of clocks last, and what belongs to them."""
-
-    states: tuple[FirstOrderState, ...]
-    initial: dict[str, Expr]
-    clocks: tuple[Clock, ...]
-    events: tuple[Event, ...]  #: one a clock
-
-
-def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) -> DeclaredStates:
-    """Take in the names of all states before any expression is read; those that can be used are returned.
+def declare_states(
+    reader: Reader, entries: list[DescribedEntry], bare: bool
+) -> tuple[list[DescribedEntry], list[list[DescribedEntry]]]:
+    """Take in the names of all states before any expression is read: the usable entries, the sampled ones by clock.
 
     Parameters
     ----------
@@ -277,14 +248,16 @@ def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) ->
             )
         if reader.names.declare("state", entry.name, entry.path):
             usable.append(entry)
-    return DeclaredStates(usable, group_by_clock(reader, usable))
+    return usable, group_by_clock(reader, usable)
 
 
-def build_states(reader: Reader, declared: DeclaredStates) -> BuiltStates:
-    """The states, their initial values and sampling; faults are noted."""
+def build_states(
+    reader: Reader, entries: Sequence[DescribedEntry], groups: Sequence[Sequence[DescribedEntry]]
+) -> tuple[tuple[FirstOrderState, ...], dict[str, Expr], tuple[Clock, ...], tuple[Event, ...]]:
+    """The states, counters of clocks last, their initial values, clocks and an event for each; faults are noted."""
     states: list[FirstOrderState] = []
     initial: dict[str, Expr] = {}
-    for entry in declared.entries:
+    for entry in entries:
         unit, doc = read_described(reader, entry, STATE)
         start, path = entry.values.get("initial"), f"{entry.path}.initial"
         if is_number(start):
@@ -295,10 +268,10 @@ def build_states(reader: Reader, declared: DeclaredStates) -> BuiltStates:
         rate, sampled = _motion(reader, entry)
         states.append(FirstOrderState(str(entry.name), rate, unit.si, doc, sampled))
     new = {state.name: state.sampled for state in states if state.sampled is not None}
-    clocks, events = build_clocks(reader, declared.timings, new)
+    clocks, events = build_clocks(reader, groups, new)
     zero = reader.graph.zero
     counters = (FirstOrderState(c.counter, zero, doc=f"samples of {', '.join(c.states)} so far") for c in clocks)
-    return BuiltStates((*states, *counters), initial, clocks, events)
+    return (*states, *counters), initial, clocks, events
 
 
 def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:

@@ -20,6 +20,9 @@ from ..expr.identity import vanishes
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
 from .values import Reader
 
+#: Expressions, how often they are differentiated by time, what they are, and where they stand.
+Differentiated = tuple[list[Expr], int, str, str | None]
+
 
 def jumps_in_time(expressions: Sequence[Expr]) -> bool:
     """Whether an expression jumps where a comparison, linear in t and free of coordinates, changes.
@@ -54,23 +57,13 @@ def clock(graph: Graph, inputs: Sequence[Input]) -> dict[Expr, Expr]:
     return {graph.symbol("t"): graph.one, **rates}
 
 
-def add_rates(
-    reader: Reader,
-    inputs: tuple[Input, ...],
-    lagrangian: Lagrangian | None,
-    given: GivenEquations | None,
-    constraints: Sequence[Constraint],
-    switched: Sequence[Switched],
-    events: Sequence[Event],
-    outputs: Sequence[Output],
-) -> tuple[Input, ...]:
+def add_rates(reader: Reader, inputs: tuple[Input, ...], differentiated: Sequence[Differentiated]) -> tuple[Input, ...]:
     """The inputs, and those rates of them that the equations need; all rates with their expressions over time.
 
     A rate that is declared as an input already stays where it is.  Faults are noted: a name that is taken, a rate that
     would need accelerations.
     """
     needed: dict[str, str] = {}
-    differentiated = _differentiated(reader, lagrangian, given, constraints, switched, events, outputs)
     for expressions, _, why, place in differentiated:
         if place is not None and jumps_in_time(expressions):
             message = f"{why} must have a derivative by time, and a condition on t makes it jump"
@@ -99,7 +92,7 @@ def add_rates(
     return _with_signals(reader, (*inputs, *added))
 
 
-def _differentiated(
+def list_differentiated(
     reader: Reader,
     lagrangian: Lagrangian | None,
     given: GivenEquations | None,
@@ -107,14 +100,14 @@ def _differentiated(
     switched: Sequence[Switched],
     events: Sequence[Event],
     outputs: Sequence[Output],
-) -> list[tuple[list[Expr], int, str, str | None]]:
-    """Expressions that the equations differentiate by time, how often, what they are, and where they stand.
+) -> list[Differentiated]:
+    """Expressions that the equations differentiate by time.
 
     The place is None for drivers, whose jumps are told by the runs that they lead, and for constraints that close for a
     time, whose errors die away.
     """
     symbol = reader.graph.symbol
-    found: list[tuple[list[Expr], int, str, str | None]] = []
+    found: list[Differentiated] = []
     if lagrangian is not None:
         v = [symbol(f"{name}_dot") for name in lagrangian.coordinates]
         found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)", "lagrangian"))

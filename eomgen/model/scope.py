@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
 
 from ..elements.frames import Marker
 from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
@@ -120,21 +121,14 @@ class Scope:
     """
 
     def __init__(
-        self,
-        graph: Graph,
-        names: Namespace,
-        path: str,
-        level: int,
-        marker: Callable[[str], Marker],
-        quantities: dict[str, Quantity],
-        output: Callable[[str], Expr],
-        ask: Callable[[Named, str], None],
-        local: Mapping[str, Expr] | None = None,
-        exclusive: bool = False,
+        self, reader: Any, path: str, level: int, local: Mapping[str, Expr] | None = None, exclusive: bool = False
     ) -> None:
-        self.graph, self.names, self.path, self.level = graph, names, path, level
-        self.marker, self.quantities, self.output, self.ask = marker, quantities, output, ask
-        self.local, self.exclusive = local or {}, exclusive
+        self.reader = reader
+        self.graph: Graph = reader.graph
+        self.names: Namespace = reader.names
+        self.marker: Callable[[str], Marker] = reader.moving
+        self.output: Callable[[str], Expr] = reader.output
+        self.path, self.level, self.local, self.exclusive = path, level, local or {}, exclusive
 
     def resolve(self, name: str) -> Expr:
         """The expression of a name."""
@@ -160,7 +154,7 @@ class Scope:
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
         elif kind is None and name in TOTALS and self.level >= LAW:
-            self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
+            self.reader.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
             known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level), "pi"]
@@ -191,7 +185,7 @@ class Scope:
                 carried = "reaction" if found.carried else "quantity of a force element"
                 self._refuse(str(found), carried)
             else:
-                self.ask(found, self.path)
+                self.reader.ask(found, self.path)
             return self.graph.symbol(str(found))
         level, axis = QUANTITIES[found.name]
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
@@ -202,7 +196,7 @@ class Scope:
             seen = found._replace(of=found.origin, origin=found.of)
         point = self._point(seen)
         origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
-        self.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
+        self.reader.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
         return self.graph.symbol(str(found))
 
     def _fixed(self, label: str) -> Marker:

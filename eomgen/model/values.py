@@ -18,8 +18,9 @@ from ..base.names import hint
 from ..base.texts import WHOLE, join_surrogates, lone_surrogate
 from ..base.value_rules import ROTATION, word_of_check
 from ..elements import kinds
-from ..elements.element_type import Found
+from ..elements.element_type import Entry, Found, Meaning
 from ..elements.frames import GROUND, Frame, Marker
+from ..elements.joints import JOINTS
 from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
 from ..errors import ExpressionError
 from ..expr import vectors as vec
@@ -29,16 +30,18 @@ from ..expr.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
-from .mechanism import Body
+from .mechanism import Body, JointSpec
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
-from .quantities import Named, Quantity
+from .quantities import TURNING, Named, Quantity
 from .requirements import Requirements
-from .scope import Namespace, Scope
+from .scope import ENERGIES, RATES, Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy, name_of
 from .units import Unit
 
 _A = {"length": "a length", "angle": "an angle"}
+#: Kinds of names of motions, of Euler parameters too -> how many derivatives they are.
+_LEVELS = {"coordinate": 0, "velocity": 1, "acceleration": 2, "rate": 1, "rate of rate": 2}
 
 
 def is_number(value: object) -> bool:
@@ -76,7 +79,10 @@ class Reader:
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
         self.shapes: Callable[[str, Any], Any] = lambda path, value: None  # of contacts between groups
         self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
+        self.specs: Sequence[JointSpec] = ()  # the same, whose markers are read
         self.mass_data: Sequence[Body] = ()  # bodies whose masses are read
+        self.contacts: dict[str, str] = {}  # path of a cam -> the angle that finds its contact
+        self.added: tuple[list[Body], list[JointSpec]] = [], []  # what contacts add
 
     def ask(self, quantity: Named, path: str) -> None:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
@@ -149,8 +155,7 @@ class Reader:
         return found
 
     def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
-        asked = (self.moving, self.quantities, self.output, self.ask)
-        scope = Scope(self.graph, self.names, path, level, *asked, local, exclusive)
+        scope = Scope(self, path, level, local, exclusive)
         try:
             if isinstance(value, str):
                 return parse(value, self.graph, scope.resolve, scope.locate if level >= LAW else None)
@@ -228,6 +233,30 @@ class Reader:
         remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
         self.faults.add(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
         return str(field.default)
+
+    def meaning(self, name: str) -> Meaning:
+        """What a name in an expression stands for."""
+        kind, place = self.names.kinds.get(name, ""), self.quantities.get(name)
+        if place is not None:
+            turns = place.level in TURNING or (place.axis == 3 and place.level < 2)
+            return Meaning("marker", place.order, "angle" if turns else "length")
+        if name in (f"{energy}()" for energy in ENERGIES):
+            return Meaning("energy")
+        if (asked := Named.parse(name)) is not None and asked.carried:
+            return Meaning("reaction" if asked.part else "multiplier")
+        if asked is not None:  # whether a force moves with velocities is known once its law is
+            return Meaning("element", 1 if asked.name == "rate" else 0, "length")
+        if kind not in _LEVELS:
+            return Meaning(kind)
+        level = _LEVELS[kind]
+        of = name.removesuffix(RATES[level])
+        kinds = {c: k.kind for j in self.joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True)}
+        return Meaning(kind, level, "length" if kinds.get(of) == "length" else "angle")
+
+    def table_kind(self, function: str) -> str | None:
+        """The kind of a function that is a table."""
+        entries = self.description.sections["functions"]
+        return next((e.values.get("kind", "cubic") for e in entries if e.name == function and "x" in e.values), None)
 
     # -- vectors and matrices -------------------------------------------------------------------------------------
     def vector(self, path: str, value: Any, level: int = CONSTANT) -> Vec3:
@@ -427,3 +456,16 @@ class Reader:
             remedy = nearest(shown(given), known, "joints and coordinates")
             faults.add(path, f"no joint {quoted(given)}", remedy, "EG-NAME-UNKNOWN")
         return None
+
+    def contact_point(self, entry: Entry, cam: Marker) -> tuple[Marker, Expr] | None:
+        """A massless body about a marker's axis, whose x axis points to a contact, and the angle that turns it."""
+        name, (bodies, joints), o = f"{entry.name}_contact", self.added, vec.zero(self.graph)
+        if name in self.bodies:
+            message = f"the contact point needs a body named {name!r}, and there is one already"
+            self.faults.add(entry.path, message, "rename one of them", "EG-NAME-TAKEN")
+            return None
+        point = Marker(len(self.mass_data) + len(bodies), Frame(self.identity, o), name)
+        coordinate = self.contacts[entry.path]
+        bodies.append(Body(name, self.graph.zero, o, (o, o, o)))
+        joints.append(JointSpec(name, JOINTS["revolute"](), cam, point, (coordinate,), False))
+        return point, self.graph.symbol(coordinate)

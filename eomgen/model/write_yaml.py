@@ -54,10 +54,7 @@ def with_named_markers(description: Description) -> Description:
         return expression.xreplace(named_symbols)
 
     for name, entries in sections.items():
-        sections[name] = [
-            DescribedEntry(entry.name, with_sympy(entry.values, put), entry.path, entry.trusted, entry.folder)
-            for entry in entries
-        ]
+        sections[name] = [replace(entry, values=with_sympy(entry.values, put)) for entry in entries]
     values = with_sympy(description.values, put)
     return Description(values=values, sections=sections, notes=description.notes, renamed=description.renamed)
 
@@ -77,13 +74,7 @@ def _give_name(bodies: list[DescribedEntry], reference: Mapping[str, Any]) -> st
     while f"marker_{k}" in taken:
         k += 1
     placed = {key: value for key, value in reference.items() if key != "body"}
-    bodies[place] = DescribedEntry(
-        entry.name,
-        {**entry.values, "markers": [*listed, (f"marker_{k}", placed)]},
-        entry.path,
-        entry.trusted,
-        entry.folder,
-    )
+    bodies[place] = replace(entry, values={**entry.values, "markers": [*listed, (f"marker_{k}", placed)]})
     return f"{body}.marker_{k}"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
 
 import numpy as np
 
@@ -107,10 +106,10 @@ def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) 
 class CamLift(Constraint):
     """The follower's coordinate is a given function of the cam's: s = lift(theta - phase)."""
 
-    sentence: ClassVar[str] = "The coordinate of the follower is a given function of the angle of the cam."
-    formula: ClassVar[str] = r"s = f(\theta - \theta_0)"
-    type_name: ClassVar[str] = "cam"
-    written: ClassVar[bool] = True
+    sentence = "The coordinate of the follower is a given function of the angle of the cam."
+    formula = r"s = f(\theta - \theta_0)"
+    type_name = "cam"
+    written = True
     cam: Expr
     follower: Expr
     lift: Profile
@@ -128,9 +127,9 @@ class CamLift(Constraint):
 class KnifeContact(Constraint):
     """The follower marker's origin lies on the contour: |p| = r(theta of p), p in the cam's axes."""
 
-    sentence: ClassVar[str] = "The tip of the follower lies on the contour of the cam."
-    formula: ClassVar[str] = r"|\mathbf{p}| = r(\theta)"
-    type_name: ClassVar[str] = "cam_knife_edge"
+    sentence = "The tip of the follower lies on the contour of the cam."
+    formula = r"|\mathbf{p}| = r(\theta)"
+    type_name = "cam_knife_edge"
     cam: Marker
     follower: Marker
     contour: Profile
@@ -151,9 +150,9 @@ class FlatSupport(Constraint):
     axis to the tangent whose outward normal points to theta (for a convex cam h + h'' > 0 is its radius of curvature).
     """
 
-    sentence: ClassVar[str] = r"A flat face with the normal $\mathbf{n}$ touches the cam."
-    formula: ClassVar[str] = r"\mathbf{n}^T \mathbf{p} = h(\theta)"
-    type_name: ClassVar[str] = "cam_support"
+    sentence = r"A flat face with the normal $\mathbf{n}$ touches the cam."
+    formula = r"\mathbf{n}^T \mathbf{p} = h(\theta)"
+    type_name = "cam_support"
     cam: Marker
     follower: Marker
     support: Profile
@@ -179,8 +178,8 @@ class _Contact(Constraint):
     ``point`` is fixed to a body without mass that turns about the cam's axis by that angle.
     """
 
-    sentence: ClassVar[str] = "The follower touches the contour of the cam at the polar angle $\theta$."
-    formula: ClassVar[str] = r"\mathbf{p} = r(\theta) \mathbf{e}_r"
+    sentence = "The follower touches the contour of the cam at the polar angle $\theta$."
+    formula = r"\mathbf{p} = r(\theta) \mathbf{e}_r"
     cam: Marker
     follower: Marker
     contour: Profile
@@ -208,7 +207,7 @@ class _Contact(Constraint):
 class RollerContact(_Contact):
     """A roller of radius R whose centre is the follower's marker: p = r e_r + R n."""
 
-    type_name: ClassVar[str] = "cam_roller"
+    type_name = "cam_roller"
     radius: Expr
 
     def drawn(self) -> list[Seen]:
@@ -235,7 +234,7 @@ class FlatContact(_Contact):
     = 0; of the two sides of the cam, the one that n points out of.
     """
 
-    type_name: ClassVar[str] = "cam_flat_face"
+    type_name = "cam_flat_face"
 
     def drawn(self) -> list[Seen]:
         return [_polar(self.cam, self.contour, self.follower, face=True)]
@@ -310,7 +309,7 @@ def _cam_contact(e: Entry) -> Constraint | None:
         return FlatSupport(e.name, axis, follower, profile)
     if shape == "knife_edge":
         return KnifeContact(e.name, axis, follower, profile)
-    contact = e.contact_point(axis)
+    contact: tuple[Marker, Expr] | None = e.reader.contact_point(e, axis)
     if contact is None:
         return None
     if shape == "roller":

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from ...base.records import dataclass
 from ...expr.core import Expr, is_comparison, symbols_of
 from ...expr.differentiate import gradient
-from ..element_type import ElementType, Entry, table
+from ..element_type import ElementType, Entry, Meaning, table
 from ..kinds import OUTPUT, Factors, Scalar
 from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
 
@@ -31,10 +29,10 @@ _UNUSABLE = {
 class Linear(Constraint):
     """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
 
-    sentence: ClassVar[str] = "A linear relation between coordinates."
-    formula: ClassVar[str] = r"\Sigma_k c_k q_k = c_0"
-    type_name: ClassVar[str] = "linear"
-    written: ClassVar[bool] = True
+    sentence = "A linear relation between coordinates."
+    formula = r"\Sigma_k c_k q_k = c_0"
+    type_name = "linear"
+    written = True
     terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
     offset: Expr
     kind: str
@@ -50,10 +48,10 @@ class Linear(Constraint):
 class Equation(Constraint):
     """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
 
-    sentence: ClassVar[str] = "An equation that the model gives."
-    formula: ClassVar[str] = r"C = 0"
-    type_name: ClassVar[str] = "equation"
-    written: ClassVar[bool] = True
+    sentence = "An equation that the model gives."
+    formula = r"C = 0"
+    type_name = "equation"
+    written = True
     expression: Expr
     kind: str
     level: str
@@ -77,7 +75,7 @@ def _equation(e: Entry) -> Equation | None:
     expression = e["equation"]
     if is_comparison(expression):
         e.fault("equation", *NO_EQUATION)
-    used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
+    used: dict[str, Meaning] = {name: e.reader.meaning(name) for name in sorted(symbols_of([expression]))}
     for name, meant in used.items():
         if meant.level == 2:
             what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)

@@ -7,7 +7,6 @@ Mechanical Systems, sec. 3.5); velocity and acceleration follow from the derivat
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
@@ -28,8 +27,8 @@ ROUGH = ("monotone",)
 class Driver(Constraint):
     """A measure that follows ``value``, an expression of t and parameters; its row is called ``<name>.motion``."""
 
-    sentence: ClassVar[str] = "A measure $s$ of the motion follows a given function of time."
-    formula: ClassVar[str] = r"s - f(t) = 0"
+    sentence = "A measure $s$ of the motion follows a given function of time."
+    formula = r"s - f(t) = 0"
     value: Expr
 
     @abstractmethod
@@ -45,7 +44,7 @@ class Driver(Constraint):
 class CoordinateDriver(Driver):
     """The coordinate of a joint."""
 
-    type_name: ClassVar[str] = "driver"
+    type_name = "driver"
     coordinate: Expr
     kind: str
 
@@ -64,7 +63,7 @@ class CoordinateDriver(Driver):
 class DistanceDriver(Driver):
     """The distance between the origins of two markers, which must not meet."""
 
-    type_name: ClassVar[str] = "driver_distance"
+    type_name = "driver_distance"
     start: Marker
     end: Marker
 
@@ -77,7 +76,7 @@ class DistanceDriver(Driver):
 class PlaceDriver(Driver):
     """The place of a marker's origin along ``axis``, a unit vector in the axes of marker ``on``, from its origin."""
 
-    type_name: ClassVar[str] = "driver_place"
+    type_name = "driver_place"
     marker: Marker
     axis: Vec3
     on: Marker
@@ -90,7 +89,7 @@ class PlaceDriver(Driver):
 class AngleDriver(Driver):
     """The turn of one marker about the z axis of another; the two z axes stay in line."""
 
-    type_name: ClassVar[str] = "driver_angle"
+    type_name = "driver_angle"
     start: Marker
     end: Marker
 
@@ -129,13 +128,13 @@ def _value(e: Entry) -> Expr:
     value: Expr = e["value"]
     graph = e.graph
     for name in sorted(symbols_of([value])):
-        kind = e.meaning(name).kind
+        kind = e.reader.meaning(name).kind
         if kind not in ("", "time", "parameter", "input"):
             remedy = "a driver's value can contain t, parameters and inputs; a coupling relates coordinates"
             e.fault("value", f"the {kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")
     called = {graph.nodes[i][0] for i in reachable(graph, [value.id])} & graph.calls.keys()
     for function, orders in (graph.calls[operation] for operation in sorted(called)):
-        table_kind = e.table_kind(function.name)
+        table_kind = e.reader.table_kind(function.name)
         if table_kind is not None and (table_kind in ROUGH or any(orders)):
             derived = f"of the derivative of table {function.name!r}"
             what = derived if any(orders) else f"of {table_kind} table {function.name!r}"

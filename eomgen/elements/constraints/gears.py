@@ -61,10 +61,10 @@ class Belt(Pair):
 class Rack(Constraint):
     """A pinion that rolls on a rack: s = r a + offset (Norton, Design of Machinery, sec. 9.3)."""
 
-    sentence: ClassVar[str] = "A pinion of radius $r$ rolls on a rack."
-    formula: ClassVar[str] = r"s = r a + s_0"
-    type_name: ClassVar[str] = "rack"
-    written: ClassVar[bool] = True
+    sentence = "A pinion of radius $r$ rolls on a rack."
+    formula = r"s = r a + s_0"
+    type_name = "rack"
+    written = True
     pinion: Expr
     rack: Expr
     radius: Expr

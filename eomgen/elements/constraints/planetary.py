@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import WHEELS as WHEELS_FIT
@@ -27,10 +26,10 @@ class Planetary(Constraint):
     has the angle 0; one whose radius is None is not there.
     """
 
-    sentence: ClassVar[str] = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
-    formula: ClassVar[str] = r"\frac{r_s \varphi_s + r_r \varphi_r}{r_s + r_r} = \varphi_c"
-    type_name: ClassVar[str] = "planetary"
-    written: ClassVar[bool] = True
+    sentence = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
+    formula = r"\frac{r_s \varphi_s + r_r \varphi_r}{r_s + r_r} = \varphi_c"
+    type_name = "planetary"
+    written = True
     sun: Expr
     ring: Expr
     carrier: Expr
@@ -41,12 +40,9 @@ class Planetary(Constraint):
     phase: Expr
 
     def drawn(self) -> list[Seen]:
-        if self.planet is None:
+        (r_s, r_r, r_p), found = self._radii(), list[Seen]()
+        if self.planet is None or r_p is None:
             return []
-        r_s, r_r, r_p = self._radii()
-        if r_p is None:
-            return []
-        found: list[Seen] = []
         if r_s is not None:
             found.append(PitchCircles(self.sun, self.planet, r_p / r_s, self.carrier))
         if r_r is not None:
@@ -61,20 +57,16 @@ class Planetary(Constraint):
         return r_s, r_r, r_p
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
-        r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
-        rows: list[Condition] = []
+        (r_s, r_r, r_p), rows = self._radii(), list[Condition]()
         if self.planet is None:
             if r_s is not None and r_r is not None:
                 mean = (r_s * self.sun + r_r * self.ring) / (r_s + r_r)
                 rows.append(Condition("ratio", mean - self.carrier - self.phase, "angle"))
             return rows
-        r_s, r_r, r_p = self._radii()
-        if r_p is None:
-            return rows
-        if r_s is not None:
+        if r_p is not None and r_s is not None:
             sun = r_s / r_p * (self.sun - self.carrier) + self.planet
             rows.append(Condition("sun_mesh", sun - self.phase, "angle"))
-        if r_r is not None:
+        if r_p is not None and r_r is not None:
             ring = r_r / r_p * (self.ring - self.carrier) - self.planet
             rows.append(Condition("ring_mesh", ring, "angle"))
         return rows
@@ -117,7 +109,7 @@ def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
     if "planet" not in parts:
         return None
     planet, base = e.symbol(parts["planet"]), e.carrier(parts["planet"])
-    if base is None or "carrier" not in parts or base == e.carried(parts["carrier"]):
+    if base is None or "carrier" not in parts or base == e.carrier(parts["carrier"], "successor"):
         return planet
     if base == e.carrier(parts["carrier"]):
         return planet - carrier

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import POSITIVE, SUPPORT
@@ -53,8 +52,8 @@ LYING = "the disc lies flat (axle along the plane's normal)"
 class Rolling(Constraint):
     """A body that rolls on the x-y plane of marker ``plane``, on the side to which its z axis points."""
 
-    sentence: ClassVar[str] = "The body touches the plane, and the point of contact does not slide."
-    formula: ClassVar[str] = r"\mathbf{v} + \boldsymbol{\omega} \times \mathbf{d} = \mathbf{0}"
+    sentence = "The body touches the plane, and the point of contact does not slide."
+    formula = r"\mathbf{v} + \boldsymbol{\omega} \times \mathbf{d} = \mathbf{0}"
     wheel: Marker  #: centre; its z axis is that of a disc
     plane: Marker
 
@@ -101,7 +100,7 @@ class RollingDisc(Wheeled):
     (radius - tube) s + tube above the plane.  The wheel may lean but not lie down (s > 0).
     """
 
-    type_name: ClassVar[str] = "rolling_disc"
+    type_name = "rolling_disc"
     tube: Expr
 
     def _lean(self, view: ConstraintView) -> tuple[Vec3, Vec3, Expr]:
@@ -130,7 +129,7 @@ class RollingDisc(Wheeled):
 class RollingSphere(Wheeled):
     """A ball about the marker's origin; with ``no_spin`` it does not turn about the normal either."""
 
-    type_name: ClassVar[str] = "rolling_sphere"
+    type_name = "rolling_sphere"
     no_spin: bool = False
 
     def height(self, view: ConstraintView) -> Expr:
@@ -154,9 +153,9 @@ class KnifeEdge(Constraint):
     The velocity is taken relative to the body of ``on`` (Chaplygin's sleigh; Neimark and Fufaev, ch. II).
     """
 
-    sentence: ClassVar[str] = r"The marker does not move along one of its axes $\mathbf{n}$."
-    formula: ClassVar[str] = r"\mathbf{n}^T \mathbf{v} = 0"
-    type_name: ClassVar[str] = "knife_edge"
+    sentence = r"The marker does not move along one of its axes $\mathbf{n}$."
+    formula = r"\mathbf{n}^T \mathbf{v} = 0"
+    type_name = "knife_edge"
     marker: Marker = key(MarkerReference("marker at the point where the blade touches", required=True))
     axis: Vec3 = key(Axis("direction in which the marker cannot move, in its own axes", default="y"))
     on: Marker = key(MarkerReference("the body on which the blade moves", default="ground"))
@@ -183,7 +182,7 @@ NORMAL = ("nx", "ny", "nz")  #: what a formula of a support calls the components
 class RollingConvex(Rolling):
     """A body whose support is a formula of the outward normal in the axes of marker ``wheel``, at its centre."""
 
-    type_name: ClassVar[str] = "rolling_convex"
+    type_name = "rolling_convex"
     support: Expr
     local: Vec3  #: symbols of the formula
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
@@ -73,9 +73,9 @@ class Hold(Constraint):
     It is held wherever it is: its velocity on the other body is 0, and with ``turning`` its angular velocity too.
     """
 
-    sentence: ClassVar[str] = "The marker does not move on the other body while it is held."
-    formula: ClassVar[str] = r"\mathbf{v}_b - \mathbf{v}_a = \mathbf{0}"
-    type_name: ClassVar[str] = "hold"
+    sentence = "The marker does not move on the other body while it is held."
+    formula = r"\mathbf{v}_b - \mathbf{v}_a = \mathbf{0}"
+    type_name = "hold"
     on: Marker
     marker: Marker
     axes: str
@@ -98,9 +98,9 @@ class Hold(Constraint):
 class Lock(Constraint):
     """A joint whose coordinates, or one of them, do not change: it is held wherever it is."""
 
-    sentence: ClassVar[str] = "The coordinates of the joint do not change while it is locked."
-    formula: ClassVar[str] = r"\dot{q}_k = 0"
-    type_name: ClassVar[str] = "lock"
+    sentence = "The coordinates of the joint do not change while it is locked."
+    formula = r"\dot{q}_k = 0"
+    type_name = "lock"
     velocities: tuple[tuple[str, Expr, str], ...]  #: label, the velocity, 'length' or 'angle'
 
     def conditions(self, view: ConstraintView) -> list[Condition]:

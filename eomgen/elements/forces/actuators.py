@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr
@@ -21,8 +19,8 @@ from .paths import ANYWHERE, ON_JOINT, PathForce, read_coordinate
 class Actuator(PathForce):
     """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
 
-    sentence: ClassVar[str] = "A given force or torque $F$ (`value`) along its path of length or angle $s$."
-    formula: ClassVar[str] = r"\delta W = F \delta s"
+    sentence = "A given force or torque $F$ (`value`) along its path of length or angle $s$."
+    formula = r"\delta W = F \delta s"
     value: Expr = key(
         Scalar(
             "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
@@ -51,8 +49,8 @@ _AXES = Choice("axes of the vector: ground, or the marker's own", default="groun
 class PointForce(Force):
     """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
 
-    sentence: ClassVar[str] = r"A given force $\mathbf{F}$ at the origin of a marker."
-    formula: ClassVar[str] = r"\delta W = \mathbf{F}^T \delta \mathbf{r}"
+    sentence = r"A given force $\mathbf{F}$ at the origin of a marker."
+    formula = r"\delta W = \mathbf{F}^T \delta \mathbf{r}"
     marker: Marker = key(MarkerReference("marker at whose origin the force acts", required=True))
     value: Vec3 = key(Vector("force (N)", required=True, level=LAW, dimension=FORCE))
     axes: str = key(_AXES)
@@ -69,8 +67,8 @@ class PointForce(Force):
 class BodyTorque(Force):
     """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
 
-    sentence: ClassVar[str] = r"A given torque $\mathbf{M}$ on a body."
-    formula: ClassVar[str] = r"\delta W = \mathbf{M}^T \delta \mathbf{\varphi}"
+    sentence = r"A given torque $\mathbf{M}$ on a body."
+    formula = r"\delta W = \mathbf{M}^T \delta \mathbf{\varphi}"
     marker: Marker
     value: Vec3
     axes: str = "ground"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt
@@ -33,8 +31,8 @@ class PointGravity(Force):
     The opposite wrench acts on the body of the centre; two bodies attract each other if mu = G times the mass there.
     """
 
-    sentence: ClassVar[str] = r"A body is attracted by a point at the distance $r$, with the parameter $\mu$ (`mu`)."
-    formula: ClassVar[str] = r"V = -\mu \frac{m}{r}"
+    sentence = r"A body is attracted by a point at the distance $r$, with the parameter $\mu$ (`mu`)."
+    formula = r"V = -\mu \frac{m}{r}"
     center: Marker
     body: Marker  #: at the centre of mass, in the body's axes
     mu: Expr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import Allowed
@@ -34,11 +33,11 @@ class Bushing(Force):
     its opposite at the same point on the first body.  K is symmetric; V = y^T K y / 2.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         r"A bushing: forces and torques proportional to the six displacements $\mathbf{y}$ and their "
         "rates."
     )
-    formula: ClassVar[str] = r"\mathbf{Q} = -\mathbf{K} \mathbf{y} - \mathbf{D} \dot{\mathbf{y}}"
+    formula = r"\mathbf{Q} = -\mathbf{K} \mathbf{y} - \mathbf{D} \dot{\mathbf{y}}"
     first: Marker
     second: Marker
     stiffness: Mat6 = key(

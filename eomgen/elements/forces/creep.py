@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE
@@ -34,11 +33,9 @@ class Creep(Force):
       (2000), 728-739).
     """
 
-    sentence: ClassVar[str] = (
-        "A rolling wheel creeps on its track; $\\xi$ are its velocities divided by the speed of rolling."
-    )
-    formula: ClassVar[str] = r"F_x = -f_{11} \xi_x, \quad F_y = -f_{22} \xi_y - f_{23} \varphi"
-    not_finite_where: ClassVar[str] = "its speed of rolling is 0: give it a speed that does not vanish at rest"
+    sentence = "A rolling wheel creeps on its track; $\\xi$ are its velocities divided by the speed of rolling."
+    formula = r"F_x = -f_{11} \xi_x, \quad F_y = -f_{22} \xi_y - f_{23} \varphi"
+    not_finite_where = "its speed of rolling is 0: give it a speed that does not vanish at rest"
     track: Marker  #: x along it, z its normal, to the side of the wheel
     wheel: Marker  #: on the axle
     radius: Expr = key(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 from ...base.records import dataclass
 from ...base.value_rules import NOT_NEGATIVE
@@ -58,12 +58,12 @@ class ReactionFriction(Force):
     times the ``radius`` of the pin, and ``thrust_radius`` times the size of the reaction along the axis is added.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "Friction in a joint that grows with the force $N$ the joint carries: it opposes the rate $v$ of the "
         "coordinate; $v_s$ smooths its change of sign."
     )
-    formula: ClassVar[str] = r"F = -\left(c(v) + \mu(v) N\right) \mathrm{tanh}(v/v_s) - b v"
-    by_reaction: ClassVar[bool] = True
+    formula = r"F = -\left(c(v) + \mu(v) N\right) \mathrm{tanh}(v/v_s) - b v"
+    by_reaction = True
     path: Path
     law: Friction
     joint: str
@@ -172,7 +172,7 @@ class JointFriction(PathForce):
     depend on the joint's reactions; :class:`~.friction.ReactionFriction` does.
     """
 
-    sentence: ClassVar[str] = "Friction in a joint: it opposes the rate $v$ of the coordinate."
+    sentence = "Friction in a joint: it opposes the rate $v$ of the coordinate."
     law: LineFriction
 
     @property

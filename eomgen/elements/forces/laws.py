@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
 
 from ...base.records import dataclass
 from ...expr.core import Expr, substitute
@@ -24,11 +23,9 @@ class GeneralElement(PathForce):
     law for the path's.  Only the potential V(value) counts as energy; the law is taken as it is, conservative or not.
     """
 
-    sentence: ClassVar[str] = (
-        "A law of the model gives the force along the path from its length or angle $s$ and the rate."
-    )
-    formula: ClassVar[str] = r"F = f(s,\dot{s})"
-    uses_value: ClassVar[bool] = True
+    sentence = "A law of the model gives the force along the path from its length or angle $s$ and the rate."
+    formula = r"F = f(s,\dot{s})"
+    uses_value = True
     value: Expr
     rate: Expr
     law: Expr

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from ...base.records import dataclass
 from ...base.value_rules import Allowed
@@ -79,12 +79,12 @@ class Muscle(PathForce):
     state or any expression; an elastic tendon is outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "A muscle with a rigid tendon pulls the ends of its path together; $a$ is the activation, $l$ and "
         r"$\dot{l}$ the length of its fibres and its rate, normalised."
     )
-    formula: ClassVar[str] = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
-    uses_value: ClassVar[bool] = True
+    formula = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
+    uses_value = True
     activation: Expr
     force_max: Expr
     fiber_length: Expr

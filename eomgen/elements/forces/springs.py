@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr
@@ -22,12 +20,12 @@ class Spring(PathForce):
     The law is conservative while k and s0 depend on parameters only, which the description checks.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "A linear spring: its force along its path of length or angle $s$ is proportional to the stretch "
         "from $s_0$ (`rest`), with the stiffness $k$."
     )
-    formula: ClassVar[str] = r"F = -k (s - s_0), \quad V = \frac{1}{2} k (s - s_0)^2"
-    uses_value: ClassVar[bool] = True
+    formula = r"F = -k (s - s_0), \quad V = \frac{1}{2} k (s - s_0)^2"
+    uses_value = True
     stiffness: Expr = key(Scalar("stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS))
     rest: Expr = key(Scalar("value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH))
 
@@ -58,11 +56,11 @@ class Spring(PathForce):
 class Damper(PathForce):
     """Viscous damper: generalized force -c s' along the path (c in N s/m or N m s/rad)."""
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "A viscous damper: its force along its path is proportional to the rate of the length or angle $s$, "
         "with the factor $c$ (`damping`)."
     )
-    formula: ClassVar[str] = r"F = -c \dot{s}"
+    formula = r"F = -c \dot{s}"
     damping: Expr = key(Scalar("damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING))
 
     def push(self, value: Expr, rate: Expr) -> Expr:

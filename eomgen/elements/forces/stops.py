@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from ...base.records import dataclass
 from ...base.value_rules import POSITIVE
 from ...expr.core import Expr
@@ -23,10 +21,8 @@ class JointStop(PathForce):
     Penetrations are q - upper and lower - q.  A stop never pulls.
     """
 
-    sentence: ClassVar[str] = (
-        "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
-    )
-    uses_value: ClassVar[bool] = True
+    sentence = "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
+    uses_value = True
     lower: Expr | None
     upper: Expr | None
     law: NormalLaw

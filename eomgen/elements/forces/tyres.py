@@ -275,7 +275,7 @@ class Tyre(Force):
     spin, too.  The way of the wheel, tanh(V_x / reversal), tells the laws whether it rolls forwards or backwards.
     """
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "A tyre on a road: load from its penetration, forces in the plane of the road from slips that build up over "
         "relaxation lengths."
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
@@ -68,14 +67,15 @@ class Guide(Joint):
     joint of the loop is cut.  Singular where the derivatives of r by its parameters vanish or are parallel.
     """
 
-    role: ClassVar[str] = "tree"
-    has_axis: ClassVar[bool] = False
-    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
+    role = "tree"
+    has_axis = False
+    look = JointLook((SymbolPart("sphere", (1.0,)),))
 
     @property
-    @abstractmethod
     def shape(self) -> Shape:
         """The point r and its parameters."""
+        found: Shape = getattr(self, next(iter(self.options)))
+        return found
 
     def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
         """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""
@@ -120,34 +120,26 @@ class TurningGuide(Guide):
 class CurveSlider(Guide):
     """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "The origin of S slides along a curve of P without turning; the coordinate is the parameter of the curve."
     )
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
-    type_name: ClassVar[str] = "curve_slider"
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
+    type_name = "curve_slider"
+    coordinates = (Coordinate("", "length"),)
     curve: Shape = key(CURVE)
-
-    @property
-    def shape(self) -> Shape:
-        return self.curve
 
 
 @dataclass(frozen=True)
 class SurfaceSlider(Guide):
     """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
 
-    sentence: ClassVar[str] = (
+    sentence = (
         "The origin of S slides on a surface of P without turning; the coordinates are the parameters of the surface."
     )
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
-    type_name: ClassVar[str] = "surface_slider"
-    coordinates: ClassVar[tuple[Coordinate, ...]] = ON_SURFACE
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
+    type_name = "surface_slider"
+    coordinates = ON_SURFACE
     surface: Shape = key(SURFACE)
-
-    @property
-    def shape(self) -> Shape:
-        return self.surface
 
 
 @dataclass(frozen=True)
@@ -157,29 +149,21 @@ class PointOnCurve(TurningGuide):
     A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
     """
 
-    sentence: ClassVar[str] = "The origin of S slides along a curve of P, and S turns freely."
-    formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1)"
-    type_name: ClassVar[str] = "point_on_curve"
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (*ALONG_CURVE, *ANGLES)
+    sentence = "The origin of S slides along a curve of P, and S turns freely."
+    formula = r"\mathbf{u} = \mathbf{r}(q_1)"
+    type_name = "point_on_curve"
+    coordinates = (*ALONG_CURVE, *ANGLES)
     curve: Shape = key(CURVE)
     sequence: str = key(SEQUENCE)
-
-    @property
-    def shape(self) -> Shape:
-        return self.curve
 
 
 @dataclass(frozen=True)
 class PointOnSurface(TurningGuide):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = "The origin of S slides on a surface of P, and S turns freely."
-    formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
-    type_name: ClassVar[str] = "point_on_surface"
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (*ON_SURFACE, *ANGLES)
+    sentence = "The origin of S slides on a surface of P, and S turns freely."
+    formula = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
+    type_name = "point_on_surface"
+    coordinates = (*ON_SURFACE, *ANGLES)
     surface: Shape = key(SURFACE)
     sequence: str = key(SEQUENCE)
-
-    @property
-    def shape(self) -> Shape:
-        return self.surface

@@ -92,6 +92,8 @@ class Joint(ABC):
     has_axes : whether ``axes=``, directions of x and y, is accepted instead
     options : further keys of this type: the fields that :func:`~eomgen.elements.element_type.key` marks
     coordinates : the coordinates, in order
+    held : axes of P along which the origin of S stays at that of P
+    kept : axes of S that stay parallel to those of P: '', 'z' or 'xyz'
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
@@ -110,6 +112,8 @@ class Joint(ABC):
     counts_turns: ClassVar[bool] = False
     options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
+    held = ""
+    kept = ""
     quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
     look: ClassVar[JointLook] = JointLook()
 
@@ -141,9 +145,11 @@ class Joint(ABC):
     def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
         """One (angular, linear) column per velocity: the relative twist is the sum of column times velocity."""
 
-    @abstractmethod
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         """Equations that hold the relative pose to what the joint allows, when a loop is closed by it."""
+        rows = [Closure(f"r_{axis}", position[AXES[axis]], "length") for axis in self.held]
+        turns = (("z.x", rotation[0][2]), ("z.y", rotation[1][2]), ("x.y", rotation[1][0]))
+        return rows + [Closure(*turn, "angle") for turn in turns[: {"": 0, "z": 2, "xyz": 3}[self.kept]]]
 
     @abstractmethod
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
@@ -155,28 +161,7 @@ class Joint(ABC):
 
     def aligned(self, rotation: Mat3) -> list[Expr]:
         """Expressions that must be positive: the closure equations alone also admit anti-parallel axes."""
-        return []
-
-
-# -- closure conditions ------------------------------------------------------------------------------------------------
-
-
-def along(position: Vec3, letters: str) -> list[Closure]:
-    """The components of S's origin along these axes of P vanish."""
-    return [Closure(f"r_{letter}", position[AXES[letter]], "length") for letter in letters]
-
-
-def parallel_axes(rotation: Mat3) -> list[Closure]:
-    """The z axes are parallel: z_S . x_P = z_S . y_P = 0."""
-    return [
-        Closure("z.x", rotation[0][2], "angle"),
-        Closure("z.y", rotation[1][2], "angle"),
-    ]
-
-
-def same_orientation(rotation: Mat3) -> list[Closure]:
-    """All axes are parallel: z_S . x_P = z_S . y_P = x_S . y_P = 0."""
-    return [*parallel_axes(rotation), Closure("x.y", rotation[1][0], "angle")]
+        return [rotation[axis][axis] for axis in {"": (), "z": (2,), "xyz": (0, 2)}[self.kept]]
 
 
 # -- rotation coordinates ----------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
@@ -22,93 +22,91 @@ from .joint import (
     Joint,
     QuaternionSlot,
     about,
-    along,
     euler,
     euler_angles,
     euler_rates,
-    parallel_axes,
     parameter_rotation,
-    same_orientation,
     unit,
 )
+
+# -- axes that stay parallel -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class AxisJoint(Joint):
+    """S slides along the axes that are not held, and turns about z where all axes are not kept parallel.
+
+    The coordinates are the lengths in the order x, y, z, then the angle.
+    """
+
+    def _free(self, three: Sequence[Vec3] | Vec3) -> list[Any]:
+        return [one for axis, one in zip("xyz", three, strict=True) if axis not in self.held]
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        lengths = iter(q)
+        x, y, z = (graph.zero if axis in self.held else next(lengths) for axis in "xyz")
+        return about(graph, 2, q[-1]) if self.kept == "z" else vec.identity(graph), (x, y, z)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        o = vec.zero(graph)
+        columns = [(o, row) for row in self._free(self.pose(graph, q)[0])]  # R^T e_k is row k of R
+        return columns + [(unit(graph, 2), o)] * (self.kept == "z")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return self._free(position) + ([atan2(rotation[1][0], rotation[0][0])] if self.kept == "z" else [])
+
 
 # -- one degree of freedom ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Revolute(Joint):
+class Revolute(AxisJoint):
     """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
-    sentence: ClassVar[str] = "S turns about the axis {z} that it shares with P; the origins coincide."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
-    type_name: ClassVar[str] = "revolute"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return about(graph, 2, q[0]), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(unit(graph, 2), vec.zero(graph))]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xyz") + parallel_axes(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [atan2(rotation[1][0], rotation[0][0])]
+    sentence = "S turns about the axis {z} that it shares with P; the origins coincide."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
+    type_name = "revolute"
+    look = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
+    coordinates = (Coordinate("", "angle"),)
+    held = "xyz"
+    kept = "z"
 
 
 @dataclass(frozen=True)
 class Continuous(Revolute):
     """A revolute joint without limits, as URDF calls it.  Allows 1, removes 5."""
 
-    type_name: ClassVar[str] = "continuous"
+    type_name = "continuous"
 
 
 @dataclass(frozen=True)
-class Prismatic(Joint):
+class Prismatic(AxisJoint):
     """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
-    sentence: ClassVar[str] = "S slides along the axis {z} that it shares with P, without turning."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
-    type_name: ClassVar[str] = "prismatic"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return vec.identity(graph), (graph.zero, graph.zero, q[0])
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(vec.zero(graph), unit(graph, 2))]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xy") + same_orientation(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[0][0], rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [position[2]]
+    sentence = "S slides along the axis {z} that it shares with P, without turning."
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
+    type_name = "prismatic"
+    look = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
+    coordinates = (Coordinate("", "length"),)
+    held = "xy"
+    kept = "xyz"
 
 
 @dataclass(frozen=True)
-class Screw(Joint):
+class Screw(AxisJoint):
     """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
 
     The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
     """
 
-    sentence: ClassVar[str] = "S turns about the common axis {z} and advances by the pitch $p$ in each turn."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_{z}"
-    type_name: ClassVar[str] = "screw"
-    look: ClassVar[JointLook] = JointLook(
-        (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True
-    )
-    counts_turns: ClassVar[bool] = True
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+    sentence = "S turns about the common axis {z} and advances by the pitch $p$ in each turn."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_{z}"
+    type_name = "screw"
+    look = JointLook((SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True)
+    counts_turns = True
+    coordinates = (Coordinate("", "angle"),)
+    held = "xy"
+    kept = "z"
     pitch: Expr = key(
         Scalar(
             "advance of S per turn (m), negative for a left-handed thread",
@@ -134,14 +132,11 @@ class Screw(Joint):
         turn = position[2] / self.lead
         c, s = cos(turn), sin(turn)
         off = atan2(c * rotation[1][0] - s * rotation[0][0], c * rotation[0][0] + s * rotation[1][0])
-        return [*along(position, "xy"), *parallel_axes(rotation), Closure("thread", self.lead * off, "length")]
+        return [*super().closure(graph, rotation, position), Closure("thread", self.lead * off, "length")]
 
     def closure_in_turns(self, graph: Graph, rotation: Mat3, position: Vec3, turn: Expr) -> list[Closure]:
         thread = Closure("thread", position[2] - self.lead * turn, "length")
-        return [*along(position, "xy"), *parallel_axes(rotation), thread]
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[2][2]]
+        return [*super().closure(graph, rotation, position), thread]
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return [position[2] / self.lead]
@@ -151,118 +146,59 @@ class Screw(Joint):
 
 
 @dataclass(frozen=True)
-class Cylindrical(Joint):
+class Cylindrical(AxisJoint):
     """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
-    sentence: ClassVar[str] = "S slides along the common axis {z} and turns about it."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
-    type_name: ClassVar[str] = "cylindrical"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return about(graph, 2, q[1]), (graph.zero, graph.zero, q[0])
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(vec.zero(graph), unit(graph, 2)), (unit(graph, 2), vec.zero(graph))]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xy") + parallel_axes(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [position[2], atan2(rotation[1][0], rotation[0][0])]
+    sentence = "S slides along the common axis {z} and turns about it."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
+    type_name = "cylindrical"
+    look = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
+    coordinates = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
+    held = "xy"
+    kept = "z"
 
 
 @dataclass(frozen=True)
-class Planar(Joint):
+class Planar(AxisJoint):
     """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
-    sentence: ClassVar[str] = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
-    formula: ClassVar[str] = (
-        r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
-    )
-    type_name: ClassVar[str] = "planar"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+    sentence = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
+    type_name = "planar"
+    look = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
+    coordinates = (
         Coordinate("_x", "length"),
         Coordinate("_y", "length"),
         Coordinate("_3", "angle"),
     )
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return about(graph, 2, q[2]), (q[0], q[1], graph.zero)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        turn = about(graph, 2, q[2])
-        o = vec.zero(graph)
-        return [(o, turn[0]), (o, turn[1]), (unit(graph, 2), o)]  # R^T e_k is row k of R
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "z") + parallel_axes(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [position[0], position[1], atan2(rotation[1][0], rotation[0][0])]
+    held = "z"
+    kept = "z"
 
 
 @dataclass(frozen=True)
-class Translational(Joint):
+class Translational(AxisJoint):
     """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
-    sentence: ClassVar[str] = "S slides along the three axes of P without turning."
-    formula: ClassVar[str] = (
-        r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
-    )
-    type_name: ClassVar[str] = "translational"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
-    has_axis: ClassVar[bool] = False
-    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return vec.identity(graph), (q[0], q[1], q[2])
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(vec.zero(graph), unit(graph, k)) for k in range(3)]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return same_orientation(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[0][0], rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return list(position)
+    sentence = "S slides along the three axes of P without turning."
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
+    type_name = "translational"
+    look = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
+    has_axis = False
+    coordinates = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
+    kept = "xyz"
 
 
 @dataclass(frozen=True)
-class Weld(Joint):
+class Weld(AxisJoint):
     """S is fixed to P.  Allows 0, removes 6."""
 
-    sentence: ClassVar[str] = "S is fixed to P."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"
-    type_name: ClassVar[str] = "weld"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
-    has_axis: ClassVar[bool] = False
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return vec.identity(graph), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return []
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xyz") + same_orientation(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[0][0], rotation[2][2]]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return []
+    sentence = "S is fixed to P."
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"
+    type_name = "weld"
+    look = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
+    has_axis = False
+    held = "xyz"
+    kept = "xyz"
 
 
 # -- two angles between shafts -----------------------------------------------------------------------------------------
@@ -278,14 +214,13 @@ class Universal(Joint):
     R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
     """
 
-    sentence: ClassVar[str] = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
-    type_name: ClassVar[str] = "universal"
-    look: ClassVar[JointLook] = JointLook(
-        (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
-    )
-    coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
-    has_axes: ClassVar[bool] = True
+    sentence = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
+    type_name = "universal"
+    look = JointLook((SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y")))
+    coordinates = TWO_ANGLES
+    held = "xyz"
+    has_axes = True
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
         return euler(graph, "xy", q), vec.zero(graph)
@@ -294,7 +229,7 @@ class Universal(Joint):
         return [(g, vec.zero(graph)) for g in euler_rates(graph, "xy", q)]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return [*along(position, "xyz"), Closure("x.y", rotation[0][1], "angle")]
+        return [*super().closure(graph, rotation, position), Closure("x.y", rotation[0][1], "angle")]
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return [atan2(rotation[2][1], rotation[1][1]), atan2(rotation[0][2], rotation[0][0])]
@@ -310,13 +245,12 @@ class ConstantVelocity(Joint):
     1978, sec. 13.2: constant-velocity connections).  The shafts are the z axes; a bend of half a turn is singular.
     """
 
-    sentence: ClassVar[str] = (
-        "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
-    )
-    formula: ClassVar[str] = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
-    type_name: ClassVar[str] = "constant_velocity"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
-    coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
+    sentence = "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
+    formula = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
+    type_name = "constant_velocity"
+    look = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
+    coordinates = TWO_ANGLES
+    held = "xyz"
 
     def _angles(self, q: Sequence[Expr]) -> tuple[Expr, Expr, Expr]:
         return 0.5 * q[0], q[1], 0.5 * q[0]
@@ -330,7 +264,8 @@ class ConstantVelocity(Joint):
         return [(vec.scale(graph.constant(0.5), vec.add(first, third)), o), (second, o)]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return [*along(position, "xyz"), Closure("x.y", rotation[1][0] - rotation[0][1], "angle")]  # 4 e0 e3
+        bend = Closure("x.y", rotation[1][0] - rotation[0][1], "angle")  # 4 e0 e3
+        return [*super().closure(graph, rotation, position), bend]
 
     def aligned(self, rotation: Mat3) -> list[Expr]:
         return [rotation[0][0] + rotation[1][1]]  # 2 (e0^2 - e3^2): it is e3 that vanishes, not e0
@@ -365,7 +300,7 @@ class RotatingJoint(Joint):
     velocities are the components of the angular velocity of S relative to P in S axes.
     """
 
-    has_axis: ClassVar[bool] = False
+    has_axis = False
     place: ClassVar[tuple[Coordinate, ...]] = ()
     sequence: str = key(SEQUENCE)
     rotation: str = key(ROTATION)
@@ -381,67 +316,46 @@ class RotatingJoint(Joint):
         """Whether the rotation is described by Euler parameters."""
         return self.rotation == "euler_parameters"
 
-    def turn(self, graph: Graph, q: Sequence[Expr]) -> Mat3:
-        """The rotation of S in P; q without the place."""
-        return parameter_rotation(graph, q) if self.in_parameters else euler(graph, self.sequence, q)
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        n = len(self.place)
+        turn = parameter_rotation(graph, q[n:]) if self.in_parameters else euler(graph, self.sequence, q[n:])
+        return turn, (q[0], q[1], q[2]) if n else vec.zero(graph)
 
-    def turns(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        """Columns of the angular velocity; constant for Euler parameters."""
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        """Columns of the angular velocity are constant for Euler parameters."""
+        n, o, places = len(self.place), vec.zero(graph), list[tuple[Vec3, Vec3]]()
+        if n:
+            places = [(o, row) for row in self.pose(graph, q)[0]]
         if self.in_parameters:
-            return [(unit(graph, k), vec.zero(graph)) for k in range(3)]
-        return [(g, vec.zero(graph)) for g in euler_rates(graph, self.sequence, q)]
+            return places + [(unit(graph, k), o) for k in range(3)]
+        return places + [(g, o) for g in euler_rates(graph, self.sequence, q[n:])]
 
-    def turned(self, graph: Graph, rotation: Mat3) -> list[Expr]:
-        """The coordinates of a rotation."""
-        if self.in_parameters:
-            return [*euler_parameters_from_matrix(rotation)]
-        return euler_angles(graph, self.sequence, rotation)
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        parameters = self.in_parameters
+        turn = euler_parameters_from_matrix(rotation) if parameters else euler_angles(graph, self.sequence, rotation)
+        return [*position[: len(self.place)], *turn]
 
 
 @dataclass(frozen=True)
 class Spherical(RotatingJoint):
     """S turns freely about the common origin.  Allows 3, removes 3."""
 
-    sentence: ClassVar[str] = "S turns about its origin, which stays at the origin of P."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
-    type_name: ClassVar[str] = "spherical"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
-    coordinates: ClassVar[tuple[Coordinate, ...]] = ANGLES
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return self.turn(graph, q), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return self.turns(graph, q)
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xyz")
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return self.turned(graph, rotation)
+    sentence = "S turns about its origin, which stays at the origin of P."
+    formula = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
+    type_name = "spherical"
+    look = JointLook((SymbolPart("sphere", (1.0,)),))
+    coordinates = ANGLES
+    held = "xyz"
 
 
 @dataclass(frozen=True)
 class Free(RotatingJoint):
     """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
 
-    sentence: ClassVar[str] = "S moves without hindrance: three displacements in the axes of P, then three rotations."
-    formula: ClassVar[str] = (
+    sentence = "S moves without hindrance: three displacements in the axes of P, then three rotations."
+    formula = (
         r"\mathbf{R}_{PS} = \mathbf{R}(q), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
     )
-    type_name: ClassVar[str] = "free"
-    place: ClassVar[tuple[Coordinate, ...]] = PLACE
-    coordinates: ClassVar[tuple[Coordinate, ...]] = PLACE + ANGLES
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return self.turn(graph, q[3:]), (q[0], q[1], q[2])
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        o = vec.zero(graph)
-        return [(o, row) for row in self.turn(graph, q[3:])] + self.turns(graph, q[3:])
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return []
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [*position, *self.turned(graph, rotation)]
+    type_name = "free"
+    place = PLACE
+    coordinates = PLACE + ANGLES

@@ -14,14 +14,14 @@ from ...expr.core import Expr, Graph
 from ...expr.vectors import Mat3, Vec3
 from ..element_type import key
 from ..looks import JointLook, SymbolPart
-from .joint import LENGTH, Closure, Joint, along, parallel_axes, same_orientation
+from .joint import LENGTH, Closure, Joint
 
 
 @dataclass(frozen=True)
 class RodJoint(Joint):
     """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
 
-    role: ClassVar[str] = "loop"
+    role = "loop"
     removes: ClassVar[int]
 
     @property
@@ -47,16 +47,12 @@ def apart(length: Expr, position: Vec3) -> Closure:
 class Distance(RodJoint):
     """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = (
-        "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
-    )
-    formula: ClassVar[str] = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
-    type_name: ClassVar[str] = "distance"
-    look: ClassVar[JointLook] = JointLook(
-        (SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True
-    )
-    has_axis: ClassVar[bool] = False
-    removes: ClassVar[int] = 1
+    sentence = "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
+    formula = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
+    type_name = "distance"
+    look = JointLook((SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True)
+    has_axis = False
+    removes = 1
     length: Expr = key(LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
@@ -67,73 +63,61 @@ class Distance(RodJoint):
 class RevoluteSpherical(RodJoint):
     """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
-    formula: ClassVar[str] = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
-    type_name: ClassVar[str] = "revolute_spherical"
-    look: ClassVar[JointLook] = JointLook(
-        (SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True
-    )
-    removes: ClassVar[int] = 2
+    sentence = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
+    formula = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
+    type_name = "revolute_spherical"
+    look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
+    removes = 2
+    held = "z"
     length: Expr = key(LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return [apart(self.length, position), *along(position, "z")]
+        return [apart(self.length, position), *super().closure(graph, rotation, position)]
 
 
 @dataclass(frozen=True)
 class Inline(RodJoint):
     """The origin of S stays on the axis {z} of P.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "The origin of S stays on the axis {z} of P."
-    formula: ClassVar[str] = r"u_{x} = 0, \quad u_{y} = 0"
-    type_name: ClassVar[str] = "inline"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
-    removes: ClassVar[int] = 2
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xy")
+    sentence = "The origin of S stays on the axis {z} of P."
+    formula = r"u_{x} = 0, \quad u_{y} = 0"
+    type_name = "inline"
+    look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
+    removes = 2
+    held = "xy"
 
 
 @dataclass(frozen=True)
 class Inplane(RodJoint):
     """The origin of S stays in the plane of P across the axis {z}.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = "The origin of S stays in the plane of P across the axis {z}."
-    formula: ClassVar[str] = r"u_{z} = 0"
-    type_name: ClassVar[str] = "inplane"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),))
-    removes: ClassVar[int] = 1
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "z")
+    sentence = "The origin of S stays in the plane of P across the axis {z}."
+    formula = r"u_{z} = 0"
+    type_name = "inplane"
+    look = JointLook((SymbolPart("sphere", (0.8,)),))
+    removes = 1
+    held = "z"
 
 
 @dataclass(frozen=True)
 class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "The axes {z} of P and S stay parallel."
-    formula: ClassVar[str] = (
-        r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
-    )
-    type_name: ClassVar[str] = "parallel"
-    removes: ClassVar[int] = 2
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return parallel_axes(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[2][2]]
+    sentence = "The axes {z} of P and S stay parallel."
+    formula = r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
+    type_name = "parallel"
+    removes = 2
+    kept = "z"
 
 
 @dataclass(frozen=True)
 class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = "The axes {z} of P and S stay perpendicular."
-    formula: ClassVar[str] = r"\mathbf{e}_{z}^P \cdot \mathbf{e}_{z}^S = 0"
-    type_name: ClassVar[str] = "perpendicular"
-    removes: ClassVar[int] = 1
+    sentence = "The axes {z} of P and S stay perpendicular."
+    formula = r"\mathbf{e}_{z}^P \cdot \mathbf{e}_{z}^S = 0"
+    type_name = "perpendicular"
+    removes = 1
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         return [Closure("z.z", rotation[2][2], "angle")]
@@ -143,14 +127,9 @@ class Perpendicular(RodJoint):
 class Orientation(RodJoint):
     """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
 
-    sentence: ClassVar[str] = "The axes of S stay parallel to those of P; the origins are free."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}"
-    type_name: ClassVar[str] = "orientation"
-    has_axis: ClassVar[bool] = False
-    removes: ClassVar[int] = 3
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return same_orientation(rotation)
-
-    def aligned(self, rotation: Mat3) -> list[Expr]:
-        return [rotation[0][0], rotation[2][2]]
+    sentence = "The axes of S stay parallel to those of P; the origins are free."
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}"
+    type_name = "orientation"
+    has_axis = False
+    removes = 3
+    kept = "xyz"

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from .quaternions import euler_parameters_from_matrix, multiply_quaternions
-from .scalars import Scalar, about, atan2, cos, entries, half, shaped, sin, sqrt, times, where_less
+from .scalars import Scalar, about, atan2, cos, entries, shaped, sin, sqrt, times, where_less
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -44,8 +44,8 @@ def euler_parameters_from_euler_angles(sequence: str, angles: Any) -> Any:
     """Euler parameters of intrinsic Euler angles (rad)."""
     result: Any = [1, 0, 0, 0]
     for axis, angle in zip(axes_of(sequence), entries(angles, 3, "Euler angles"), strict=True):
-        turn = [cos(half(angle)), 0, 0, 0]
-        turn[1 + axis] = sin(half(angle))
+        turn = [cos(angle / 2), 0, 0, 0]
+        turn[1 + axis] = sin(angle / 2)
         result = multiply_quaternions(result, turn)
     return result
 

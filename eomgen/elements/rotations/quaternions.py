@@ -16,7 +16,6 @@ from .scalars import (
     cos,
     dot,
     entries,
-    half,
     require_rotation,
     rows,
     shaped,
@@ -91,8 +90,8 @@ def euler_parameters_from_matrix(rotation: Any) -> Any:
 def euler_parameters_from_axis_angle(axis: Any, angle: Scalar) -> Any:
     """(cos a/2, n sin a/2) of a unit axis (3,) and an angle (rad)."""
     n = entries(axis, 3, "an axis")
-    s = sin(half(angle))
-    return shaped([cos(half(angle)), *(s * x for x in n)])
+    s = sin(angle / 2)
+    return shaped([cos(angle / 2), *(s * x for x in n)])
 
 
 def matrix_from_axis_angle(axis: Any, angle: Scalar) -> Any:
@@ -118,8 +117,8 @@ def euler_parameters_from_rotation_vector(vector: Any) -> Any:
     square = dot(v, v)
     angle = sqrt(where_less(square, SMALL, 1, square))  # kept away from 0, where the other branch is taken
     series = (1 - square / 24 + square * square / 1920) / 2
-    factor = where_less(square, SMALL, series, sin(half(angle)) / angle)
-    first = where_less(square, SMALL, 1 - square / 8 + square * square / 384, cos(half(angle)))
+    factor = where_less(square, SMALL, series, sin(angle / 2) / angle)
+    first = where_less(square, SMALL, 1 - square / 8 + square * square / 384, cos(angle / 2))
     return shaped([first, *(factor * x for x in v)])
 
 

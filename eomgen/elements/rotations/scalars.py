@@ -74,11 +74,6 @@ def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar]) -> list[list[Scalar]]:
     return times(z, times(y, x))
 
 
-def half(x: Scalar) -> Scalar:
-    """x / 2, exact in symbols."""
-    return x / 2
-
-
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
     """Scalar product of two vectors of any length."""
     total = a[0] * b[0]

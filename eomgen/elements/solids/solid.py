@@ -66,7 +66,7 @@ class Solid(ABC):
 class Box(Solid):
     """A rectangular block; edges along its axes."""
 
-    type_name: ClassVar[str] = "box"
+    type_name = "box"
     dimensions: ClassVar[Fields] = {"size": Vector("edges along x, y, z (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
@@ -82,7 +82,7 @@ class Box(Solid):
 class Ellipsoid(Solid):
     """An ellipsoid; half axes along its axes."""
 
-    type_name: ClassVar[str] = "ellipsoid"
+    type_name = "ellipsoid"
     dimensions: ClassVar[Fields] = {"semi_axes": Vector("half axes along x, y, z (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
@@ -98,7 +98,7 @@ class Ellipsoid(Solid):
 class Sphere(Solid):
     """A ball."""
 
-    type_name: ClassVar[str] = "sphere"
+    type_name = "sphere"
     dimensions: ClassVar[Fields] = {"radius": Scalar("radius (m)", required=True, dimension=LENGTH)}
 
     def content(self) -> Expr:
@@ -121,9 +121,9 @@ _RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
 class Cylinder(Solid):
     """A full circular cylinder, placed by its centre; of length 0 a disc (which needs a mass)."""
 
-    type_name: ClassVar[str] = "cylinder"
+    type_name = "cylinder"
     dimensions: ClassVar[Fields] = {"radius": _RADIUS, "length": _LENGTH}
-    has_axis: ClassVar[bool] = True
+    has_axis = True
 
     def content(self) -> Expr:
         r = self.length("radius")
@@ -139,13 +139,13 @@ class Cylinder(Solid):
 class Tube(Solid):
     """A hollow circular cylinder, placed by its centre."""
 
-    type_name: ClassVar[str] = "tube"
+    type_name = "tube"
     dimensions: ClassVar[Fields] = {
         "outer_radius": Scalar("outer radius (m)", required=True, dimension=LENGTH),
         "inner_radius": Scalar("inner radius (m)", required=True, dimension=LENGTH),
         "length": _LENGTH,
     }
-    has_axis: ClassVar[bool] = True
+    has_axis = True
 
     def content(self) -> Expr:
         a, b = self.length("outer_radius"), self.length("inner_radius")
@@ -162,10 +162,10 @@ class Tube(Solid):
 class Rod(Solid):
     """A thin straight rod, placed by its middle; ``line_density`` is its mass for each metre."""
 
-    type_name: ClassVar[str] = "rod"
+    type_name = "rod"
     dimensions: ClassVar[Fields] = {"length": _LENGTH}
-    has_axis: ClassVar[bool] = True
-    content_key: ClassVar[str] = "line_density"
+    has_axis = True
+    content_key = "line_density"
 
     def content(self) -> Expr:
         return self.length("length")
@@ -180,12 +180,12 @@ class Rod(Solid):
 class Cone(Solid):
     """A full circular cone, placed by the centre of its base, its apex along the axis."""
 
-    type_name: ClassVar[str] = "cone"
+    type_name = "cone"
     dimensions: ClassVar[Fields] = {
         "radius": Scalar("radius of the base (m)", required=True, dimension=LENGTH),
         "length": Scalar("height along the axis (m)", required=True, dimension=LENGTH),
     }
-    has_axis: ClassVar[bool] = True
+    has_axis = True
 
     def content(self) -> Expr:
         r = self.length("radius")
