@@ -67,7 +67,7 @@ class Entry:
 
     def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
         """Note a fault of one key, or of the entry as a whole (``""``)."""
-        self.reader.faults.add(self._at(key), message, remedy, code)
+        self.reader.fault(self._at(key), message, remedy, code)
 
     def missing(self, key: str, remedy: str) -> None:
         """Note that a key is missing."""

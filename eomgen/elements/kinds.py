@@ -552,7 +552,7 @@ class Factors(Rates):
             if found is not None:
                 if any(found.name == other.name for other, _ in terms):
                     remedy = "name it once, with the sum of its factors"
-                    reader.faults.add(f"{path}.{name}", f"{found.name!r} is named twice", remedy, "EG-CONFLICT")
+                    reader.fault(f"{path}.{name}", f"{found.name!r} is named twice", remedy, "EG-CONFLICT")
                 terms.append((found, own))
         return terms
 
@@ -728,9 +728,7 @@ CYLINDER: Fields = {
         "coefficient of friction of a rope or belt on it; give smoothing too", dimension=NONE, allowed=NOT_NEGATIVE
     ),
     "smoothing": Scalar(
-        "slip velocity (m/s) below which this friction is smoothed",
-        dimension=LENGTH.times(TIME, -1),
-        allowed=POSITIVE,
+        "slip velocity (m/s) below which this friction is smoothed", dimension=LENGTH.times(TIME, -1), allowed=POSITIVE
     ),
 }
 
@@ -754,7 +752,7 @@ class Via(Field):
             stop = self._stop(reader, f"{path}[{k}]", item)
             if isinstance(stop, WrapCylinder) and found and isinstance(found[-1], WrapCylinder):
                 remedy = "put a marker between the two cylinders"
-                reader.faults.add(f"{path}[{k}]", "follows another cylinder directly", remedy, "EG-CONFLICT")
+                reader.fault(f"{path}[{k}]", "follows another cylinder directly", remedy, "EG-CONFLICT")
             if stop is not None:
                 found.append(stop)
         return None if reader.faults.under(path) else found
@@ -836,7 +834,7 @@ class JointPair(Field):
             return None
         a, b = (reader.coordinate(f"{path}[{k}]", part, self.measure) for k, part in enumerate(parts))
         if a is not None and b is not None and a.name == b.name:
-            reader.faults.add(path, f"{a.name!r} is named twice", "name two different coordinates", "EG-CONFLICT")
+            reader.fault(path, f"{a.name!r} is named twice", "name two different coordinates", "EG-CONFLICT")
             return None
         return None if a is None or b is None else (a, b)
 

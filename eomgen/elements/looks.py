@@ -203,10 +203,7 @@ SPIRAL: tuple[Points, ...] = (
 #: the turning pot of a damper about an axis
 TURNING_DASHPOT: tuple[Points, ...] = (_arc(1.6, 20, 160, 12), _arc(2.2, 0, 180, 16))
 #: a round arrow: a motor or torque about an axis
-ROUND_ARROW: tuple[Points, ...] = (
-    _arc(2.1, -60, 170, 20),
-    ((-2.5, 0.95), (-2.07, 0.36), (-1.45, 0.75)),
-)
+ROUND_ARROW: tuple[Points, ...] = (_arc(2.1, -60, 170, 20), ((-2.5, 0.95), (-2.07, 0.36), (-1.45, 0.75)))
 #: stops about an axis
 STOP: tuple[Points, ...] = (((1.4, 1.0), (2.6, 1.9)), ((1.4, -1.0), (2.6, -1.9)), _arc(1.72, -35, 35, 8))
 #: a cross within a square, about an axis
@@ -216,10 +213,7 @@ CROSS: tuple[Points, ...] = (
     ((-0.7, 0.7), (0.7, -0.7)),
 )
 #: an arrow along the way
-ARROW: tuple[Points, ...] = (
-    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    ((0.82, 0.7, 0.0), (1.0, 0.0, 0.0), (0.82, -0.7, 0.0)),
-)
+ARROW: tuple[Points, ...] = (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), ((0.82, 0.7, 0.0), (1.0, 0.0, 0.0), (0.82, -0.7, 0.0)))
 #: a law of the model's own between two points: a plain box
 LAW_BOX: tuple[Points, ...] = (
     ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0)),

@@ -273,7 +273,7 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
         found = measure_mesh(_locate(reader, file))
     except UsageError as error:
         needed = "a mesh must be a closed surface of triangles that face outwards"
-        reader.faults.add(place, str(error), needed * (error.code == "EG-FILE-DAMAGED"), error.code)
+        reader.fault(place, str(error), needed * (error.code == "EG-FILE-DAMAGED"), error.code)
         return None
     one = graph.one if scale is None else scale
     x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)
@@ -365,10 +365,10 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
             if key == "scale" and any(x.is_zero for x in found):
                 remedy = "give three numbers other than 0; negative ones mirror"
                 message = "a scale of 0 leaves nothing of the mesh"
-                reader.faults.add(f"{place}.{key}", message, remedy, "EG-RANGE")
+                reader.fault(f"{place}.{key}", message, remedy, "EG-RANGE")
             if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
                 remedy = 'give six hexadecimal digits: "#1f77b4"'
-                reader.faults.add(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")
+                reader.fault(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")
 
 
 #: Keys of which a body has one at most.
@@ -417,19 +417,19 @@ def _own(
     if point is not None and point[1] is not None:
         if "axes" in values:
             message = "is given beside a marker in about, which has axes already"
-            reader.faults.add(f"{path}.axes", message, "give about: [x, y, z]", "EG-CONFLICT")
+            reader.fault(f"{path}.axes", message, "give about: [x, y, z]", "EG-CONFLICT")
         rotation = point[1]
     plane = _plane(tensor)
     axis = None if plane is None else vec.transpose(rotation)[plane]
     if rotation != reader.identity:  # which mirrors the upper triangle
         if not is_symmetric(tensor):
-            reader.faults.add(f"{path}.inertia", *ASYMMETRIC, code="EG-INERTIA")
+            reader.fault(f"{path}.inertia", *ASYMMETRIC, code="EG-INERTIA")
         tensor = rotate_symmetric(rotation, tensor)
     moment: Vec3 | None = None
     if "first_moment" in values:
         moment = reader.vector(f"{path}.first_moment", values["first_moment"])
         if mass.is_zero and not all(x.is_zero for x in moment):
-            reader.faults.add(
+            reader.fault(
                 f"{path}.first_moment",
                 "a body without mass has no first moment",
                 "give the body a mass",
@@ -482,7 +482,7 @@ def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | 
         if marker is None:
             own = [key.partition(".")[2] for key in reader.markers if key.startswith(f"{body}.")]
             remedy = nearest(about, [*POINTS, *own], "allowed")
-            reader.faults.add(place, f"{body!r} has no marker {about!r}", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(place, f"{body!r} has no marker {about!r}", remedy, "EG-NAME-UNKNOWN")
             return None
         return marker.frame.position, marker.frame.rotation
     if items(about) is None:

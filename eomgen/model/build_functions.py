@@ -120,22 +120,20 @@ def _check_signature(reader: Reader, path: str, name: str, arity: int, source: t
     if found is None:
         if not re.search(rf"\b{name}\b", text):
             remedy = "it must be a C function double f(double, ...)"
-            reader.faults.add(f"{path}.source", f"{file} has no function {name!r}", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(f"{path}.source", f"{file} has no function {name!r}", remedy, "EG-NAME-UNKNOWN")
     elif found.foreign:
         message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is not double"
-        reader.faults.add(f"{path}.source", message, f"write {one}", "EG-TYPE")
+        reader.fault(f"{path}.source", message, f"write {one}", "EG-TYPE")
     elif found.arguments != arity:
         message = f"{name} in {file}:{found.line} takes {found.arguments} arguments, not the {arity} declared"
-        reader.faults.add(
-            f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}", "EG-SHAPE"
-        )
+        reader.fault(f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}", "EG-SHAPE")
 
 
 def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:
     listed = items(values.get("derivatives"))
     given = values.get("arguments", len(listed) if listed else 1)
     if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= ARGUMENTS:
-        reader.faults.add(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}", "EG-SHAPE")
+        reader.fault(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}", "EG-SHAPE")
         return None
     return given
 
@@ -152,11 +150,11 @@ def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orde
     for place, _, name in wanted:
         fault = fault_of_name(name, symbol=True)
         if fault:
-            reader.faults.add(place, *fault, "EG-NAME-FORM")
+            reader.fault(place, *fault, "EG-NAME-FORM")
     if reader.faults.under(path):
         return None
     if len({name for _, _, name in wanted}) < len(wanted):
-        reader.faults.add(
+        reader.fault(
             path, "names one C function twice", "name a different C function for each derivative", "EG-CONFLICT"
         )
     return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
@@ -171,7 +169,7 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
         return []
     if len(listed) != length:
         what = f"with that many arguments it needs {length}, null where the source has none"
-        reader.faults.add(path, f"has {len(listed)} entries", what, "EG-SHAPE")
+        reader.fault(path, f"has {len(listed)} entries", what, "EG-SHAPE")
         return []
     return listed
 
@@ -186,17 +184,17 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
         with open_plain(file) as stream:
             data = stream.read(SIZE + 1)
         if len(data) > SIZE:
-            reader.faults.add(path, f"{file} is too large", f"at most {SIZE} bytes", "EG-TOO-LARGE")
+            reader.fault(path, f"{file} is too large", f"at most {SIZE} bytes", "EG-TOO-LARGE")
             return None
         return file.name, data.decode("utf-8-sig").replace("\r\n", "\n")
     except OSError as error:
-        reader.faults.add(
+        reader.fault(
             path, f"{file} cannot be read ({error.strerror})", "paths are relative to the model file", "EG-FILE"
         )
     except UnicodeDecodeError:
-        reader.faults.add(path, f"{file} is not UTF-8 text", "save it as UTF-8", "EG-FILE-DAMAGED")
+        reader.fault(path, f"{file} is not UTF-8 text", "save it as UTF-8", "EG-FILE-DAMAGED")
     except UsageError as error:
-        reader.faults.add(path, str(error), code=error.code)
+        reader.fault(path, str(error), code=error.code)
     return None
 
 
@@ -212,7 +210,7 @@ def _twin(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tup
             listed = _listed(reader, f"{entry.path}.python_{key}", getattr(given, key) or None, len(every))
             functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
         if not all(callable(f) for f in functions.values()):
-            reader.faults.add(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
+            reader.fault(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
             return None
         return Twin(functions)
     source = _read(reader, path, given, entry.folder)
@@ -225,12 +223,12 @@ def _twin(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tup
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
     except Exception as error:  # whatever the file of the user raises
-        reader.faults.add(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}", code="EG-FILE")
+        reader.fault(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}", code="EG-FILE")
         return None
     missing = [name for _, name in names if not callable(getattr(module, name, None))]
     if missing:
         remedy = "its functions must have the names of the C functions"
-        reader.faults.add(path, f"{source[0]} has no function {', '.join(missing)}", remedy, "EG-NAME-UNKNOWN")
+        reader.fault(path, f"{source[0]} has no function {', '.join(missing)}", remedy, "EG-NAME-UNKNOWN")
         return None
     return Twin({orders: getattr(module, name) for orders, name in names})
 
@@ -245,7 +243,7 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
     for entry in entries:
         if isinstance(entry.name, str) and entry.name in QUANTITIES:
             message = f"{entry.name!r} is a built-in name for the motion of a marker"
-            reader.faults.add(entry.path, message, "choose another name", "EG-NAME-TAKEN")
+            reader.fault(entry.path, message, "choose another name", "EG-NAME-TAKEN")
         reader.names.declare("function", entry.name, entry.path)
         function = None if reader.faults.under(entry.path) else _build(reader, entry)
         if function is None:
@@ -325,7 +323,7 @@ def _finite(reader: Reader, path: str, function: Function, numbers: Array) -> Fu
     """The function, unless its slopes are too large for doubles."""
     if np.isfinite(numbers).all():
         return function
-    reader.faults.add(path, "is too steep for double precision", "scale its values or its points", "EG-RANGE")
+    reader.fault(path, "is too steep for double precision", "scale its values or its points", "EG-RANGE")
     return None
 
 
@@ -341,19 +339,17 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
     if x is None:
         return None
     if len(x) < 2:
-        reader.faults.add(path, "has fewer than two points", "give two or more", "EG-SHAPE")
+        reader.fault(path, "has fewer than two points", "give two or more", "EG-SHAPE")
         return None
     steps = np.diff(x)
     if not (steps > 0.0).all():
         k = int(np.argmax(~(steps > 0.0)))
-        reader.faults.add(
+        reader.fault(
             f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table must increase", "EG-RANGE"
         )
         return None
     if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
-        reader.faults.add(
-            path, "has points too close together, or too far apart, for double precision", code="EG-RANGE"
-        )
+        reader.fault(path, "has points too close together, or too far apart, for double precision", code="EG-RANGE")
         return None
     return x
 
@@ -365,7 +361,7 @@ def _numbers(reader: Reader, path: str, given: Any) -> Array | None:
         reader.wrong(path, given, kinds.Numbers)
         return None
     if len(listed) > POINTS:
-        reader.faults.add(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points", "EG-TOO-LARGE")
+        reader.fault(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points", "EG-TOO-LARGE")
         return None
     read = [
         float(x) if is_number(x) and -1e300 < x < 1e300 else reader.number(f"{path}[{k}]", x)
@@ -382,16 +378,14 @@ def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | 
         reader.wrong(path, given, kinds.Grid)
         return None
     if len(rows) != n_x:
-        reader.faults.add(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x", "EG-SHAPE")
+        reader.fault(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x", "EG-SHAPE")
         return None
     if n_x * n_y > POINTS:
-        reader.faults.add(path, f"has {n_x * n_y} points", f"a table has at most {POINTS}", "EG-TOO-LARGE")
+        reader.fault(path, f"has {n_x * n_y} points", f"a table has at most {POINTS}", "EG-TOO-LARGE")
         return None
     read = [_numbers(reader, f"{path}[{k}]", row) for k, row in enumerate(rows)]
     for k, row in enumerate(read):
         if row is not None and len(row) != n_y:
-            reader.faults.add(
-                f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y", "EG-SHAPE"
-            )
+            reader.fault(f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y", "EG-SHAPE")
     found = [row for row in read if row is not None and len(row) == n_y]
     return np.array(found) if len(found) == n_x else None

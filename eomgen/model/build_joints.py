@@ -50,20 +50,20 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
         values = [given[key]] if listed is None else listed
         if len(values) != len(coordinates):
             message = f"{len(values)} values for {len(coordinates)} coordinates"
-            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
+            reader.fault(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
             continue
         for k, value in enumerate(values):
             place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
             number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
             if number is not None and number < 0 and key in ("velocity", "effort"):
-                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
+                reader.fault(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
             elif number is not None:
                 result[k].append((key, number))
     for name, found in zip(coordinates, result, strict=True):
         limits = dict(found)
         if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
             message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
-            reader.faults.add(path, message, "exchange them", "EG-RANGE")
+            reader.fault(path, message, "exchange them", "EG-RANGE")
     return tuple(tuple(found) for found in result)
 
 
@@ -71,7 +71,7 @@ def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
     """Coulomb friction of a joint (N m or N), as data."""
     value = reader.number(path, given)
     if value is not None and value < 0:
-        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
+        reader.fault(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
     return value or 0.0
 
 
@@ -163,7 +163,7 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
         if len(names) != count:
             remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
             plural = "" if len(names) == 1 else "s"
-            reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy, "EG-SHAPE")
+            reader.fault(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy, "EG-SHAPE")
         for k, name in enumerate(names):
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
@@ -190,13 +190,13 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
         if "axes" in values:
             if "axis" in values:
-                reader.faults.add(f"{path}.axes", "axis is given too", "leave out one of them", "EG-CONFLICT")
+                reader.fault(f"{path}.axes", "axis is given too", "leave out one of them", "EG-CONFLICT")
             columns = reader.axes(f"{path}.axes", values["axes"])
         if pair is None:
             continue
         if pair[0].body == pair[1].body:
             message = f"{pair[0].label} and {pair[1].label} are on the same body"
-            reader.faults.add(f"{path}.between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
+            reader.fault(f"{path}.between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
             continue
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
@@ -227,9 +227,7 @@ def _type(reader: Reader, entry: DescribedEntry) -> str | None:
     if given is None:
         reader.faults.missing(path, f"give one of {', '.join(JOINTS)}")
     else:
-        reader.faults.add(
-            path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"), "EG-CHOICE"
-        )
+        reader.fault(path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"), "EG-CHOICE")
     return None
 
 
@@ -242,14 +240,12 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             elsewhere = key in others
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
             remedy = IN_PLACE_OF_JOINTS if key in SWITCHING else unknown_key(key, fields)
-            reader.faults.add(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
+            reader.fault(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in entry.values and key != "type":
             reader.faults.missing(f"{entry.path}.{key}", f"give {field.says}")
     if {"coordinate", "coordinates"} <= entry.values.keys():
-        reader.faults.add(
-            f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT"
-        )
+        reader.fault(f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT")
     kind = JOINTS[type_name]
     options: dict[str, Any] = {}
     for option in kind.options:
@@ -260,7 +256,7 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             options[option] = fields[option].read(reader, f"{entry.path}.{option}", value)
     if options.get("rotation") == "euler_parameters" and "sequence" in entry.values:
         remedy = "leave out sequence, or choose rotation: euler_angles"
-        reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
+        reader.fault(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
     return kind(**options)
 
 

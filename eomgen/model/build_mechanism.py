@@ -206,9 +206,7 @@ def build(description: Description) -> Mechanism:
 def _limits_told(reader: Reader, given: Any) -> bool:
     if given == "stop":
         remedy = "add a force of type stop for each joint; allowed here: note, off"
-        reader.faults.add(
-            "limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE"
-        )
+        reader.fault("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE")
         return True
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
@@ -255,7 +253,7 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
     if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
         what = ", ".join(name.removesuffix("()") for name in asked)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
-        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
+        reader.fault("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
 
 def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, CarriedQuantity]]:
@@ -278,13 +276,11 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
         if name in known and known[name].is_rigid and not on:
             told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
-            reader.faults.add(
-                path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED"
-            )
+            reader.fault(path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED")
         elif quantity != "power" and not on and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             message = f"{name!r} does not act along a path"
-            reader.faults.add(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
+            reader.fault(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
 
 
 def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -> dict[str, Expr]:
@@ -303,7 +299,7 @@ def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -
             _check_place(reader, path, *place)
         else:
             remedy = nearest(shown(name), known, _listed([_PLURAL[what] for what in whats], "and"))
-            reader.faults.add(path, f"no {_listed(whats, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(path, f"no {_listed(whats, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
     return result
 
 
@@ -312,10 +308,10 @@ def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
     marker = reader.markers.get(label)
     if marker is None:
         named = [known for known, marker in reader.markers.items() if marker.body != GROUND]
-        reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"), "EG-NAME-UNKNOWN")
+        reader.fault(path, f"no marker {quoted(label)}", nearest(label, named, "markers"), "EG-NAME-UNKNOWN")
     elif marker.body == GROUND:
         kind = "velocity" if what.startswith("v") else "position"
-        reader.faults.add(
+        reader.fault(
             path, f"is a {kind} on the ground, which does not move", "name a marker of another body", "EG-REFERENCE"
         )
 
@@ -340,11 +336,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
         name = name_of(item)
         if name not in known and name not in rates:
             remedy = nearest(shown(name), known, "coordinates")
-            reader.faults.add(f"independent[{k}]", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(f"independent[{k}]", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
         elif name in result:
-            reader.faults.add(
-                f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once", "EG-CONFLICT"
-            )
+            reader.fault(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once", "EG-CONFLICT")
         else:
             result.append(name)
     return tuple(result)
@@ -363,5 +357,5 @@ def _simulation(reader: Reader, given: Any) -> Simulation:
     if (settings.get("method") in FIXED_STEP) != ("step" in settings):
         remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
         told = "only methods RK4 and moreau take steps of one size, and they need their size"
-        reader.faults.add("simulation.step", told, remedy, "EG-CONFLICT")
+        reader.fault("simulation.step", told, remedy, "EG-CONFLICT")
     return Simulation(**settings)

@@ -29,7 +29,7 @@ def read_described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tup
     try:
         unit = read_unit(text)
     except UnitError as error:
-        reader.faults.add(f"{entry.path}.unit", str(error), error.remedy, "EG-UNIT")
+        reader.fault(f"{entry.path}.unit", str(error), error.remedy, "EG-UNIT")
         return Unit(NONE), doc
     if text:
         reader.units[entry.path] = unit
@@ -43,7 +43,7 @@ def in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float |
     found = value * unit.size
     if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
         remedy = "check the value and its unit"
-        reader.faults.add(
+        reader.fault(
             path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy, "EG-UNIT"
         )
         return None
@@ -77,11 +77,9 @@ def with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
     for name in sorted(symbols_of([expression])):
         if reader.names.kinds.get(name) == "input":
             remedy = "allowed are t, coordinates, velocities and parameters"
-            reader.faults.add(path, f"the input {name!r} cannot be used here", remedy, "EG-REFERENCE")
+            reader.fault(path, f"the input {name!r} cannot be used here", remedy, "EG-REFERENCE")
     if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
-        reader.faults.add(
-            path, "a function of the model cannot be used here", "write out its expression", "EG-REFERENCE"
-        )
+        reader.fault(path, "a function of the model cannot be used here", "write out its expression", "EG-REFERENCE")
     return replace(given, signal=expression)
 
 
@@ -100,7 +98,7 @@ class Outputs:
         for k, entry in enumerate(entries):
             kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
             if entry.name in self._places:
-                reader.faults.add(entry.path, "the name is given to two outputs", "rename one", "EG-NAME-TAKEN")
+                reader.fault(entry.path, "the name is given to two outputs", "rename one", "EG-NAME-TAKEN")
             elif kind not in _REPEATED:
                 reader.names.declare("output", entry.name, entry.path)
             if isinstance(entry.name, str):
@@ -119,7 +117,7 @@ class Outputs:
         if k in self._open:
             round_trip = [*self._open[self._open.index(k) :], k]
             message = f"depends on itself: {' -> '.join(str(self._entries[i].name) for i in round_trip)}"
-            self._reader.faults.add(self._entries[k].path, message, "write one of them without the others", "EG-CIRCLE")
+            self._reader.fault(self._entries[k].path, message, "write one of them without the others", "EG-CIRCLE")
             return Output(str(self._entries[k].name), self._reader.stand_in), self._reader.stand_in
         if k not in self._read:
             self._open.append(k)

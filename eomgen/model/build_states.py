@@ -37,23 +37,23 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         expression = instant(reader, f"{path}.expression", values["expression"])
         if is_comparison(expression):
             message, remedy = "is a comparison, which has no zero", "give the difference of its sides: a - b for a > b"
-            reader.faults.add(f"{path}.expression", message, remedy, "EG-EVENT")
+            reader.fault(f"{path}.expression", message, remedy, "EG-EVENT")
     direction = values.get("direction", 0)
     if not is_number(direction) or direction not in (-1, 0, 1):
         remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
-        reader.faults.add(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
+        reader.fault(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
         direction = 0
     reset = _reset(reader, f"{path}.reset", {} if values.get("reset") is None else values["reset"])
     restitution = None
     if values.get("restitution") is not None:
         restitution = reader.number(f"{path}.restitution", values["restitution"])
         if restitution is not None and not 0.0 <= restitution <= 1.0:
-            reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1", code="EG-RANGE")
+            reader.fault(f"{path}.restitution", f"{restitution:g} is not between 0 and 1", code="EG-RANGE")
         if reset:
-            reader.faults.add(f"{path}.reset", "is given beside a restitution", "give one of the two", "EG-CONFLICT")
+            reader.fault(f"{path}.reset", "is given beside a restitution", "give one of the two", "EG-CONFLICT")
         if direction == 1:
             message = "with a restitution only a falling value (a gap that closes) is an impact"
-            reader.faults.add(f"{path}.direction", message, "give -1, or leave it out", "EG-EVENT")
+            reader.fault(f"{path}.direction", message, "give -1, or leave it out", "EG-EVENT")
         direction = -1
     doc = reader.text(f"{path}.doc", values.get("doc", ""))
     terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
@@ -69,17 +69,17 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     if values.get("restitution") is None:
         what = "friction" if given is not None else "slip"
         remedy = "give the restitution of the impact, from 0 to 1"
-        reader.faults.add(
+        reader.fault(
             f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy, "EG-MISSING"
         )
     if given is None or slip is None:
         missing, there = ("slip", "friction") if slip is None else ("friction", "slip")
         remedy = "slip: the output that is the sliding velocity" if slip is None else "friction: the coefficient"
-        reader.faults.add(f"{path}.{there}", f"is given without {missing}", f"give {remedy}", "EG-MISSING")
+        reader.fault(f"{path}.{there}", f"is given without {missing}", f"give {remedy}", "EG-MISSING")
         return None, ()
     friction = reader.number(f"{path}.friction", given)
     if friction is not None and not friction >= 0.0:
-        reader.faults.add(f"{path}.friction", f"{friction:g} is negative", "give 0 or more", "EG-RANGE")
+        reader.fault(f"{path}.friction", f"{friction:g} is negative", "give 0 or more", "EG-RANGE")
     names = [slip] if isinstance(slip, str) else items(slip)
     outputs = [*reader.names.of("output")]
     if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
@@ -88,9 +88,9 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     for name in names:
         if name not in outputs:
             remedy = nearest(name, outputs, "outputs")
-            reader.faults.add(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy, "EG-NAME-UNKNOWN")
         elif (unit := reader.units.get(f"outputs.{name}")) is not None and unit.size != 1.0:
-            reader.faults.add(
+            reader.fault(
                 f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit", "EG-UNIT"
             )
     return friction, tuple(names)
@@ -116,12 +116,12 @@ def check_resets(
             path = f"events.{event.name}.reset.{name}"
             if name in counters:
                 remedy = f"reset {', '.join(counters[name])}, or declare them with another period or offset"
-                reader.faults.add(
+                reader.fault(
                     path, f"{name!r} counts samples, and a sample would be missed or come twice", remedy, "EG-EVENT"
                 )
             elif name in closed and value.value not in (0.0, 1.0):
                 remedy = "give 1 to close the constraint, 0 to open it"
-                reader.faults.add(
+                reader.fault(
                     path, f"{name!r} is 1 while the constraint is closed and 0 while it is open", remedy, "EG-EVENT"
                 )
 
@@ -133,7 +133,7 @@ def instant(reader: Reader, path: str, value: Any) -> Expr:
         remedy = (
             "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
         )
-        reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy, "EG-REFERENCE")
+        reader.fault(path, f"the {what} {name!r} cannot be used in an event", remedy, "EG-REFERENCE")
     return expression
 
 
@@ -149,7 +149,7 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
         else:
             states = bool(reader.description.sections["states"])
             remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
-            reader.faults.add(
+            reader.fault(
                 f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy, "EG-NAME-UNKNOWN"
             )
     return tuple(result)
@@ -233,7 +233,7 @@ def declare_states(
     """
     if entries and bare:
         message = "a bare Lagrangian, or equations, have no states beside them"
-        reader.faults.add(
+        reader.fault(
             "states",
             message,
             "write them as velocities of from_equations, or describe bodies and joints",
@@ -243,9 +243,7 @@ def declare_states(
     for entry in entries:
         if isinstance(entry.name, str) and entry.name.endswith("_dot"):
             remedy = "choose a name that does not end in _dot"
-            reader.faults.add(
-                entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy, "EG-NAME-TAKEN"
-            )
+            reader.fault(entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy, "EG-NAME-TAKEN")
         if reader.names.declare("state", entry.name, entry.path):
             usable.append(entry)
     return usable, group_by_clock(reader, usable)
@@ -278,14 +276,14 @@ def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
     """The rate of a state, and its new value at sampling times if it is sampled."""
     values, path = entry.values, entry.path
     if "rate" in values and "sampled" in values:
-        reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period", "EG-CONFLICT")
+        reader.fault(path, "has a rate and is sampled", "give rate, or sampled and period", "EG-CONFLICT")
     if "sampled" in values:
         return reader.graph.zero, reader.expression(f"{path}.sampled", values["sampled"], LAW)
     if "period" in values and "rate" not in values:  # a function of the run renews it
         return reader.graph.zero, reader.graph.symbol(str(entry.name))
     for key in ("period", "offset"):
         if key in values:
-            reader.faults.add(
+            reader.fault(
                 f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate", "EG-CONFLICT"
             )
     if values.get("rate") is None:
@@ -336,7 +334,7 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
         if name not in names or name == entry.name:
             remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
             place = path if isinstance(given, str) else f"{path}[{k}]"
-            reader.faults.add(place, f"{name!r} is no other constraint that opens", remedy, "EG-NAME-UNKNOWN")
+            reader.fault(place, f"{name!r} is no other constraint that opens", remedy, "EG-NAME-UNKNOWN")
     return [str(name) for name in listed]
 
 
@@ -364,11 +362,9 @@ def _falling(reader: Reader, path: str, value: object) -> Expr:
         return found
     remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
     if is_comparison(found):
-        reader.faults.add(
+        reader.fault(
             path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy, "EG-EXPRESSION"
         )
     elif symbols_of([found]) <= {*reader.names.of("parameter")}:
-        reader.faults.add(
-            path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy, "EG-EXPRESSION"
-        )
+        reader.fault(path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy, "EG-EXPRESSION")
     return found

@@ -96,7 +96,7 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         certain = section == "outputs" and check.is_certain(expression)
         mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
         for message, remedy in check.faults(expression, wanted, certain, mass):
-            reader.faults.add(path, message, remedy, "EG-DIMENSION")
+            reader.fault(path, message, remedy, "EG-DIMENSION")
 
 
 def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Output, ...]) -> tuple[Output, ...]:

@@ -161,12 +161,12 @@ def _section(reader: Reader, path: str, given: Any, has_others: bool, fields: Fi
         return {}
     if has_others:
         remedy = "describe only one: bodies, a Lagrangian, equations"
-        reader.faults.add(path, "the model has bodies, joints or another such section too", remedy, "EG-CONFLICT")
+        reader.fault(path, "the model has bodies, joints or another such section too", remedy, "EG-CONFLICT")
     check_keys(path, given, fields, reader.faults)
     values = dict(given)
     values["coordinates"] = _names(reader, path, values, "coordinates", ())
     if not values["coordinates"] and "coordinates" in given:
-        reader.faults.add(f"{path}.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
+        reader.fault(f"{path}.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
     return values
 
 
@@ -184,7 +184,7 @@ def _names(reader: Reader, path: str, values: Mapping[str, Any], key: str, defau
 def _check_constraint(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
     """Note a comparison, or an expression of velocities that is not linear in them."""
     if is_comparison(expression):
-        reader.faults.add(path, *NO_EQUATION)
+        reader.fault(path, *NO_EQUATION)
     else:
         _check_linear(reader, path, expression, v)
 
@@ -195,7 +195,7 @@ def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str])
     slopes = jacobian([expression], [reader.graph.symbol(name) for name in v])
     if not symbols_of(list(slopes.values())).isdisjoint(v):
         remedy = "write it as a sum of terms a(q, t)*v and b(q, t), with each velocity v to the first power"
-        reader.faults.add(path, "is not linear in the velocities", remedy, "EG-EXPRESSION")
+        reader.fault(path, "is not linear in the velocities", remedy, "EG-EXPRESSION")
 
 
 # -- a Lagrangian ------------------------------------------------------------------------------------------------------
@@ -243,7 +243,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
         for name, value in in_order(given, names):
             if name not in result:
                 remedy = nearest(shown(name), names, "coordinates")
-                reader.faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+                reader.fault(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result[name] for name in names)
@@ -251,7 +251,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     if listed is None:
         reader.wrong(path, given, kinds.CoordinateForces)
     elif listed and len(listed) != len(names):
-        reader.faults.add(
+        reader.fault(
             path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order", "EG-SHAPE"
         )
     elif listed:
@@ -301,7 +301,7 @@ def require_quadratic(reader: Reader, given: GivenEquations) -> None:
     used = symbols_of([x for row in given.mass_matrix for x in row])
     found = [rate for rate in given.velocities if rate in used]
     if found:
-        reader.faults.add(
+        reader.fault(
             "lagrangian.expression",
             "is not quadratic in the velocities: the mass matrix (its second derivatives by them) depends on "
             + ", ".join(found),
@@ -467,7 +467,7 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
     used = symbols_of(flat)
     moving = sorted(used & set(v))
     if moving:
-        reader.faults.add(
+        reader.fault(
             f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters", "EG-EXPRESSION"
         )
         return
@@ -481,5 +481,5 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
             if gap > TENSOR * size:  # false where an entry is not finite there
                 message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
                 remedy = "give the symmetric M of M v' = f, where f contains all forces"
-                reader.faults.add(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
+                reader.fault(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
                 return

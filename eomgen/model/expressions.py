@@ -78,13 +78,7 @@ def allowed() -> str:
     return f"{start}'a if c else b' and the functions {' '.join(function_words())}"
 
 
-def parse(
-    text: str,
-    graph: Graph,
-    resolve: Resolve,
-    locate: Locate | None = None,
-    any_function: bool = False,
-) -> Expr:
+def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
     """The graph expression of a text.
 
     Parameters

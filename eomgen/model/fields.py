@@ -201,8 +201,7 @@ GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 JOINT: Fields = {
     "type": k.Choice("type of the joint", required=True, choices=tuple(JOINTS)),
     "between": k.Pair(
-        "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P",
-        required=True,
+        "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P", required=True
     ),
 }
 AXIS = k.Axis("axis of the joint, in both markers", default="z")
@@ -387,12 +386,7 @@ def _element(what: str, types: Types, type_name: str) -> Schema:
 
 
 def _section(entry: Schema, doc: str) -> Schema:
-    return {
-        "type": ["object", "null"],
-        "propertyNames": ref("name"),
-        "additionalProperties": entry,
-        "description": doc,
-    }
+    return {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": entry, "description": doc}
 
 
 def _short(section: str, fields: Fields) -> Schema:

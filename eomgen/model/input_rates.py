@@ -67,7 +67,7 @@ def add_rates(reader: Reader, inputs: tuple[Input, ...], differentiated: Sequenc
     for expressions, _, why, place in differentiated:
         if place is not None and jumps_in_time(expressions):
             message = f"{why} must have a derivative by time, and a condition on t makes it jump"
-            reader.faults.add(
+            reader.fault(
                 place, message, "such a jump is an impact: write it smoothly, or as an event with a reset", "EG-JUMP"
             )
     for expressions, times, why, _ in differentiated:
@@ -83,7 +83,7 @@ def add_rates(reader: Reader, inputs: tuple[Input, ...], differentiated: Sequenc
         kind = reader.names.kinds.get(rate)
         if kind is not None:
             message = f"the name is reserved for the rate of {why}"
-            reader.faults.add(reader.names.places[rate], message, f"rename the {kind}, or the input", "EG-NAME-TAKEN")
+            reader.fault(reader.names.places[rate], message, f"rename the {kind}, or the input", "EG-NAME-TAKEN")
             continue
         reader.names.declare("input", rate, f"inputs.{base.name}")
         unit = f"{base.unit}/s^{k}" if (k := split_rate(rate)[1]) > 1 else f"{base.unit}/s"
@@ -164,7 +164,7 @@ def _rate_of_signal(reader: Reader, signal: Expr, name: str, order: int) -> Expr
                 f"{rate_of(name, order + 1)} is needed, but the signal depends on {state!r}, whose rate is not "
                 "a velocity"
             )
-            reader.faults.add(f"inputs.{name}.signal", message, "write it in t and parameters", "EG-UNSUPPORTED")
+            reader.fault(f"inputs.{name}.signal", message, "write it in t and parameters", "EG-UNSUPPORTED")
             return None
     direction = {symbol(n): symbol(rate) for n, rate in along.items()}
     return jvp([signal], {symbol("t"): reader.graph.one, **direction})[0]

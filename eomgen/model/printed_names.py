@@ -36,12 +36,12 @@ def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
     try:
         read_latex(text)
     except NotationError as error:
-        reader.faults.add(path, str(error), error.remedy, "EG-NOTATION")
+        reader.fault(path, str(error), error.remedy, "EG-NOTATION")
         return
     text = spaced(text)
     if reader.latex.setdefault(str(name), text) != text:  # an output that repeats a coordinate
         remedy = "leave one of them out"
-        reader.faults.add(path, f"{name!r} is printed as {quoted(reader.latex[name])} already", remedy, "EG-NAME-TAKEN")
+        reader.fault(path, f"{name!r} is printed as {quoted(reader.latex[name])} already", remedy, "EG-NAME-TAKEN")
 
 
 def take_coordinates_latex(
@@ -58,14 +58,14 @@ def take_coordinates_latex(
                 take_latex(reader, f"{path}.{name}", name, text)
             else:
                 remedy = nearest(shown(name), [*coordinates, *others], f"coordinates{' and velocities' * bool(others)}")
-                reader.faults.add(f"{path}.{shown(name)}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+                reader.fault(f"{path}.{shown(name)}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
         return
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
         reader.wrong(path, given, kinds.Latexes)
     elif listed and len(listed) != len(coordinates):
         message = f"{len(listed)} texts for {len(coordinates)} coordinates"
-        reader.faults.add(path, message, f"give one for each: {', '.join(coordinates) or 'none'}", "EG-SHAPE")
+        reader.fault(path, message, f"give one for each: {', '.join(coordinates) or 'none'}", "EG-SHAPE")
     else:
         for k, (name, text) in enumerate(zip(coordinates, listed, strict=False)):
             if text is not None:

@@ -65,7 +65,7 @@ def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple
     """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
     teeth = teeth_of_sprocket(given)
     if teeth is None:
-        reader.faults.add(
+        reader.fault(
             f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
         )
         return ()
@@ -91,7 +91,7 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ..
         return None
     if not listed:
         remedy = "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
-        reader.faults.add(path, "has no shapes", remedy, "EG-MISSING")
+        reader.fault(path, "has no shapes", remedy, "EG-MISSING")
         return None
     found: list[ContactShape] = []
     for k, given in enumerate(listed):
@@ -106,7 +106,7 @@ def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
     kind = given.get("shape")
     if not isinstance(kind, str) or kind not in SHAPE_FIELDS:
         message = "is missing" if kind is None else f"no shape {quoted(kind)}"
-        reader.faults.add(f"{path}.shape", message, nearest(shown(kind), SHAPE_FIELDS, "shapes"), "EG-CHOICE")
+        reader.fault(f"{path}.shape", message, nearest(shown(kind), SHAPE_FIELDS, "shapes"), "EG-CHOICE")
         return []
     check_keys(path, given, SHAPE_FIELDS[kind], reader.faults)
     if reader.faults.under(path):
@@ -114,7 +114,7 @@ def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
     on = given["on"]
     many = items(on)
     if many is not None and not many:
-        reader.faults.add(f"{path}.on", "names no marker", "give a body or a marker, or a list of them", "EG-MISSING")
+        reader.fault(f"{path}.on", "names no marker", "give a body or a marker, or a list of them", "EG-MISSING")
     places = [(f"{path}.on", on)] if many is None else [(f"{path}.on[{k}]", one) for k, one in enumerate(many)]
     markers = [reader.marker(place, one) for place, one in places]
     sizes = _sizes(reader, path, kind, given)
@@ -165,11 +165,11 @@ def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] 
     table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
     if "height" in given:
         for key in table:
-            reader.faults.add(f"{path}.{key}", "stands beside height", "give height, or x, y and z", "EG-CONFLICT")
+            reader.fault(f"{path}.{key}", "stands beside height", "give height, or x, y and z", "EG-CONFLICT")
         return (reader.expression(f"{path}.height", given["height"], local=local),)
     if missing := [key for key in ("x", "y", "z") if key not in table]:
         remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
-        reader.faults.add(f"{path}.{missing[0]}", "is missing, and there is no height", remedy, "EG-MISSING")
+        reader.fault(f"{path}.{missing[0]}", "is missing, and there is no height", remedy, "EG-MISSING")
         return None
     taken = {f.name for f in (*reader.graph.functions.values(), *(f for f, _ in reader.graph.calls.values()))}
     name = re.sub(r"\W+", "_", path).strip("_")
@@ -199,7 +199,7 @@ def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, .
     count = points_of_plate(given)
     if count is None:
         remedy = f"give a whole number from 1 to {POINTS}"
-        reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy, "EG-RANGE")
+        reader.fault(f"{path}.points", f"is {shown(given['points'])}", remedy, "EG-RANGE")
     return (*sizes, reader.graph.constant(float(count or 1)))
 
 
@@ -208,7 +208,7 @@ def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...
     (length,) = _positive(reader, path, given, "length")
     count = cells_of_bed(given)
     if count is None:
-        reader.faults.add(
+        reader.fault(
             f"{path}.cells", f"is {shown(given['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}", "EG-RANGE"
         )
     return (length, reader.graph.constant(float(count or 1)))
@@ -239,7 +239,7 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
     """Depth and points of a profile, from left to right."""
     listed, place = items(given["points"]), f"{path}.points"
     if listed is None or len(listed) < least:
-        reader.faults.add(place, "is no profile", f"give {least} or more points [x, y] from left to right", "EG-TYPE")
+        reader.fault(place, "is no profile", f"give {least} or more points [x, y] from left to right", "EG-TYPE")
         return None
     points = _points(reader, place, listed)
     if points is None:
@@ -258,7 +258,7 @@ def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tupl
     """Corners of an outline, counterclockwise."""
     listed = items(value)
     if listed is None or not 3 <= len(listed) <= CORNERS:
-        reader.faults.add(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]", "EG-TYPE")
+        reader.fault(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]", "EG-TYPE")
         return None
     points = _points(reader, path, listed)
     if points is None:
@@ -266,7 +266,7 @@ def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tupl
     numbers = _numbers(reader, points)
     sense = sense_of_outline(numbers, convex) if len(numbers) == len(points) else 1
     if isinstance(sense, Flaw):
-        reader.faults.add(path + sense.key, sense.message, sense.remedy, "EG-RANGE")
+        reader.fault(path + sense.key, sense.message, sense.remedy, "EG-RANGE")
         return None
     reader.requirements.keep(path, OUTLINE, [x for point in points for x in point], (convex, sense))
     if sense < 0:

@@ -66,6 +66,7 @@ class Reader:
 
     def __init__(self, graph: Graph, names: Namespace, faults: Faults, description: Description) -> None:
         self.graph, self.names, self.faults, self.description = graph, names, faults, description
+        self.fault = faults.add  # path, message, remedy, code
         self.identity = vec.identity(graph)
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
         self.markers: dict[str, Marker] = {}
@@ -93,10 +94,7 @@ class Reader:
         names = [str(entry.name) for entry in self.description.sections["forces"]]
         if quantity.of not in names:
             raise ExpressionError(
-                f"no force element {quantity.of!r}",
-                0,
-                nearest(quantity.of, names, "elements"),
-                code="EG-NAME-UNKNOWN",
+                f"no force element {quantity.of!r}", 0, nearest(quantity.of, names, "elements"), code="EG-NAME-UNKNOWN"
             )
         for label in (quantity.on, quantity.axes):
             if label:
@@ -121,9 +119,9 @@ class Reader:
     def wrong(self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE") -> None:
         """Note that a value is not of a kind."""
         if value is None:
-            self.faults.add(path, "has no value", f"give {kind.says}", "EG-MISSING")
+            self.fault(path, "has no value", f"give {kind.says}", "EG-MISSING")
         else:
-            self.faults.add(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
+            self.fault(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
 
     def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
         """Note keys that a table does not know, and required ones that are missing."""
@@ -134,7 +132,7 @@ class Reader:
         for name in given:
             if name not in names:
                 remedy = nearest(str(name), names, "allowed")
-                self.faults.add(f"{path}.{name}", "unknown key", remedy, "EG-NAME-UNKNOWN")
+                self.fault(f"{path}.{name}", "unknown key", remedy, "EG-NAME-UNKNOWN")
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -165,10 +163,10 @@ class Reader:
                 return self.graph.constant(float(value))
         except ExpressionError as error:
             if not self.names.explains(error):
-                self.faults.add(path, error.place(), error.remedy, error.code)
+                self.fault(path, error.place(), error.remedy, error.code)
             return self.stand_in
         except OverflowError:
-            self.faults.add(path, f"{quoted(value)} is not a finite number", code="EG-NUMBER")
+            self.fault(path, f"{quoted(value)} is not a finite number", code="EG-NUMBER")
             return self.stand_in
         self.wrong(path, value, kinds.Scalar)
         return self.stand_in
@@ -196,7 +194,7 @@ class Reader:
             return ""
         half = lone_surrogate(value)
         if half:
-            self.faults.add(path, f"contains {half}, which is half of a character pair", WHOLE, "EG-TYPE")
+            self.fault(path, f"contains {half}, which is half of a character pair", WHOLE, "EG-TYPE")
             return ""
         return join_surrogates(value)
 
@@ -208,7 +206,7 @@ class Reader:
         name = usable_name(value)
         if name is None:
             message = f"{value!r:.200} is empty, or contains a character that file names cannot have"
-            self.faults.add(path, message, "give another name", "EG-FILE")
+            self.fault(path, message, "give another name", "EG-FILE")
         return name
 
     def flag(self, path: str, value: Any) -> bool:
@@ -231,7 +229,7 @@ class Reader:
             return value
         shown = list(field.choices)
         remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
-        self.faults.add(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
+        self.fault(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
         return str(field.default)
 
     def meaning(self, name: str) -> Meaning:
@@ -280,7 +278,7 @@ class Reader:
         at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
         given = [key for key in ("rpy", "axes", "matrix") if key in values]
         if len(given) > 1:
-            self.faults.add(
+            self.fault(
                 f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT"
             )
         turn, key = self.identity, given[0] if given else ""
@@ -301,7 +299,7 @@ class Reader:
             return self.identity
         if abs(sum(x * y for x, y in zip(a, b, strict=True))) > PERPENDICULAR:
             remedy = "correct one of them"
-            self.faults.add(path, f"the directions of {first} and {second} are not at right angles", remedy, "EG-RANGE")
+            self.fault(path, f"the directions of {first} and {second} are not at right angles", remedy, "EG-RANGE")
             return self.identity
         columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
         return turn_matrix(self.graph, columns)
@@ -342,7 +340,7 @@ class Reader:
             body = value.partition(".")[0]
             if found is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
                 message, _, remedy = self.unknown_marker(value)
-                self.faults.add(path, message, remedy, "EG-NAME-UNKNOWN")
+                self.fault(path, message, remedy, "EG-NAME-UNKNOWN")
             return found
         if not isinstance(value, Mapping):
             self.wrong(path, value, kinds.MarkerReference)
@@ -352,7 +350,7 @@ class Reader:
             return None
         body = value["body"]
         if not isinstance(body, str) or body not in self.bodies:
-            self.faults.add(
+            self.fault(
                 f"{path}.body",
                 f"no body {quoted(body)}",
                 nearest(shown(body), self.bodies, "bodies"),
@@ -387,7 +385,7 @@ class Reader:
         if self.faults.under(path):
             return TURNS["z"]
         if abs(sum(a * b for a, b in zip(x, y, strict=True))) > PERPENDICULAR:
-            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {kinds.TwoAxes.says}", "EG-RANGE")
+            self.fault(path, f"{quoted(value)} are not at right angles", f"give {kinds.TwoAxes.says}", "EG-RANGE")
             return TURNS["z"]
         return axes_columns(x, y)
 
@@ -396,18 +394,18 @@ class Reader:
         if isinstance(value, str):
             if value in TURNS:
                 return TURNS[value]
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
+            self.fault(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
             return TURNS["z"]
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
+            self.fault(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
             return TURNS["z"]
         x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
         if x is None or y is None or z is None:
             return TURNS["z"]
         columns = axis_columns((x, y, z))
         if columns is None:
-            self.faults.add(path, "the axis has no length", f"allowed: {kinds.Axis.says}", "EG-RANGE")
+            self.fault(path, "the axis has no length", f"allowed: {kinds.Axis.says}", "EG-RANGE")
             return TURNS["z"]
         return columns
 
@@ -419,7 +417,7 @@ class Reader:
             return own[value], self.mass_data[own[value]]
         if value is not None and not self.faults.under(f"bodies.{value}"):
             remedy = nearest(shown(value), own, "bodies")
-            self.faults.add(path, f"no body {quoted(value)}", remedy, "EG-NAME-UNKNOWN")
+            self.fault(path, f"no body {quoted(value)}", remedy, "EG-NAME-UNKNOWN")
         return None
 
     def coordinate(self, path: str, value: Any, measure: str = "") -> Found | None:
@@ -462,7 +460,7 @@ class Reader:
         name, (bodies, joints), o = f"{entry.name}_contact", self.added, vec.zero(self.graph)
         if name in self.bodies:
             message = f"the contact point needs a body named {name!r}, and there is one already"
-            self.faults.add(entry.path, message, "rename one of them", "EG-NAME-TAKEN")
+            self.fault(entry.path, message, "rename one of them", "EG-NAME-TAKEN")
             return None
         point = Marker(len(self.mass_data) + len(bodies), Frame(self.identity, o), name)
         coordinate = self.contacts[entry.path]

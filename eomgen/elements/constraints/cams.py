@@ -353,9 +353,7 @@ TYPES = table(
             ),
             "shape": Choice("shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")),
             "contour": Scalar(
-                "radius r(theta) of the contour at the polar angle theta (m)",
-                dimension=LENGTH,
-                local=_TURN,
+                "radius r(theta) of the contour at the polar angle theta (m)", dimension=LENGTH, local=_TURN
             ),
             "support": Scalar(
                 "for a flat face: support function h(theta), distance of the axis from the tangent whose normal points "

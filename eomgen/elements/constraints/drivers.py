@@ -159,7 +159,7 @@ TYPES = table(
             ),
             "between": Pair("two markers whose distance is driven; the distance must not become 0"),
             "angle": Pair(
-                "two markers whose z axes stay in line; the angle of the second about z of the first is driven",
+                "two markers whose z axes stay in line; the angle of the second about z of the first is driven"
             ),
             "marker": MarkerReference("a marker whose position along axis is driven"),
             "axis": Axis("direction in which the marker's position is measured, in the axes of on", default="x"),

@@ -279,11 +279,7 @@ TYPES = table(
             ),
             "radius": Scalar("radius of a disc or a sphere (m)", dimension=LENGTH),
             "shape": Choice("shape of the wheel", default="disc", choices=tuple(_NEEDED)),
-            "tube": Scalar(
-                "radius of the rounded edge of a disc (m), 0 for a sharp edge",
-                default=0,
-                dimension=LENGTH,
-            ),
+            "tube": Scalar("radius of the rounded edge of a disc (m), 0 for a sharp edge", default=0, dimension=LENGTH),
             "no_spin": Flag("whether the sphere is kept from spinning about the plane's normal", default=False),
             "semi_axes": Vector("semi-axes of an ellipsoid along x, y and z (m)", dimension=LENGTH),
             "support": Scalar(

@@ -17,10 +17,7 @@ from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_
 
 #: Of any constraint that may close and open in a run.
 SWITCHING: Fields = {
-    "closes": Scalar(
-        "where it falls to 0 the constraint closes: a plastic impact, after which it holds",
-        level=LAW,
-    ),
+    "closes": Scalar("where it falls to 0 the constraint closes: a plastic impact, after which it holds", level=LAW),
     "opens": Scalar("where it falls to 0 while the constraint holds, it lets go", level=LAW),
     "closed": Flag("whether it holds at the start of a run; false if closes is given, else true"),
     "releases": SomeNames("one or several other constraints that let go as it closes, before the impact"),
@@ -137,9 +134,7 @@ TYPES = table(
                 "axes of the first marker along which the second does not move", default="xyz", choices=AXES
             ),
             "turning": Choice(
-                "axes of the first marker about which the second does not turn",
-                default="none",
-                choices=("none", *AXES),
+                "axes of the first marker about which the second does not turn", default="none", choices=("none", *AXES)
             ),
         },
         _hold,

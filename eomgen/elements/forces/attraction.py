@@ -93,9 +93,7 @@ TYPES = table(
             "center": MarkerReference("marker at the attracting point", required=True),
             "body": BodyName("the body that is attracted at its centre of mass", required=True),
             "mu": Scalar(
-                "gravitational parameter G M of the centre (m^3/s^2)",
-                required=True,
-                dimension=Dimension(3, 0, -2),
+                "gravitational parameter G M of the centre (m^3/s^2)", required=True, dimension=Dimension(3, 0, -2)
             ),
             "extent": Choice(
                 "point takes the body as a point mass; maccullagh adds its inertia to second order: the "

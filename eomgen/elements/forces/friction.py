@@ -89,15 +89,12 @@ class ReactionFriction(Force):
 #: Keys of friction by the joint's reaction.
 BY_REACTION: Fields = {
     "coefficient": Scalar(
-        "friction coefficient, times the force across its axis that the joint carries",
-        level=LAW,
-        dimension=NONE,
+        "friction coefficient, times the force across its axis that the joint carries", level=LAW, dimension=NONE
     ),
     "static_coefficient": Scalar("the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE),
     "radius": Scalar("radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
     "thrust_radius": Scalar(
-        "mean radius of the collar (m) on which the reaction along the axis rubs; none by default",
-        dimension=LENGTH,
+        "mean radius of the collar (m) on which the reaction along the axis rubs; none by default", dimension=LENGTH
     ),
 }
 
@@ -226,9 +223,7 @@ TYPES = table(
             "viscous": Scalar("viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING),
             "coulomb": Scalar("Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
             "static": Scalar(
-                "static friction, at the onset of sliding (N m or N); give stribeck too",
-                level=LAW,
-                dimension=PUSH,
+                "static friction, at the onset of sliding (N m or N); give stribeck too", level=LAW, dimension=PUSH
             ),
             **BY_REACTION,
             "stribeck": Scalar(

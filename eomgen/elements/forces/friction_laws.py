@@ -347,9 +347,7 @@ def has_bristles(values: Mapping[str, Any]) -> bool:
 FRICTION: Fields = {
     "friction": Scalar("coefficient of sliding friction", level=LAW, dimension=NONE),
     "static_friction": Scalar(
-        "coefficient of static friction, at the onset of sliding; give stribeck too",
-        level=LAW,
-        dimension=NONE,
+        "coefficient of static friction, at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
     ),
     "stribeck": Scalar(
         "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
@@ -374,12 +372,10 @@ FRICTION_CHOICE: Fields = {
     ),
     "transition": Scalar("velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE),
     "bristle_stiffness": Scalar(
-        "friction of friction_law lugre per deflection of the bristles",
-        dimension=NONE.times(REACH, -1),
+        "friction of friction_law lugre per deflection of the bristles", dimension=NONE.times(REACH, -1)
     ),
     "bristle_damping": Scalar(
-        "friction of friction_law lugre per rate of the deflection",
-        dimension=NONE.times(RATE, -1),
+        "friction of friction_law lugre per rate of the deflection", dimension=NONE.times(RATE, -1)
     ),
 }
 _PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")

@@ -18,11 +18,7 @@ from .paths import BETWEEN, VIA, PathForce, read_path
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
 # problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement,
 # rounded as there (docs/forces.md compares them with those of OpenSim).
-_ACTIVE = (
-    (0.814, 1.06, 0.162, 0.0633),
-    (0.433, 0.717, -0.0299, 0.2),
-    (0.1, 1.0, 0.354, 0.0),
-)
+_ACTIVE = ((0.814, 1.06, 0.162, 0.0633), (0.433, 0.717, -0.0299, 0.2), (0.1, 1.0, 0.354, 0.0))
 _VELOCITY = (-0.318, -8.149, -0.374, 0.886)
 _STRAIN, _SHAPE = 0.6, 4.0
 SHARPNESS = 10.0  #: with which activation changes to deactivation
@@ -161,9 +157,7 @@ TYPES = table(
                 dimension=SPEED,
             ),
             "pennation": Scalar(
-                "angle of the fibres to the tendon at their optimal length (rad)",
-                default=0,
-                dimension=NONE,
+                "angle of the fibres to the tendon at their optimal length (rad)", default=0, dimension=NONE
             ),
             "damping": Scalar("damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE),
             "via": VIA,

@@ -231,9 +231,7 @@ NORMAL: Fields = {
     "restitution": Scalar("coefficient of restitution, from which the dissipation is computed", dimension=NONE),
     "velocity": Scalar("impact velocity (m/s) at which that restitution holds", dimension=RATE),
     "formula": Choice(
-        "formula that gives the dissipation from the restitution",
-        default=RESTITUTIONS[0],
-        choices=RESTITUTIONS,
+        "formula that gives the dissipation from the restitution", default=RESTITUTIONS[0], choices=RESTITUTIONS
     ),
 }
 #: Which law it is, and what only some laws have.

@@ -33,10 +33,10 @@ class GuidePoint(Vector):
         for name in sorted(symbols_of(point) - {*reader.names.of("parameter"), *names}):
             if name in reader.names.kinds:
                 message = f"the {reader.names.kinds[name]} {name!r} cannot be used here"
-                reader.faults.add(path, message, f"allowed are parameters and {shown}", "EG-REFERENCE")
+                reader.fault(path, message, f"allowed are parameters and {shown}", "EG-REFERENCE")
         if not symbols_of(point) & {*names} and not reader.faults.under(path):
             remedy = f"use the joint's own {shown} in the expressions"
-            reader.faults.add(path, f"does not depend on {shown}", remedy, "EG-EXPRESSION")
+            reader.fault(path, f"does not depend on {shown}", remedy, "EG-EXPRESSION")
         return Shape(point, tuple(reader.graph.symbol(name) for name in names))
 
     def absent(self, reader: Any) -> Shape:

@@ -228,11 +228,7 @@ def parameter_rotation(graph: Graph, e: Sequence[Expr]) -> Mat3:
     w1, w2, w3 = s1 * e0, s2 * e0, s3 * e0
     xx, yy, zz, xy, xz, yz = s1 * e1, s2 * e2, s3 * e3, s1 * e2, s1 * e3, s2 * e3
     i = graph.one
-    return (
-        (i - (yy + zz), xy - w3, xz + w2),
-        (xy + w3, i - (xx + zz), yz - w1),
-        (xz - w2, yz + w1, i - (xx + yy)),
-    )
+    return ((i - (yy + zz), xy - w3, xz + w2), (xy + w3, i - (xx + zz), yz - w1), (xz - w2, yz + w1, i - (xx + yy)))
 
 
 def parameter_rates(e: Sequence[Expr], w: Sequence[Expr]) -> list[Expr]:

@@ -166,11 +166,7 @@ class Planar(AxisJoint):
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
     type_name = "planar"
     look = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
-    coordinates = (
-        Coordinate("_x", "length"),
-        Coordinate("_y", "length"),
-        Coordinate("_3", "angle"),
-    )
+    coordinates = (Coordinate("_x", "length"), Coordinate("_y", "length"), Coordinate("_3", "angle"))
     held = "z"
     kept = "z"
 

@@ -9,20 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...base.limits.numbers import TINY
-from .scalars import (
-    Scalar,
-    atan2,
-    combine,
-    cos,
-    dot,
-    entries,
-    require_rotation,
-    rows,
-    shaped,
-    sin,
-    sqrt,
-    where_less,
-)
+from .scalars import Scalar, atan2, combine, cos, dot, entries, require_rotation, rows, shaped, sin, sqrt, where_less
 
 SMALL = 1e-4  #: squares below which series replace quotients 0/0; the terms left out are below rounding
 
