@@ -13,7 +13,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, Entry, table
 from ..elements.forces.force import Force, Load, MarkerLoad, MovingView, View
-from ..elements.forces.friction_laws import SUMS, UNIT, DryFriction, LuGre, has_bristles, read_friction
+from ..elements.forces.friction import SUMS, UNIT, DryFriction, LuGre, has_bristles, read_friction
 from ..elements.forces.normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
 from ..elements.frames import Frame, Marker
 from ..elements.kinds import Law
@@ -142,7 +142,7 @@ class ContactGroups(Force):
     def _slots(self) -> int:
         """How many numbers a pair has in the sum: its states, and where shapes have pieces what their rates need too.
 
-        Soil needs how many pieces touch; see also :meth:`~..elements.forces.friction_laws.LuGre.sums`.
+        Soil needs how many pieces touch; see also :meth:`~..elements.forces.friction.LuGre.sums`.
         """
         if self.on_bed:
             return self._each + COUNTS

@@ -13,7 +13,7 @@ from ..base.numeric.outline_pieces import CHOSEN, PIECE
 from ..base.numeric.pair_sums import POSE
 from ..base.numeric.polygon_edges import EDGE, OTHER, OWN
 from ..elements.forces.force import MarkerLoad, View, where
-from ..elements.forces.friction_laws import DryFriction
+from ..elements.forces.friction import DryFriction
 from ..elements.forces.normal_laws import ElasticPart, NormalLaw
 from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec

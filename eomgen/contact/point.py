@@ -11,7 +11,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, Entry, table
 from ..elements.forces.force import Force, Load, MarkerLoad, Measured, View
-from ..elements.forces.friction_laws import (
+from ..elements.forces.friction import (
     FRICTION,
     FRICTION_CHOICE,
     UNIT,

@@ -13,7 +13,7 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
 from ..elements.element_type import Entry
 from ..elements.forces.force import beyond_zero, where
-from ..elements.forces.friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
+from ..elements.forces.friction import FRICTION, FRICTION_CHOICE, DryFriction, Slip
 from ..elements.forces.normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
 from ..elements.kinds import Choice, Fields, Flag, Radii, Scalar
 from ..expr import vectors as vec

@@ -22,6 +22,7 @@ from ..model.names import nearest
 from ..model.printed_names import give_latex
 from ..model.scope import RATES
 from ..model.sympy_face import (
+    SympyNames,
     function_name,
     is_sympy,
     lower_sympy,
@@ -32,7 +33,6 @@ from ..model.sympy_face import (
     sympy_name,
     with_sympy,
 )
-from ..model.sympy_text import SympyNames
 
 KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
 

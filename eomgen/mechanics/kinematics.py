@@ -15,7 +15,7 @@ from ..errors import ModelError
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jvp
 from ..expr.spatial import Twist
-from ..model.input_rates import clock
+from ..model.equations import clock
 from ..model.mechanism import Mechanism
 from .loops import (
     Constraints,

@@ -21,7 +21,7 @@ from ..elements.constraints import CoordinateDriver
 from ..elements.frames import GROUND
 from ..elements.joints import QuaternionSlot
 from ..elements.joints.joint import parameter_rates
-from ..elements.joints.rods import Distance, RevoluteSpherical
+from ..elements.joints.joint_types import Distance, RevoluteSpherical
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph

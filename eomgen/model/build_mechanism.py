@@ -17,9 +17,17 @@ from ..expr.core import Expr, Graph
 from ..expr.shown import quoted, shown
 from .bodies import check_bodies, check_display, read_body, read_body_shapes
 from .build_functions import build_functions
-from .build_joints import build_joints, declare_coordinates, with_locks
-from .build_quantities import Outputs, read_input, read_parameter, with_signal
+from .build_joints import (
+    build_elements,
+    build_joints,
+    check_turns,
+    declare_contacts,
+    declare_coordinates,
+    own_states,
+    with_locks,
+)
 from .build_states import (
+    Outputs,
     build_events,
     build_states,
     build_switches,
@@ -27,23 +35,27 @@ from .build_states import (
     declare_states,
     declare_switches,
     events_of_switches,
+    read_input,
+    read_parameter,
+    with_signal,
 )
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
-from .element_entry import build_elements, check_turns, declare_contacts, own_states
 from .equations import (
+    add_rates,
     build_equations,
     build_lagrangian,
     check_energies,
+    clock,
     declare_equations,
     declare_lagrangian,
     differentiate,
+    list_differentiated,
     require_quadratic,
 )
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
-from .input_rates import add_rates, clock, list_differentiated
 from .mechanism import Body, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .quantities import SUMS, CarriedQuantity, WrenchQuantity

@@ -18,11 +18,10 @@ from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from ..expr.core import Graph
-from .build_joints import declare_coordinates
+from .build_joints import declare_contacts, declare_coordinates, own_states
 from .build_states import declare_states, declare_switches
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
-from .element_entry import declare_contacts, own_states
 from .fields import ADDED, COMPONENT
 from .names import fault_of_name, function_words, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named

@@ -32,7 +32,7 @@ from .methods import check_keywords, checked_keywords, keywords_of
 from .names import fault_of_name
 from .quantities import COM
 from .sympy_face import function, named, names_of, one_or_several, require_name, symbol
-from .write_yaml import plain, plain_description, yaml_text
+from .yaml_file import plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -137,7 +137,7 @@ class Builder(ElementMethods):
             A coordinate is neither a symbol nor a function of time ``q(t)``.
         """
         from .equations import describe_lagrangian
-        from .sympy_text import SympyNames
+        from .sympy_face import SympyNames
 
         coordinates = one_or_several(coordinates)
         given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
@@ -150,7 +150,7 @@ class Builder(ElementMethods):
     ) -> Self:
         """Make a model from equations M v' = f; see :func:`eomgen.model.equations.describe_equations`."""
         from .equations import describe_equations
-        from .sympy_text import SympyNames
+        from .sympy_face import SympyNames
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
         coordinates = one_or_several(coordinates)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..elements.rotations.scalars import matrix_from_roll_pitch_yaw
+from ..elements.scalars import matrix_from_roll_pitch_yaw
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.vectors import Mat3

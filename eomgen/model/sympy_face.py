@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import partialmethod
+from itertools import count
 from typing import TYPE_CHECKING, Any
+from unicodedata import normalize
 
+from ..base.latex import GREEK, NotationError, read_latex
+from ..base.notation import split_rate
+from ..base.operations import OPERATIONS
 from ..base.texts import shown
-from ..errors import ExpressionError, ModelError, Problem, ill_typed
+from ..errors import ExpressionError, ModelError, Problem, cannot, ill_typed
+from ..expr.core import Expr, Graph
+from ..expr.functions import Function
 from ..expr.shown import parts_of, quoted, shortened
-from .description import items
+from .description import Description, items
+from .expressions import parse
+from .names import fault_of_name, unique
+from .quantities import Named
+from .scope import RATES
 
 if TYPE_CHECKING:
     from ..expr.core import Expr, Graph
@@ -217,3 +230,247 @@ def derivative_names(expressions: list[Any]) -> list[str]:
 
     slopes = (part for part in _parts(expressions) if isinstance(part, sympy.Derivative))
     return sorted({name for slope in slopes if (name := function_name(slope))})
+
+
+# -- names and texts ---------------------------------------------------------------------------------------------------
+
+
+LARGE = 200  #: operations of an expression from which given equations are written with intermediates
+_WORDS = {sign: word for word, sign in GREEK.items()}
+
+
+class SympyNames:
+    """What SymPy's names are called in a model; only those that it cannot use are changed.
+
+    Parameters
+    ----------
+    given : nested lists and mappings
+        Everything in which names stand.
+    coordinates : sequence
+        Where they are functions, their argument is the time, whatever it is called.
+    """
+
+    def __init__(self, given: Any, coordinates: Any) -> None:
+        import sympy
+        from sympy.core.function import AppliedUndef
+
+        found: dict[Any, str] = {}
+        listed = [x for x in one_or_several(coordinates) if isinstance(x, AppliedUndef) and len(x.args) == 1]
+        time = sympy.Symbol("t")
+        clock = next((x.args[0] for x in listed if isinstance(x.args[0], sympy.Symbol) and x.args[0].name != "t"), time)
+        self.replaced: dict[Any, Any] = {} if clock == time else {clock: time}
+        for expression in filter(is_sympy, values_in(given, keys=True)):
+            for part in parts_of(expression):
+                if isinstance(part, sympy.Symbol) and part.name != clock.name:
+                    found[part] = part.name
+                elif isinstance(part, AppliedUndef) and [getattr(x, "name", "") for x in part.args] == [clock.name]:
+                    found[part] = part.func.__name__
+        self.renamed: dict[str, str] = {}
+        taken = {name + rate for name in found.values() if not fault_of_name(name, symbol=True) for rate in RATES}
+        for name in sorted(set(found.values())):
+            if fault_of_name(name, symbol=True):
+                stem = split_rate(name)[0]
+                self.renamed[stem] = self.renamed.get(stem) or unique(_plain(stem), "symbol", taken, RATES)
+        for part, name in found.items():
+            if (new := self.name(name)) != name:
+                if isinstance(part, sympy.Symbol):
+                    self.replaced[part] = sympy.Symbol(new, **part.assumptions0)
+                else:
+                    self.replaced[part] = sympy.Function(new)(time)
+
+    def name(self, name: str) -> str:
+        """The name in the model; of a rate by that of its coordinate."""
+        stem = name if name in self.renamed else split_rate(name)[0]
+        return self.renamed[stem] + name[len(stem) :] if stem in self.renamed else name
+
+    def put(self, value: Any) -> Any:
+        """A value with the names of the model; texts are left as they are, unless they are keys."""
+        if not self.replaced:
+            return value
+        if isinstance(value, Mapping):
+            keys = (self.name(key) if isinstance(key, str) else self.put(key) for key in value)
+            return dict(zip(keys, map(self.put, value.values()), strict=True))
+        if hasattr(value, "xreplace"):  # SymPy's matrices too, which keep their shape
+            return value.xreplace(self.replaced)
+        listed = items(value)
+        return value if listed is None else [self.put(part) for part in listed]
+
+    def latex(self, given: Any = None) -> Any:
+        """The LaTeX of names: as it is given, else what the names were in SymPy where that is LaTeX."""
+        own: dict[str, str] = {}
+        for old, new in self.renamed.items():
+            text = "".join(f"\\{_WORDS[c]} " if c in _WORDS else c for c in normalize("NFKC", old)).strip()
+            with suppress(NotationError):
+                if text.startswith("\\"):
+                    read_latex(text)
+                    own[new] = text
+        return own | self.put(dict(given or {})) if own else self.put(given)
+
+    def noted(self, description: Description) -> Description:
+        """The description with a note of what was renamed."""
+        places, given = ("outputs", "parameters", "inputs"), description.values.get("equations", {})
+        homes = {entry.name: place for place in places for entry in description.sections[place]}
+        for name in (*given.get("coordinates", ()), *given.get("velocities", ())):  # which outputs may repeat
+            homes.pop(name, None)
+        renamed: dict[str, dict[str, str]] = {}
+        for old, new in self.renamed.items():
+            renamed.setdefault(homes.get(new, "coordinates"), {})[old] = new
+        description.note_renamed(renamed)
+        return description
+
+
+def _plain(name: str) -> str:
+    """Letters like ``theta_1`` of ``\\theta_{1}``."""
+    words = "".join(_WORDS.get(c, c) for c in normalize("NFKC", name)).replace("_{", "_")
+    return words.translate({ord(c): None for c in "\\{}$"}).strip()
+
+
+def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
+    """A SymPy expression as a text that the expressions of a model file know.
+
+    Parameters
+    ----------
+    expression : sympy.Expr
+    functions : collection of str, optional
+        Names of the functions that the model declares.
+
+    Raises
+    ------
+    UsageError
+        The expression has parts that such a text cannot say.
+    """
+    import sympy
+    from sympy.core.function import AppliedUndef
+    from sympy.printing.str import StrPrinter
+
+    def named(printer: Any, e: Any, word: str) -> str:
+        return f"{word}({', '.join(printer._print(x) for x in e.args)})"
+
+    class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
+        """SymPy's text with the names of functions that a model file uses."""
+
+        def _print_Float(self, e: Any) -> str:
+            return repr(float(e))
+
+        def _print_Heaviside(self, e: Any) -> str:
+            if 2 * e.args[1] != 1:
+                raise cannot(f"{shortened(e)} cannot be written as a text: only heaviside with the value 1/2 at 0 can")
+            return f"heaviside({self._print(e.args[0])})"
+
+        def _print_Exp1(self, e: Any) -> str:
+            return "exp(1)"
+
+        def _print_And(self, e: Any) -> str:
+            return "(" + " and ".join(self._print(x) for x in e.args) + ")"
+
+        def _print_Or(self, e: Any) -> str:
+            return "(" + " or ".join(self._print(x) for x in e.args) + ")"
+
+        def _print_Not(self, e: Any) -> str:
+            return f"(not {self._print(e.args[0])})"
+
+        def _print_Relational(self, e: Any) -> str:
+            return f"({self._print(e.lhs)} {e.rel_op} {self._print(e.rhs)})"
+
+        def _print_Piecewise(self, e: Any) -> str:
+            *pieces, last = e.args
+            if last.cond != True:  # noqa: E712 - SymPy's own true
+                raise cannot(f"{shortened(e)} leaves cases without a value; end the Piecewise with (expression, True)")
+            text = self._print(last.expr)
+            for piece in reversed(pieces):
+                text = f"where({self._print(piece.cond)}, {self._print(piece.expr)}, {text})"
+            return str(text)
+
+        def _print_AppliedUndef(self, e: Any) -> str:
+            if e.func.__name__ not in functions:
+                return function_name(e) or str(e)
+            return f"{e.func.__name__}({', '.join(self._print(x) for x in e.args)})"
+
+        def _print_Derivative(self, e: Any) -> str:
+            if e.expr.func.__name__ not in functions:
+                return function_name(e) or str(e)
+            return self._slope(e, e.expr.args)
+
+        def _print_Subs(self, e: Any) -> str:
+            slope = e.expr
+            if not isinstance(slope, sympy.Derivative) or slope.expr.func.__name__ not in functions:
+                return str(e)
+            places = dict(zip(e.variables, e.point, strict=True))
+            return self._slope(slope, [x.xreplace(places) for x in slope.expr.args])
+
+        def _slope(self, e: Any, operands: Any) -> str:
+            wanted = dict(e.variable_count)
+            orders = [wanted.get(x, 0) for x in e.expr.args]
+            if sum(orders) != sum(wanted.values()) or any(set(wanted) & x.free_symbols - {x} for x in e.expr.args):
+                raise cannot(f"{shortened(e)} cannot be written as a text: write out the chain rule of its derivative")
+            call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
+            return f"diff({', '.join([call, *map(str, orders)])})"
+
+    for row in OPERATIONS.values():
+        if row.word and row.sympy_class:
+            setattr(Printer, f"_print_{row.sympy_class}", partialmethod(named, word=row.word))
+    try:
+        text = str(Printer().doprint(expression))
+    except RecursionError:
+        raise cannot(f"{shortened(expression)} is nested too deeply to be written as a text") from None
+    except ValueError:  # Python writes whole numbers of some thousand digits and no longer ones
+        raise cannot(
+            f"{shortened(expression)} contains a number with too many digits to be written as a text"
+        ) from None
+    graph = Graph()
+    for call in expression.atoms(AppliedUndef) if isinstance(expression, sympy.Basic) else ():
+        if call.func.__name__ in functions:
+            graph.declare(Function(call.func.__name__, len(call.args), None))
+    known = {*free_names([expression]), "t"} | {f + rate for f in function_names([expression]) for rate in RATES}
+
+    def resolve(name: str) -> Expr:
+        if name not in known:  # a constant of SymPy such as I or oo
+            raise ExpressionError(f"{name} is not a real number")
+        return graph.symbol(name)
+
+    def locate(quantity: Named) -> Expr:
+        return resolve(str(quantity))
+
+    try:
+        parse(text, graph, resolve, locate)
+    except ExpressionError as error:
+        raise cannot(f"{shortened(expression)} cannot be written as a text: {shortened(error)}") from None
+    return text
+
+
+# -- given equations ---------------------------------------------------------------------------------------------------
+def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The section with the common parts of its expressions named, if one of them is large."""
+    found = [*filter(is_sympy, values_in(equations))]
+    if not found or max(int(x.count_ops()) for x in found) < LARGE:
+        return equations
+    import sympy
+    from sympy.core.function import AppliedUndef
+
+    inside: dict[Any, Any] = {}
+    for name, part in equations.get("intermediates", {}).items():
+        if not is_sympy(part):
+            return equations
+        inside[sympy.Symbol(name)] = part.xreplace(inside)
+    equations = {key: value for key, value in equations.items() if key != "intermediates"}
+    found = [x.xreplace(inside) for x in values_in(equations) if is_sympy(x)]
+
+    plain: dict[Any, Any] = {}
+    names: set[str] = set()
+    for expression in found:
+        names |= {symbol.name for symbol in expression.atoms(sympy.Symbol)}
+        for part in expression.atoms(AppliedUndef, sympy.Derivative):
+            if (name := function_name(part)) is not None:
+                plain[part] = sympy.Symbol(name)
+    # a velocity may hold the function of its coordinate inside
+    rates = {part: symbol for part, symbol in plain.items() if isinstance(part, sympy.Derivative)}
+    names |= {symbol.name for symbol in plain.values()}
+    free = (sympy.Symbol(f"z{k}") for k in count(1) if f"z{k}" not in names)
+    common, short = sympy.cse([x.xreplace(rates).xreplace(plain) for x in found], symbols=free, order="none")
+    replaced = iter(short)
+    result: dict[str, Any] = {}
+    for key, value in equations.items():
+        if key == "mass_matrix":
+            result["intermediates"] = {str(symbol): expression for symbol, expression in common}
+        result[key] = with_sympy(value, lambda x: next(replaced))
+    return result

@@ -1,15 +1,17 @@
-"""Constraint elements: gear pairs, racks and belts, as relations between coordinates."""
+"""Constraint elements: gear pairs, racks, belts and planetary sets, as relations between coordinates."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ...base.records import dataclass
 from ...base.value_rules import POSITIVE
+from ...base.value_rules import WHEELS as WHEELS_FIT
 from ...expr.core import Expr, sin
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, Found, table
-from ..kinds import Flag, JointPair, JointReference, Scalar, Two
+from ..kinds import Flag, JointPair, JointReference, Scalar, Two, Wheels
 from ..looks import PitchCircles, RackAndPinion, Seen
 from .constraint import Condition, Constraint, ConstraintView
 
@@ -173,4 +175,137 @@ TYPES = table(
         _belt,
         one_of=("radii", "teeth"),
     ),
+)
+
+
+# -- planetary sets ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Planetary(Constraint):
+    """A planetary set; angles of sun, ring and carrier from the frame, that of the planet from the carrier.
+
+    Sun and planet mesh outside, ring and planet inside (Willis; Norton, Design of Machinery, sec. 9.9):
+
+        r_s / r_p (sun - carrier) + planet = phase,    r_r / r_p (ring - carrier) - planet = 0,
+
+    and, without the planet, (r_s sun + r_r ring) / (r_s + r_r) = carrier + phase.  A wheel that is fixed to the frame
+    has the angle 0; one whose radius is None is not there.
+    """
+
+    sentence = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
+    formula = r"\frac{r_s \varphi_s + r_r \varphi_r}{r_s + r_r} = \varphi_c"
+    type_name = "planetary"
+    written = True
+    sun: Expr
+    ring: Expr
+    carrier: Expr
+    planet: Expr | None  #: angle from the carrier; None if the planets are not bodies of the model
+    sun_radius: Expr | None
+    ring_radius: Expr | None
+    planet_radius: Expr | None
+    phase: Expr
+
+    def drawn(self) -> list[Seen]:
+        (r_s, r_r, r_p), found = self._radii(), list[Seen]()
+        if self.planet is None or r_p is None:
+            return []
+        if r_s is not None:
+            found.append(PitchCircles(self.sun, self.planet, r_p / r_s, self.carrier))
+        if r_r is not None:
+            found.append(PitchCircles(self.ring, self.planet, -(r_p / r_r), self.carrier))
+        return found
+
+    def _radii(self) -> tuple[Expr | None, Expr | None, Expr | None]:
+        """Of sun, ring and planet, as far as they are known."""
+        r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
+        if r_p is None and r_s is not None and r_r is not None:
+            r_p = 0.5 * (r_r - r_s)
+        return r_s, r_r, r_p
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        (r_s, r_r, r_p), rows = self._radii(), list[Condition]()
+        if self.planet is None:
+            if r_s is not None and r_r is not None:
+                mean = (r_s * self.sun + r_r * self.ring) / (r_s + r_r)
+                rows.append(Condition("ratio", mean - self.carrier - self.phase, "angle"))
+            return rows
+        if r_p is not None and r_s is not None:
+            sun = r_s / r_p * (self.sun - self.carrier) + self.planet
+            rows.append(Condition("sun_mesh", sun - self.phase, "angle"))
+        if r_p is not None and r_r is not None:
+            ring = r_r / r_p * (self.ring - self.carrier) - self.planet
+            rows.append(Condition("ring_mesh", ring, "angle"))
+        return rows
+
+
+def _planetary(e: Entry) -> Planetary | None:
+    """Angles are measured from the frame; the planet's from the frame or the carrier."""
+    key = "radii" if "radii" in e.values else "teeth"
+    sizes = e[key]
+    found = {part: e[part] for part in ("sun", "ring", "carrier", "planet") if part in e.values}
+    if sizes is not None:
+        e.judge(key, WHEELS_FIT, [*sizes.values()], ([*sizes],))
+    if any(x is None for x in found.values()) or sizes is None or e.at_fault():
+        return None
+    parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
+    for part in ("sun", "ring"):
+        if part in parts and part not in sizes:
+            e.fault(key, f"the {part} has a joint but no size", f"give {key} of the {part}", "EG-MISSING")
+    main = [parts[part] for part in ("sun", "ring", "carrier") if part in parts]
+    for other in main[1:]:
+        e.require_one_carrier("", main[0], other)
+    outer = {"sun", "ring"} & sizes.keys()
+    if not outer or ("planet" not in parts and len(outer) < 2):
+        e.fault(key, "these wheels do not determine a ratio", "give sun and ring, or planet and one more", "EG-MISSING")
+    if "planet" in parts and len(sizes) < 2:
+        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(Wheels.names)}", "EG-MISSING")
+    if len(parts) < (2 if "planet" in parts else 1) or not main:
+        e.fault(
+            "", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet", "EG-MISSING"
+        )
+    if e.at_fault():
+        return None
+    sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
+    r_s, r_r, r_p = (sizes.get(wheel) for wheel in ("sun", "ring", "planet"))
+    return Planetary(e.name, sun, ring, carrier, _planet(e, parts, carrier), r_s, r_r, r_p, e["phase"])
+
+
+def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
+    """The planet's angle from the carrier."""
+    if "planet" not in parts:
+        return None
+    planet, base = e.symbol(parts["planet"]), e.carrier(parts["planet"])
+    if base is None or "carrier" not in parts or base == e.carrier(parts["carrier"], "successor"):
+        return planet
+    if base == e.carrier(parts["carrier"]):
+        return planet - carrier
+    message = f"{parts['planet'].name!r} is measured neither from the carrier nor from the frame"
+    e.fault("planet", message, "make the carrier or the frame the predecessor of the planet's joint", "EG-REFERENCE")
+    return None
+
+
+_FIXED = "joint that turns the {0} relative to the frame; fixed if left out"
+
+TYPES |= table(
+    ElementType(
+        "planetary",
+        "a planetary gear set: its meshing wheels follow Willis' equation.",
+        {
+            **{part: JointReference(_FIXED.format(part), measure="angle") for part in ("sun", "ring", "carrier")},
+            "planet": JointReference(
+                "joint of a planet on the carrier or on the frame, needed only if a planet is a body", measure="angle"
+            ),
+            "radii": Wheels("radii of the wheels that exist: sun, planet, ring (m)", dimension=LENGTH),
+            "teeth": Wheels("numbers of teeth of the wheels that exist: sun, planet, ring", dimension=NONE),
+            "phase": Scalar(
+                "phase in (r_s sun + r_r ring) / (r_s + r_r) = carrier + phase (rad); with a planet, that of its mesh "
+                "with the sun",
+                default=0,
+                dimension=NONE,
+            ),
+        },
+        _planetary,
+        one_of=("radii", "teeth"),
+    )
 )

@@ -15,7 +15,7 @@ from ..element_type import Entry, Where, element, key, table
 from ..frames import Marker
 from ..kinds import LAW, Matrix6
 from ..looks import RUBBER, Drawn, Seen
-from ..rotations.scalars import dot
+from ..scalars import dot
 from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN
 

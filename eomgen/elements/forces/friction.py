@@ -1,22 +1,464 @@
-"""Force elements, friction of a joint, by a given force or by the one that the joint carries."""
+"""Force elements, dry friction: laws of a sliding velocity, alone or with states of bristles; friction of a joint."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
+from ...base.limits.contacts import AT_REST
 from ...base.records import dataclass
-from ...base.value_rules import NOT_NEGATIVE
+from ...base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
+from ...expr import vectors as vec
 from ...expr.core import Expr, Graph, sqrt
-from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, STIFFNESS
+from ...expr.vectors import Mat3, Vec3
+from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
 from ..element_type import ElementType, Entry, table
-from ..kinds import LAW, Fields, Scalar
-from .force import Force, Load, View, beyond_zero
-from .friction_laws import FRICTION_CHOICE, Friction, LineFriction, has_bristles, read_friction
+from ..kinds import LAW, Choice, Fields, Scalar
+from .force import Force, Load, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, Path, PathForce, read_coordinate
 from .springs import Damper
+
+# -- dry friction ------------------------------------------------------------------------------------------------------
+
+
+class DryFriction(ABC):
+    """What opposes sliding in a contact, as a part of the normal force; ``formula`` says it in LaTeX."""
+
+    formula: ClassVar[str]
+
+    @abstractmethod
+    def in_plane(self, slip: Slip) -> Vec3:
+        """Friction at a sliding velocity, with the direction of the velocity."""
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
+        """The law with other expressions, in the graph of a pair; without its states."""
+        law: DryFriction = map_law(self, own)
+        return law
+
+    def on_pad(self, area: Expr) -> DryFriction:
+        """The law of a point that stands for an area of a plate."""
+        return self
+
+    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> DryFriction:
+        """The law with its states; in contacts of the plane ``lateral`` is the direction across the plane."""
+        return self
+
+    def drag(self, push: Expr, slip: Slip) -> Vec3:
+        """The force on the second surface (N), across the normal, beside a normal force."""
+        return vec.scale(-push, self.in_plane(slip))
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        """Rates of its states where surfaces are apart."""
+        return ()
+
+    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
+        """Rates of its states at a sliding velocity."""
+        return ()
+
+
+class LineFriction(DryFriction):
+    """Friction that acts in joints too, where it is a force; ``joint_formula`` says it there, in LaTeX."""
+
+    joint_formula: ClassVar[str]
+
+    @abstractmethod
+    def along(self, rate: Expr) -> Expr:
+        """Friction at a velocity along a line, with the sign of the velocity."""
+
+    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
+        """Rates of its states at a velocity along a line."""
+        return ()
+
+
+class Slip(NamedTuple):
+    """How surfaces slide: velocity and normal (ground axes), penetration, normal force, and axes of the first one."""
+
+    velocity: Vec3
+    normal: Vec3
+    depth: Expr
+    push: Expr
+    axes: Mat3
+
+    def axes_of_states(self, lateral: Vec3 | None) -> Mat3:
+        """In whose axes states are written: of the first surface, or along the surface, across the plane, normal."""
+        if lateral is None:
+            return self.axes
+        return vec.transpose((vec.cross(self.normal, lateral), lateral, self.normal))
+
+    def across(self, states: Sequence[Expr], lateral: Vec3 | None) -> Vec3:
+        """A vector of states in ground axes, less its part along the normal."""
+        zero = self.depth.graph.zero
+        x, y, z = (*states, zero, zero)[:3]
+        found = vec.times(self.axes_of_states(lateral), (x, y, z))
+        return vec.sub(found, vec.scale(vec.dot(found, self.normal), self.normal))
+
+
+def stribeck_level(squared: Expr, dynamic: Expr, static: Expr | None, stribeck: Expr | None) -> Expr:
+    """dynamic + (static - dynamic) exp(-(v / stribeck)^2) of the squared velocity."""
+    if static is None or stribeck is None:
+        return dynamic
+    fall = squared.graph.apply("exp", -squared / (stribeck * stribeck))
+    return dynamic + (static - dynamic) * fall
+
+
+# -- bristles ----------------------------------------------------------------------------------------------------------
+
+
+UNIT = "J^0.5"  #: of the state of a contact
+SUMS = 3  #: how many numbers :meth:`LuGre.sums` has beside one for each state
+
+
+@dataclass(frozen=True)
+class LuGre(LineFriction):
+    """Friction of bristles whose state holds a body at rest.
+
+    In a joint the state is the deflection z,
+
+        z' = v - stiffness |v| / c(v) z,  friction = stiffness z + damping z' + viscous v
+
+    after Canudas de Wit, Olsson, Astrom and Lischinsky (1995), IEEE Trans. Autom. Control 40, 419-425, with c(v) of
+    :class:`Friction`.  In a contact, of normal force N, the state is e = sqrt(stiffness N) z, a vector
+    along the surface, whose e^2 / 2 is the energy in the bristles:
+
+        friction = m (e + damping / stiffness e') + viscous N v
+        e' = m v - stiffness |v| / c(v) e
+        m = N / max(sqrt(N / stiffness), |e| / c_s),  c_s the greatest c(v)
+
+    At a constant N this is the law above, with vectors (Velenis, Tsiotras and Canudas de Wit, 2002).  The law above
+    gains energy where N rises while bristles are bent: their energy, stiffness N z^2 / 2, rises with it.  Here the
+    power m e v of the bristles is (e^2 / 2)' + stiffness |v| / c(v) e^2, whatever N does.  Where N falls, e may stand
+    for more than N can hold; then m is as large as c_s allows.  The damping takes while e grows with N what it gives
+    back while e falls, so that a body that bounces as it slides loses c times the impulse of N, as by the law of
+    Canudas de Wit and Tsiotras (1999), Proc. 38th IEEE Conf. Decis. Control, 3746-3751, whose friction is N times that
+    of z.  Where damping |v| > 4 c(v) it may give more than the loss and the viscous part take (Barahanov and Ortega,
+    IEEE Trans. Autom. Control 45, 2000); it gives no more than they take here.  Between surfaces that are apart the
+    bristles spring back, e' = -(stiffness / damping) e.
+    """
+
+    formula: ClassVar[str] = (
+        r"F_t = -m \left(e + \frac{\sigma_1}{\sigma_0} \dot{e}\right) - F_n b v, \quad "
+        r"m = \frac{F_n}{\max(\sqrt{F_n/\sigma_0}, |e|/c_s)}, \quad "
+        r"\dot{e} = m v - \sigma_0 \frac{|v|}{c(v)} e"
+    )
+    joint_formula: ClassVar[str] = (
+        r"F = -(\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
+    )
+    dynamic: Expr
+    stiffness: Expr
+    damping: Expr
+    viscous: Expr
+    static: Expr | None
+    stribeck: Expr | None
+    deflections: tuple[Expr, ...]  #: states: z of a joint, e of a contact
+    lateral: Vec3 | None = None
+
+    def along(self, rate: Expr) -> Expr:
+        (z,), (change,) = self.deflections, self.rates_along(rate)
+        return self.stiffness * z + self.damping * change + self.viscous * rate
+
+    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
+        return (rate - self._decay(rate * rate, rate.graph.apply("abs", rate)) * self.deflections[0],)
+
+    def in_plane(self, slip: Slip) -> Vec3:
+        """Of states in the axes of the first surface; those along the normal have no effect."""
+        damped, power, loss = self._damping(slip)
+        gains = power.graph.apply("lt", loss + power, 0.0)
+        damped = vec.scale(where(gains, -loss / where(gains, power, 1.0), 1.0), damped)
+        bristles = vec.scale(1.0 / self._give(slip), vec.add(self._bent(slip), damped))
+        return vec.add(bristles, vec.scale(self.viscous, slip.velocity))
+
+    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
+        """Of its states, at one place of contact."""
+        *drive, decay, push, _ = self.sums(slip)
+        return self.rates_of((*drive, decay, push, decay.graph.zero))
+
+    def sums(self, slip: Slip) -> tuple[Expr, ...]:
+        """What one of several places of contact adds: m v, the decay times N, N, and the decay that damping needs."""
+        push = _pressing(slip)
+        velocity = vec.transpose_times(slip.axes_of_states(self.lateral), slip.velocity)
+        drive = push / self._give(slip)
+        decay, bent = self._decay_in_plane(slip), self._bent(slip)
+        power = self._damping(slip)[1]
+        stored = vec.dot(bent, bent)
+        gives = push.graph.apply("lt", power, 0.0)  # only bent bristles do
+        needed = where(gives, push.graph.apply("min", decay, -power / where(gives, stored, 1.0)), 0.0)
+        return (*(drive * v for v, _ in zip(velocity, self.deflections, strict=False)), push * decay, push, needed)
+
+    def rates_of(self, sums: Sequence[Expr]) -> tuple[Expr, ...]:
+        """Rates from what all places of contact add; the decay is the mean of theirs by their normal forces.
+
+        So the power of all bristles is that of their energy and of the decay, which is never negative, nor less than
+        what the damping gives.
+        """
+        *drive, decay, push, needed = sums
+        touches = push.graph.apply("lt", 0.0, push)
+        mean = push.graph.apply("max", decay / where(touches, push, 1.0), needed)
+        return tuple(
+            where(touches, rise - mean * e, back)
+            for rise, e, back in zip(drive, self.deflections, self.rates_apart(), strict=True)
+        )
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        relaxed = self.stiffness / self.damping
+        return tuple(-relaxed * z for z in self.deflections)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
+        return replace(map_law(self, own), deflections=(), lateral=None)  # type: ignore[no-any-return]
+
+    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> LuGre:
+        return replace(self, deflections=states, lateral=lateral)
+
+    def _decay(self, squared: Expr, speed: Expr) -> Expr:
+        return self.stiffness * speed / stribeck_level(squared, self.dynamic, self.static, self.stribeck)
+
+    def _decay_in_plane(self, slip: Slip) -> Expr:
+        return self._decay(vec.dot(slip.velocity, slip.velocity), _size(slip.velocity))
+
+    def _damping(self, slip: Slip) -> tuple[Vec3, Expr, Expr]:
+        """damping / stiffness e', its power, and what the decay and viscous friction take."""
+        push, bent, decay = _pressing(slip), self._bent(slip), self._decay_in_plane(slip)
+        drive = push / self._give(slip)
+        change = vec.sub(vec.scale(drive, slip.velocity), vec.scale(decay, bent))
+        damped = vec.scale(self.damping / self.stiffness, change)
+        viscous = self.viscous * push * vec.dot(slip.velocity, slip.velocity)
+        return damped, drive * vec.dot(damped, slip.velocity), decay * vec.dot(bent, bent) + viscous
+
+    def _bent(self, slip: Slip) -> Vec3:
+        return slip.across(self.deflections, self.lateral)
+
+    def _give(self, slip: Slip) -> Expr:
+        """What the state is divided by: sqrt(N / stiffness), or more where the normal force does not hold it."""
+        graph = slip.push.graph
+        pressed = graph.apply("lt", 0.0, slip.push)
+        most = self.dynamic if self.static is None else graph.apply("max", self.dynamic, self.static)
+        root = sqrt(where(pressed, slip.push, 1.0) / self.stiffness)
+        return graph.apply("max", root, _size(self._bent(slip)) / most)
+
+
+def _pressing(slip: Slip) -> Expr:
+    return slip.push.graph.apply("max", 0.0, slip.push)
+
+
+def _size(x: Vec3) -> Expr:
+    """The length of a vector; its slope at 0 counts as 0."""
+    return beyond_zero(vec.dot(x, x), sqrt)
+
+
+# -- laws --------------------------------------------------------------------------------------------------------------
+
+
+BRISTLES = "lugre"  #: the law that has states
+#: Laws of dry friction.
+FRICTION_LAWS = ("coulomb", "brown_mcphee", BRISTLES)
+
+
+class SlidingFriction(LineFriction):
+    """Friction that follows from the sliding velocity alone."""
+
+    @abstractmethod
+    def per_velocity(self, squared: Expr) -> Expr:
+        """What times the velocity in a plane is the friction, of the velocity's square; smooth at rest."""
+
+    def in_plane(self, slip: Slip) -> Vec3:
+        return vec.scale(self.per_velocity(vec.dot(slip.velocity, slip.velocity)), slip.velocity)
+
+
+@dataclass(frozen=True)
+class Friction(SlidingFriction):
+    """Coulomb and Stribeck friction; what multiplies the direction of sliding, opposed to it.
+
+    ``dynamic``, ``static`` and ``viscous`` are forces for a joint and parts of the normal force for a contact.
+
+        c(v) = dynamic + (static - dynamic) exp(-(v / stribeck)^2)
+
+    after Armstrong-Helouvry, Dupont and Canudas de Wit (1994), Automatica 30, 1083-1138, section 2.  ``static`` None
+    means dynamic.  At rest friction is 0: a body on a slope creeps, at a part of the velocity ``smoothing``.
+    """
+
+    formula: ClassVar[str] = r"F_t = -F_n (\frac{c(v)}{\sqrt{v^2 + v_s^2}} + b) v"
+    joint_formula: ClassVar[str] = r"F = -c(v) \mathrm{tanh}(v/v_s) - b v"
+    dynamic: Expr
+    smoothing: Expr
+    viscous: Expr
+    static: Expr | None = None
+    stribeck: Expr | None = None
+
+    def level(self, squared: Expr) -> Expr:
+        """c of the squared sliding velocity."""
+        return stribeck_level(squared, self.dynamic, self.static, self.stribeck)
+
+    def along(self, rate: Expr) -> Expr:
+        """c tanh(v / smoothing) + viscous v of a velocity along a line."""
+        direction = rate.graph.apply("tanh", rate / self.smoothing)
+        return self.level(rate * rate) * direction + self.viscous * rate
+
+    def per_velocity(self, squared: Expr) -> Expr:
+        """c / sqrt(v^2 + smoothing^2) + viscous: times the velocity in a plane it is the friction; smooth at rest."""
+        size = squared.graph.apply("sqrt", squared + self.smoothing * self.smoothing)
+        return self.level(squared) / size + self.viscous
+
+
+@dataclass(frozen=True)
+class BrownMcPhee(SlidingFriction):
+    """Friction of continuous derivatives whose largest value is the static friction, close to v = transition.
+
+        c(v) = dynamic tanh(4 x) + (static - dynamic) x / (x^2 / 4 + 3/4)^2 + viscous v,  x = v / transition
+
+    after Brown and McPhee (2016), J. Comput. Nonlinear Dynam. 11, 054502, equation 5.
+    """
+
+    _CURVE: ClassVar[str] = (
+        r"c_d \mathrm{tanh}(4 \frac{v}{v_t}) + (c_s - c_d) \frac{v/v_t}{(\frac{1}{4} (v/v_t)^2 + \frac{3}{4})^2} + b v"
+    )
+    formula: ClassVar[str] = rf"F_t = -F_n ({_CURVE})"
+    joint_formula: ClassVar[str] = rf"F = -({_CURVE})"
+    dynamic: Expr
+    static: Expr
+    transition: Expr
+    viscous: Expr
+
+    def along(self, rate: Expr) -> Expr:
+        x = rate / self.transition
+        return self.dynamic * x.graph.apply("tanh", 4.0 * x) + self._rise(x * x) * x + self.viscous * rate
+
+    def per_velocity(self, squared: Expr) -> Expr:
+        """By the velocity sqrt(v^2 + (AT_REST transition)^2) in tanh(4 x) / v, which is finite at rest then."""
+        graph, small = squared.graph, AT_REST * self.transition
+        speed = graph.apply("sqrt", squared + small * small)
+        slope = graph.apply("tanh", 4.0 * speed / self.transition) / speed
+        return (
+            self.dynamic * slope
+            + self._rise(squared / (self.transition * self.transition)) / self.transition
+            + (self.viscous)
+        )
+
+    def _rise(self, square: Expr) -> Expr:
+        base = 0.25 * square + 0.75
+        return (self.static - self.dynamic) / (base * base)
+
+
+def has_bristles(values: Mapping[str, Any]) -> bool:
+    """Whether an entry's law of friction has states."""
+    law = values.get("friction_law")
+    return isinstance(law, str) and law == BRISTLES
+
+
+#: Of contacts, as parts of the normal force.
+FRICTION: Fields = {
+    "friction": Scalar("coefficient of sliding friction", level=LAW, dimension=NONE),
+    "static_friction": Scalar(
+        "coefficient of static friction, at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
+    ),
+    "stribeck": Scalar(
+        "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
+        "sliding friction",
+        dimension=RATE,
+    ),
+    "viscous_friction": Scalar(
+        "viscous friction coefficient per normal force and velocity (s/m)",
+        default=0,
+        level=LAW,
+        dimension=NONE.times(RATE, -1),
+    ),
+    "smoothing": Scalar("sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
+}
+#: Which law it is, and what only some laws have; of a contact.
+FRICTION_CHOICE: Fields = {
+    "friction_law": Choice(
+        "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; lugre, "
+        "bristles that hold a body at rest",
+        default=FRICTION_LAWS[0],
+        choices=FRICTION_LAWS,
+    ),
+    "transition": Scalar("velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE),
+    "bristle_stiffness": Scalar(
+        "friction of friction_law lugre per deflection of the bristles", dimension=NONE.times(REACH, -1)
+    ),
+    "bristle_damping": Scalar(
+        "friction of friction_law lugre per rate of the deflection", dimension=NONE.times(RATE, -1)
+    ),
+}
+_PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")
+
+
+def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> LineFriction | None:
+    """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
+    if dynamic not in e.values:
+        for key in (static, "friction_law", *_PLAIN, *(() if alone else (viscous,))):
+            if key in e.values:
+                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out", "EG-MISSING")
+        return None
+    level = e[dynamic]
+    kind = e["friction_law"]
+    if kind == BRISTLES:
+        e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
+    else:
+        e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
+    along = e[viscous]
+    if along is not None and not alone:
+        e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
+    drag = e.graph.zero if along is None else along
+    if kind == "brown_mcphee":
+        return _brown_mcphee(e, level, drag, static)
+    if kind == BRISTLES:
+        return _lugre(e, level, drag, static)
+    for key in _PLAIN[2:]:
+        e.refuse(key, f"has no meaning in friction_law: {kind}")
+    if "smoothing" not in e.values:
+        e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
+        return None
+    pair = _onset(e, level, static)
+    return None if pair is None else Friction(level, e.positive("smoothing"), drag, *pair)
+
+
+def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None] | None:
+    """Static friction and Stribeck velocity, or neither; None where only one is given, which is noted."""
+    if (static in e.values) != ("stribeck" in e.values):
+        missing = "stribeck" if static in e.values else static
+        e.missing(missing, f"give {static} and stribeck together, or neither")
+        return None
+    onset = e[static]
+    if onset is not None:
+        _require_greater(e, level, onset, static)
+    return onset, e.positive("stribeck") if "stribeck" in e.values else None
+
+
+def _require_greater(e: Entry, level: Expr, onset: Expr, static: str) -> None:
+    """Require static friction that is not below sliding friction, which is itself not below 0."""
+    told = "is {1:g}, below sliding friction {0:g}", "static is the greater"
+    e.judge(static, LIMITS, [level, onset], told)
+
+
+def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:
+    for key in ("stribeck", "smoothing", *_PLAIN[3:]):
+        e.refuse(key, "has no meaning in friction_law: brown_mcphee, which has transition")
+    if "transition" not in e.values:
+        e.missing("transition", "give the velocity (greater than 0) near which friction is largest")
+        return None
+    onset = e[static]
+    if onset is None:
+        onset = level
+    _require_greater(e, level, onset, static)
+    return BrownMcPhee(level, onset, e.positive("transition"), viscous)
+
+
+def _lugre(e: Entry, level: Expr, viscous: Expr, static: str) -> LuGre | None:
+    for key in ("smoothing", "transition"):
+        e.refuse(key, "has no meaning in friction_law: lugre")
+    for key in _PLAIN[3:]:
+        if key not in e.values:
+            e.missing(key, "friction_law: lugre needs bristle_stiffness and bristle_damping")
+    pair = _onset(e, level, static)
+    if pair is None or e.at_fault():
+        return None
+    return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())
+
+
+# -- friction of a joint -----------------------------------------------------------------------------------------------
+
 
 # -- symbols of reactions ----------------------------------------------------------------------------------------------
 
@@ -166,7 +608,7 @@ class JointFriction(PathForce):
     """Friction on a joint's coordinate of rate v (N or N m), such as -[c(v) tanh(v / smoothing) + viscous v].
 
     The tanh is the regularisation of Andersson, Soderberg and Bjorklund (2007), Tribol. Int. 40, 580-587.  It does not
-    depend on the joint's reactions; :class:`~.friction.ReactionFriction` does.
+    depend on the joint's reactions; :class:`ReactionFriction` does.
     """
 
     sentence = "Friction in a joint: it opposes the rate $v$ of the coordinate."

@@ -1,16 +1,149 @@
-"""Force elements, springs and dampers: linear laws along a path or on an angle."""
+"""Force elements: given forces and torques, springs, dampers, and laws of the model's own."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ...base.records import dataclass
 from ...expr import vectors as vec
-from ...expr.core import Expr
-from ..dimensions import DAMPING, ENERGY, LENGTH, NONE, REACH, STIFFNESS, TIME
-from ..element_type import element, key, keys_of, table
-from ..kinds import LAW, Scalar
-from ..looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
-from .force import Load, View
-from .paths import ANGLE, COORDINATE, LINE, Line, PathForce
+from ...expr.core import Expr, substitute
+from ...expr.differentiate import gradient
+from ...expr.vectors import Vec3
+from ..dimensions import DAMPING, ENERGY, FORCE, LENGTH, NONE, PUSH, RATE, REACH, SPIN, STIFFNESS, TIME, Dimension
+from ..element_type import ElementType, Entry, element, key, keys_of, table
+from ..frames import Marker
+from ..kinds import LAW, Choice, Fields, MarkerReference, Scalar, Value, Vector
+from ..looks import COIL, CYLINDER, DASHPOT, LAW_BOX, LAW_RING, ROUND_ARROW, SPIRAL, TURNING_DASHPOT, Pull, Seen
+from .force import Force, Load, MarkerLoad, View
+from .paths import (
+    ANGLE,
+    ANYWHERE,
+    BETWEEN,
+    COORDINATE,
+    LINE,
+    ON_JOINT,
+    VIA,
+    Line,
+    Path,
+    PathForce,
+    read_angle,
+    read_coordinate,
+    read_joint_or_path,
+)
+
+
+@dataclass(frozen=True)
+class Actuator(PathForce):
+    """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
+
+    sentence = "A given force or torque $F$ (`value`) along its path of length or angle $s$."
+    formula = r"\delta W = F \delta s"
+    value: Expr = key(
+        Scalar(
+            "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
+            required=True,
+            level=LAW,
+            dimension=PUSH,
+        )
+    )
+
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return self.value
+
+    def drawn(self) -> list[Seen]:
+        seen = self.path.drawn(CYLINDER, ROUND_ARROW)
+        return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
+
+
+def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
+    return vec.times(view.rotation(marker), value) if axes == "body" else value
+
+
+_AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
+
+
+@dataclass(frozen=True)
+class PointForce(Force):
+    """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
+
+    sentence = r"A given force $\mathbf{F}$ at the origin of a marker."
+    formula = r"\delta W = \mathbf{F}^T \delta \mathbf{r}"
+    marker: Marker = key(MarkerReference("marker at whose origin the force acts", required=True))
+    value: Vec3 = key(Vector("force (N)", required=True, level=LAW, dimension=FORCE))
+    axes: str = key(_AXES)
+
+    def loads(self, view: View) -> list[Load]:
+        force = _in_ground_axes(view, self.marker, self.value, self.axes)
+        return [MarkerLoad(self.marker, force, vec.zero(view.graph))]
+
+    def drawn(self) -> list[Seen]:
+        return [Pull(self.marker, self.value, self.axes == "body", turns=False)]
+
+
+@dataclass(frozen=True)
+class BodyTorque(Force):
+    """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
+
+    sentence = r"A given torque $\mathbf{M}$ on a body."
+    formula = r"\delta W = \mathbf{M}^T \delta \mathbf{\varphi}"
+    marker: Marker
+    value: Vec3
+    axes: str = "ground"
+
+    def loads(self, view: View) -> list[Load]:
+        torque = _in_ground_axes(view, self.marker, self.value, self.axes)
+        return [MarkerLoad(self.marker, vec.zero(view.graph), torque)]
+
+    def drawn(self) -> list[Seen]:
+        return [Pull(self.marker, self.value, self.axes == "body", turns=True)]
+
+
+def _torque(e: Entry) -> Force | None:
+    if "joint" in e.values:
+        e.refuse("axes", "a torque on a joint's coordinate has no axes")
+        path, value = read_coordinate(e), e.read("value", Scalar)
+        return None if path is None else Actuator(e.name, path, value)
+    marker = e["body"]
+    vector, axes = e.read("value", Vector), e["axes"]
+    return None if marker is None else BodyTorque(e.name, marker, vector, axes)
+
+
+TYPES = table(
+    element(
+        PointForce,
+        "force",
+        "a force on a body, at the origin of a marker.",
+        remedies={
+            "marker": "for a force along a joint's coordinate use torque or actuator (N on a length, N m on an angle)"
+        },
+    ),
+    ElementType(
+        "torque",
+        "a torque on a joint's coordinate (one value) or on a body (three values).",
+        {
+            "joint": ON_JOINT,
+            "body": MarkerReference("a body"),
+            "value": Value(
+                "torque (N m): one value on a joint (a force in N if its coordinate is a length), three on a body",
+                required=True,
+                level=LAW,
+                dimension=PUSH,
+            ),
+            "axes": _AXES,
+        },
+        _torque,
+        one_of=("joint", "body"),
+    ),
+    element(
+        Actuator,
+        "actuator",
+        "an actuator with a given force: on a joint's coordinate, or along the line or a path between two markers.",
+        ANYWHERE,
+    ),
+)
+
+
+# -- springs and dampers -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -75,7 +208,7 @@ _TURNING_DAMPING = keys_of(Damper)["damping"].replace(dimension=ENERGY.times(TIM
 _LENGTH = Scalar("free length (m), at which the force is 0", default=0, dimension=LENGTH)
 _ANGLE = Scalar("angle (rad) at which the torque is 0", default=0, dimension=NONE)
 
-TYPES = table(
+TYPES |= table(
     element(
         Spring,
         "spring",
@@ -102,4 +235,105 @@ TYPES = table(
     ),
     element(Spring, "joint_spring", "a linear spring on one coordinate of a joint, an angle or a length.", COORDINATE),
     element(Damper, "joint_damper", "a viscous damper on one coordinate of a joint, an angle or a length.", COORDINATE),
+)
+
+
+# -- any law: an expression of a path's value and rate -----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class GeneralElement(PathForce):
+    """A generalized force law(value, rate) - dV/dvalue along the path (N or N m).
+
+    Positive pushes the ends apart or drives the coordinate.  ``value`` and ``rate`` are the symbols that stand in the
+    law for the path's.  Only the potential V(value) counts as energy; the law is taken as it is, conservative or not.
+    """
+
+    sentence = "A law of the model gives the force along the path from its length or angle $s$ and the rate."
+    formula = r"F = f(s,\dot{s})"
+    uses_value = True
+    value: Expr
+    rate: Expr
+    law: Expr
+    energy: Expr
+
+    def _here(self, view: View, expression: Expr) -> Expr:
+        return self._at(*self.path.measure(view), expression)
+
+    def _at(self, value: Expr, rate: Expr, expression: Expr) -> Expr:
+        return substitute([expression], {self.value: value, self.rate: rate})[0]
+
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return self._at(value, rate, self.law - gradient(self.energy, [self.value])[0])
+
+    def drawn(self) -> list[Seen]:
+        seen = self.path.drawn(LAW_BOX, LAW_RING)
+        return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
+
+    def potential(self, view: View) -> Expr | None:
+        if self.energy.is_zero or not self.path.is_exact(view):
+            return None
+        return self._here(view, self.energy)
+
+    def remainder(self, view: View) -> list[Load]:
+        return [] if self.law.is_zero else self.path.loads(view, self._here(view, self.law))
+
+
+def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], GeneralElement | None]:
+    """The law knows ``length`` or ``angle``, and ``rate``."""
+
+    def read(e: Entry) -> GeneralElement | None:
+        where = path(e)
+        if "law" not in e.values and "potential" not in e.values:
+            e.fault("", "has no force law", "give law, potential or both", "EG-MISSING")
+        on = e["joint"] if "joint" in e.values and where is not None else None
+        word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
+        value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
+        law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
+        energy = e.law("potential", {word: value}) if "potential" in e.values else e.graph.zero
+        return None if where is None else GeneralElement(e.name, where, value, rate, law, energy)
+
+    return read
+
+
+def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
+    """Keys of a law of ``of``, its dimension and that of ``rate``."""
+    local = {"length": LENGTH, "angle": NONE, "rate": rate}
+    names = {name: Scalar("", dimension=own) for name, own in local.items()}
+    return {
+        "law": Scalar(
+            f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
+            "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
+            level=LAW,
+            dimension=push,
+            local=names,
+        ),
+        "potential": Scalar(
+            f"potential energy (J), an expression of {of} and parameters; the force is minus its derivative",
+            dimension=ENERGY,
+            local=names,
+        ),
+    }
+
+
+TYPES |= table(
+    ElementType(
+        "element",
+        "a force with a law of your own: along a joint's coordinate, the line between two markers, or a path.",
+        {
+            "joint": ON_JOINT,
+            "between": BETWEEN,
+            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
+            "via": VIA,
+        },
+        _element(read_joint_or_path, False),
+        one_of=("joint", "between"),
+    ),
+    ElementType(
+        "torsional_element",
+        "a torque with a law of your own on an angle: of a joint, or of the second marker about z of the first.",
+        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)", ENERGY, SPIN)},
+        _element(read_angle, True),
+        one_of=("joint", "between"),
+    ),
 )

@@ -1,14 +1,13 @@
 """Joints: one short class a type; :data:`JOINTS` is the table of all of them."""
 
-from . import guides, joint_types, rods
+from . import joint_types
 from .joint import Closure, Coordinate, Joint, QuaternionSlot, Shape, Velocity
 from .joint_types import Continuous, Prismatic, Revolute
 
 #: By their words, in the order of their files.
 JOINTS: dict[str, type[Joint]] = {
     one.type_name: one
-    for home in (joint_types, guides, rods)
-    for one in vars(home).values()
+    for one in vars(joint_types).values()
     if isinstance(one, type) and issubclass(one, Joint) and "type_name" in vars(one)
 }
 

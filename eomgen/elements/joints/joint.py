@@ -16,7 +16,7 @@ from .. import dimensions
 from ..element_type import keys_of
 from ..kinds import Choice, Fields, Scalar
 from ..looks import JointLook
-from ..rotations.euler import AXES, elementary
+from ..scalars import AXES, elementary
 
 # -- the class ---------------------------------------------------------------------------------------------------------
 
@@ -71,7 +71,7 @@ class Shape(NamedTuple):
 #: Sequences of axes of Euler angles: no axis follows itself.
 SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
 SEQUENCE = Choice("axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES)
-LENGTH = Scalar(
+ROD_LENGTH = Scalar(
     "length of the rod (m)",
     required=True,
     not_zero="give a length other than 0; a rod without length is a spherical joint",

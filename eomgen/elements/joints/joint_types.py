@@ -1,4 +1,4 @@
-"""Joints of one degree of freedom and of several: revolute to free, universal, constant-velocity, weld."""
+"""Joints: all types, from revolute to free, guides along curves and surfaces, rods and conditions on axes."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ from typing import Any, ClassVar
 
 from ...base.records import dataclass
 from ...expr import vectors as vec
-from ...expr.core import Expr, Graph, atan2, cos, sin, sqrt
+from ...expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_of
+from ...expr.differentiate import jvp
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import LENGTH
 from ..element_type import key
-from ..kinds import Choice, Scalar
+from ..kinds import MOTION, Choice, Scalar, Vector, ref
 from ..looks import JointLook, SymbolPart
-from ..rotations.quaternions import euler_parameters_from_matrix
+from ..rotations import euler_parameters_from_matrix
 from .joint import (
+    ROD_LENGTH,
     SEQUENCE,
     Closure,
     Coordinate,
     Joint,
     QuaternionSlot,
+    Shape,
     about,
     euler,
     euler_angles,
@@ -355,3 +358,279 @@ class Free(RotatingJoint):
     type_name = "free"
     place = PLACE
     coordinates = PLACE + ANGLES
+
+
+# -- guides: S is led by a curve or a surface of P; they stay in the tree ----------------------------------------------
+
+
+ALONG_CURVE = (Coordinate("_s", "length"),)
+ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
+
+
+class GuidePoint(Vector):
+    """Three expressions [x, y, z] of the joint's own first coordinates and of parameters."""
+
+    schema = ref("vector")
+
+    def read(self, reader: Any, path: str, value: Any, *own: Any) -> Shape:
+        """A point as expressions of parameters of the model and of coordinates of the joint, ``own``."""
+        (names,), point = own, reader.vector(path, value, self.level)
+        shown = " and ".join(names)
+        for name in sorted(symbols_of(point) - {*reader.names.of("parameter"), *names}):
+            if name in reader.names.kinds:
+                message = f"the {reader.names.kinds[name]} {name!r} cannot be used here"
+                reader.fault(path, message, f"allowed are parameters and {shown}", "EG-REFERENCE")
+        if not symbols_of(point) & {*names} and not reader.faults.under(path):
+            remedy = f"use the joint's own {shown} in the expressions"
+            reader.fault(path, f"does not depend on {shown}", remedy, "EG-EXPRESSION")
+        return Shape(point, tuple(reader.graph.symbol(name) for name in names))
+
+    def absent(self, reader: Any) -> Shape:
+        return Shape((reader.stand_in,) * 3, ())
+
+
+CURVE = GuidePoint(
+    "point of the curve in the predecessor's axes (m), as expressions of the joint's coordinate s",
+    required=True,
+    level=MOTION,
+    own=1,
+    dimension=LENGTH,
+)
+SURFACE = GuidePoint(
+    "point of the surface in the predecessor's axes (m), as expressions of the joint's coordinates u and v",
+    required=True,
+    level=MOTION,
+    own=2,
+    dimension=LENGTH,
+)
+
+
+@dataclass(frozen=True)
+class Guide(Joint):
+    """The origin of S is at a point r of P that depends on the first coordinates, the parameters of the shape.
+
+    The parameters cannot be told from a pose without solving equations, so such a joint never closes a loop: another
+    joint of the loop is cut.  Singular where the derivatives of r by its parameters vanish or are parallel.
+    """
+
+    role = "tree"
+    has_axis = False
+    look = JointLook((SymbolPart("sphere", (1.0,)),))
+
+    @property
+    def shape(self) -> Shape:
+        """The point r and its parameters."""
+        found: Shape = getattr(self, next(iter(self.options)))
+        return found
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""
+        return vec.identity(graph), []
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q)[0], self._at(q, self.shape.point)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        rotation, rates = self.turn(graph, q)
+        o = vec.zero(graph)
+        point, parameters = self.shape
+        columns = []
+        for parameter in parameters:
+            x, y, z = jvp(list(point), {parameter: graph.one})
+            columns.append((o, vec.transpose_times(rotation, self._at(q, (x, y, z)))))
+        return [*columns, *((rate, o) for rate in rates)]
+
+    def _at(self, q: Sequence[Expr], point: Vec3) -> Vec3:
+        parameters = self.shape.parameters
+        x, y, z = substitute(list(point), dict(zip(parameters, q[: len(parameters)], strict=True)))
+        return (x, y, z)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        raise TypeError(f"a {self.type_name} joint cannot be cut")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        raise TypeError(f"a {self.type_name} joint cannot be cut")
+
+
+class TurningGuide(Guide):
+    """A guide on which S also turns freely about its origin, in Euler angles."""
+
+    sequence: str
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        angles = q[len(self.shape.parameters) :]
+        return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
+
+
+@dataclass(frozen=True)
+class CurveSlider(Guide):
+    """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
+
+    sentence = (
+        "The origin of S slides along a curve of P without turning; the coordinate is the parameter of the curve."
+    )
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
+    type_name = "curve_slider"
+    coordinates = (Coordinate("", "length"),)
+    curve: Shape = key(CURVE)
+
+
+@dataclass(frozen=True)
+class SurfaceSlider(Guide):
+    """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
+
+    sentence = (
+        "The origin of S slides on a surface of P without turning; the coordinates are the parameters of the surface."
+    )
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
+    type_name = "surface_slider"
+    coordinates = ON_SURFACE
+    surface: Shape = key(SURFACE)
+
+
+@dataclass(frozen=True)
+class PointOnCurve(TurningGuide):
+    """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
+
+    A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
+    """
+
+    sentence = "The origin of S slides along a curve of P, and S turns freely."
+    formula = r"\mathbf{u} = \mathbf{r}(q_1)"
+    type_name = "point_on_curve"
+    coordinates = (*ALONG_CURVE, *ANGLES)
+    curve: Shape = key(CURVE)
+    sequence: str = key(SEQUENCE)
+
+
+@dataclass(frozen=True)
+class PointOnSurface(TurningGuide):
+    """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
+
+    sentence = "The origin of S slides on a surface of P, and S turns freely."
+    formula = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
+    type_name = "point_on_surface"
+    coordinates = (*ON_SURFACE, *ANGLES)
+    surface: Shape = key(SURFACE)
+    sequence: str = key(SEQUENCE)
+
+
+# -- rods and conditions on axes, without coordinates ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RodJoint(Joint):
+    """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
+
+    role = "loop"
+    removes: ClassVar[int]
+
+    @property
+    def allows(self) -> int:
+        return 6 - self.removes
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return []
+
+
+def apart(length: Expr, position: Vec3) -> Closure:
+    """The origins are ``length`` apart: (r . r - l^2) / 2 l = 0, whose gradient is a unit vector there."""
+    return Closure("length", (vec.dot(position, position) - length * length) / (2.0 * length), "length")
+
+
+@dataclass(frozen=True)
+class Distance(RodJoint):
+    """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
+
+    sentence = "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
+    formula = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
+    type_name = "distance"
+    look = JointLook((SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True)
+    has_axis = False
+    removes = 1
+    length: Expr = key(ROD_LENGTH)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [apart(self.length, position)]
+
+
+@dataclass(frozen=True)
+class RevoluteSpherical(RodJoint):
+    """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
+
+    sentence = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
+    formula = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
+    type_name = "revolute_spherical"
+    look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
+    removes = 2
+    held = "z"
+    length: Expr = key(ROD_LENGTH)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [apart(self.length, position), *super().closure(graph, rotation, position)]
+
+
+@dataclass(frozen=True)
+class Inline(RodJoint):
+    """The origin of S stays on the axis {z} of P.  Allows 4, removes 2."""
+
+    sentence = "The origin of S stays on the axis {z} of P."
+    formula = r"u_{x} = 0, \quad u_{y} = 0"
+    type_name = "inline"
+    look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
+    removes = 2
+    held = "xy"
+
+
+@dataclass(frozen=True)
+class Inplane(RodJoint):
+    """The origin of S stays in the plane of P across the axis {z}.  Allows 5, removes 1."""
+
+    sentence = "The origin of S stays in the plane of P across the axis {z}."
+    formula = r"u_{z} = 0"
+    type_name = "inplane"
+    look = JointLook((SymbolPart("sphere", (0.8,)),))
+    removes = 1
+    held = "z"
+
+
+@dataclass(frozen=True)
+class Parallel(RodJoint):
+    """The z axes stay parallel.  Allows 4, removes 2."""
+
+    sentence = "The axes {z} of P and S stay parallel."
+    formula = r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
+    type_name = "parallel"
+    removes = 2
+    kept = "z"
+
+
+@dataclass(frozen=True)
+class Perpendicular(RodJoint):
+    """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
+
+    sentence = "The axes {z} of P and S stay perpendicular."
+    formula = r"\mathbf{e}_{z}^P \cdot \mathbf{e}_{z}^S = 0"
+    type_name = "perpendicular"
+    removes = 1
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [Closure("z.z", rotation[2][2], "angle")]
+
+
+@dataclass(frozen=True)
+class Orientation(RodJoint):
+    """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
+
+    sentence = "The axes of S stay parallel to those of P; the origins are free."
+    formula = r"\mathbf{R}_{PS} = \mathbf{1}"
+    type_name = "orientation"
+    has_axis = False
+    removes = 3
+    kept = "xyz"

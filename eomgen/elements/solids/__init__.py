@@ -1,6 +1,6 @@
 """Solids of uniform density: one short class a type; :data:`SOLIDS` is the literal table of all of them."""
 
-from .properties import MassProperties, combine, point
+from .solid import MassProperties, combine, point
 from .solid import Box, Cone, Cylinder, Ellipsoid, Rod, Solid, Sphere, Tube
 
 SOLIDS: dict[str, type[Solid]] = {

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ...base.algebra import quarter_turns
-from ...base.limits.numbers import UNIT
-from ...expr.core import Expr
+from ..base.algebra import quarter_turns
+from ..base.limits.numbers import UNIT
+from ..expr.core import Expr
 
 Scalar = Any  #: a number, an :class:`~eomgen.expr.core.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]
@@ -103,6 +103,24 @@ def combine(one: Scalar, first: Scalar, second: Scalar, a: Sequence[Scalar]) -> 
     """one * I + first * skew(a) + second * a a^T."""
     tilde = skew(a)
     return [[one * int(i == j) + first * tilde[i][j] + second * (a[i] * a[j]) for j in range(3)] for i in range(3)]
+
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+def axes_of(sequence: str) -> tuple[int, int, int]:
+    """Indices of the three axes; raises ValueError for anything but one of the 12 sequences."""
+    if len(sequence) != 3 or not set(sequence) <= set("xyz") or sequence[1] in (sequence[0], sequence[2]):
+        raise ValueError(
+            f"{sequence!r} is not a sequence of Euler angles; give three axes like 'xyz' or 'zxz', neighbours different"
+        )
+    i, j, k = (AXES[letter] for letter in sequence)
+    return i, j, k
+
+
+def elementary(axis: int, angle: Scalar) -> list[list[Scalar]]:
+    """Rotation about axis 0, 1 or 2."""
+    return about(axis, cos(angle), sin(angle))
 
 
 # -- what comes in and goes out ---------------------------------------------------------------------------------------
