@@ -14,7 +14,7 @@ from ..base.operations import OPERATIONS
 from ..base.value_rules import RANGE
 from ..elements.constraints import RollingDisc
 from ..elements.frames import GROUND, Marker
-from ..elements.joints.joint_types import Cylindrical, Free, Planar, Prismatic, Translational
+from ..elements.joints import Cylindrical, Free, Planar, Prismatic, Translational
 from ..errors import TO_BE_FINITE, ModelError, UsageError
 from ..expr.core import Expr, reachable, symbols_of
 from ..expr.differentiate import gradient

@@ -16,9 +16,8 @@ from ..elements.joints import JOINTS
 from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from ..errors import ModelError, Problem
 from ..model.description import GROUND_NAME, Description, Values
-from ..model.names import LONGEST, clean_name, fault_of_model_name, listing, nearest, unique
+from ..model.names import LONGEST, RATES, clean_name, fault_of_model_name, listing, nearest, unique
 from ..model.placement import TURNS, axis_word
-from ..model.scope import RATES
 from .robot import (
     IDENTITY,
     Drive,

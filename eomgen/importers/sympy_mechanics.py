@@ -18,9 +18,7 @@ from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import with_bounds
 from ..model.description import Description
-from ..model.names import nearest
-from ..model.printed_names import give_latex
-from ..model.scope import RATES
+from ..model.names import RATES, nearest
 from ..model.sympy_face import (
     SympyNames,
     function_name,
@@ -33,6 +31,7 @@ from ..model.sympy_face import (
     sympy_name,
     with_sympy,
 )
+from ..model.values import give_latex
 
 KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from ..base.records import dataclass
 from ..elements.frames import GROUND
-from ..elements.joints.joint import about
+from ..elements.joints import about
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.differentiate import jvp

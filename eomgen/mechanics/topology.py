@@ -19,9 +19,7 @@ from ..base.limits.numbers import HAIR, NO_LENGTH
 from ..base.records import dataclass
 from ..elements.constraints import CoordinateDriver
 from ..elements.frames import GROUND
-from ..elements.joints import QuaternionSlot
-from ..elements.joints.joint import parameter_rates
-from ..elements.joints.joint_types import Distance, RevoluteSpherical
+from ..elements.joints import Distance, QuaternionSlot, RevoluteSpherical, parameter_rates
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph

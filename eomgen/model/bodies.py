@@ -19,8 +19,7 @@ from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_sca
 from ..elements import kinds
 from ..elements.frames import GROUND, Frame
 from ..elements.kinds import DISPLAY, POINT, Vector
-from ..elements.solids import SOLIDS, MassProperties, combine, point
-from ..elements.solids.mesh import measure_mesh
+from ..elements.solids import SOLIDS, MassProperties, combine, measure_mesh, point
 from ..errors import UsageError
 from ..expr import vectors as vec
 from ..expr.core import Expr, symbols_of

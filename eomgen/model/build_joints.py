@@ -26,10 +26,9 @@ from .fields import joint_fields
 from .mechanism import STATE_RATE, FirstOrderState, JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
-from .printed_names import take_coordinates_latex, take_latex
 from .requirements import Requirements
 from .sympy_face import name_of
-from .values import Reader
+from .values import Reader, take_coordinates_latex, take_latex
 
 Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
 

@@ -57,10 +57,9 @@ from .equations import (
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Mechanism, Simulation
-from .names import fault_of_model_name, nearest
+from .names import Namespace, fault_of_model_name, nearest
 from .quantities import SUMS, CarriedQuantity, WrenchQuantity
 from .read_shapes import read_shapes
-from .scope import Namespace
 from .sympy_face import in_order, name_of
 from .values import Reader
 from .visit import undotted

@@ -21,13 +21,11 @@ from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, STATE
 from .mechanism import Clock, Event, FirstOrderState, Input, Output, Parameter, Switched
-from .names import nearest
-from .printed_names import take_latex
+from .names import late_names, nearest
 from .quantities import VELOCITIES, Named
-from .scope import late_names
 from .sympy_face import in_order
 from .units import Unit, UnitError, read_unit
-from .values import Reader, is_number
+from .values import Reader, is_number, take_latex
 from .visit import motions_of, names_of
 
 

@@ -21,8 +21,8 @@ from ..expr.core import Expr, Graph, reachable
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
 from .mechanism import JointSpec, Output
+from .names import ENERGIES, RATES
 from .quantities import TURNING
-from .scope import ENERGIES, RATES
 from .units import Unit, si_text
 from .values import Reader
 

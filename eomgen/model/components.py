@@ -23,9 +23,8 @@ from .build_states import declare_states, declare_switches
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .fields import ADDED, COMPONENT
-from .names import fault_of_name, function_words, nearest
+from .names import ENERGIES, RATES, Namespace, fault_of_name, function_words, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
-from .scope import ENERGIES, RATES, Namespace
 from .units import UnitError, read_unit
 from .values import Reader
 from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry

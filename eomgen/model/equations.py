@@ -25,11 +25,9 @@ from .description import Description, Faults, items
 from .expressions import names_in
 from .fields import EQUATIONS, LAGRANGIAN
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
-from .names import fault_of_name, nearest
-from .printed_names import MULTIPLIERS, give_latex, numbered, take_coordinates_latex
-from .scope import ENERGIES, RATES
+from .names import ENERGIES, RATES, fault_of_name, nearest
 from .sympy_face import derivative_names, free_names, function_names, in_order, name_of, named, names_of, values_in
-from .values import Reader
+from .values import MULTIPLIERS, Reader, give_latex, numbered, take_coordinates_latex
 
 # -- what Python gives -------------------------------------------------------------------------------------------------
 

@@ -13,8 +13,8 @@ from ..expr.shown import shown
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
 from .mechanism import velocity_names
+from .names import RATES
 from .quantities import MULTIPLIER, REACTION, WRENCH, Named
-from .scope import RATES
 from .sympy_face import names_of, require_name, symbol
 
 Triple = tuple[Any, Any, Any]

@@ -26,7 +26,7 @@ from .requirements import Requirement
 if TYPE_CHECKING:
     from ..elements.constraints.constraint import Constraint
     from ..elements.forces.force import Force
-    from ..elements.joints.joint import Joint
+    from ..elements.joints import Joint
 
 
 @dataclass(frozen=True)

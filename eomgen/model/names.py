@@ -1,16 +1,23 @@
-"""A name the user chose -> what is wrong with it, or the name they probably meant."""
+"""Names: what is wrong with one, or what was probably meant; the one namespace of a model and where each may stand."""
 
 from __future__ import annotations
 
 import keyword
 import re
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from typing import Any
 
 from ..base.names import LONGEST as LONGEST
 from ..base.names import hint, joined
 from ..base.operations import OPERATIONS
+from ..elements.frames import Marker
+from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
+from ..errors import ExpressionError
+from ..expr.core import Expr, Graph, symbols_of
 from ..expr.shown import quoted
+from .description import Faults
+from .quantities import ACCELERATIONS, COM, ONE_OR_TWO, QUANTITIES, TOTALS, TURNING, Named, Quantity, call_of
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64
@@ -123,3 +130,217 @@ def nearest(name: str, known: Iterable[str], what: str = "known") -> str:
     """A remedy for an unknown name: the near miss if there is one, and what is allowed."""
     options = list(known)
     return joined(hint(name, options), f"{what}: {listing(options)}", by=" ")
+
+
+# -- the one namespace of a model --------------------------------------------------------------------------------------
+
+
+#: Kind of name -> the least level of a field in which it may stand.
+LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
+LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
+LEVELS |= {"multiplier": OUTPUT}  # of the constraints of given equations
+LEVELS |= {"acceleration": OUTPUT, "output": LAW}
+LEVELS |= {"state": LAW, "rate of a state": OUTPUT}
+LEVELS |= {"event": OUTPUT + 1}
+LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
+
+_LEVEL_REMEDY = {
+    NUMBER: "allowed are numbers and pi",
+    CONSTANT: "allowed are numbers, parameters and pi",
+    MOTION: "allowed are t, parameters, inputs, coordinates and their velocities",
+    LAW: "allowed are t, parameters, inputs, coordinates and their velocities, states, positions and velocities of "
+    "markers, and outputs of these",
+    OUTPUT: "allowed are t, parameters, inputs, coordinates, states, their rates, motion of markers and energies",
+}
+RATES = ("", "_dot", "_ddot")
+#: Kind declared -> kinds of the name, its ``_dot`` and its ``_ddot``.
+_RATES_OF = {
+    "coordinate": ("coordinate", "velocity", "acceleration"),
+    "parameter of rotation": ("coordinate", "rate", "rate of rate"),
+    "velocity": ("velocity", "acceleration"),
+    "state": ("state", "rate of a state"),
+}
+#: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
+ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
+
+
+def late_names(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
+    late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
+    late["rate of a state"] = "rate of a state"
+    for name in sorted(used):
+        what, found = late.get(names.kinds.get(name, "")), Named.parse(name)
+        if found is not None and found.level in ACCELERATIONS:
+            what = "acceleration"
+        if what is not None:
+            yield name, what
+
+
+class Namespace:
+    """The names of one model: parameters, inputs, coordinates with their rates, and the time."""
+
+    def __init__(self, faults: Faults) -> None:
+        self.faults = faults
+        self.kinds: dict[str, str] = {"t": "time"}
+        self.places: dict[str, str] = {}
+        self.refused: set[str] = set()
+
+    def declare(self, kind: str, name: object, path: str) -> bool:
+        """Take a name in; faults of the name, and clashes with others, are noted.  Returns whether it is usable.
+
+        A coordinate brings its rates along, a velocity (one that is no coordinate's rate) its own.
+        """
+        levels = _RATES_OF.get(kind, (kind,))
+        fault = fault_of_name(name, symbol=True)
+        if fault or not isinstance(name, str):
+            self.faults.add(path, *(fault or ("", "")), code="EG-NAME-FORM")
+            self._refuse(levels[0], name, path)
+            return False
+        names = [name + suffix for suffix in RATES[: len(levels)]]
+        kind = levels[0]
+        clash = next((n for n in names if n in self.kinds), None)
+        for n, level in zip(names, levels, strict=True):
+            if n not in self.kinds:  # also after a clash, so that users of the name are not at fault too
+                self.kinds[n] = level
+                self.places[n] = path
+        if clash is not None:
+            other = f"{self.kinds[clash]} at {self.places[clash]}"
+            own = "" if clash == name else f", and {clash!r} is the rate of {name!r}"
+            self.faults.add(
+                path,
+                f"the name {clash!r} is already used by the {other}{own}",
+                "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with the "
+                "_dot and _ddot of coordinates; rename one",
+                "EG-NAME-TAKEN",
+            )
+            return False
+        return True
+
+    def _refuse(self, kind: str, name: object, path: str) -> None:
+        """Take in a name that cannot be used, so that expressions that use it are not at fault too."""
+        if isinstance(name, str):
+            self.refused.add(name)
+            if self.kinds.get(name) in (None, "time"):
+                self.kinds[name], self.places[name] = kind, path
+
+    def explains(self, error: ExpressionError) -> bool:
+        """Whether an expression is wrong only because of a name that was refused where it was declared."""
+        return any(
+            f"'{name}'" in error.message or (keyword.iskeyword(name) and name in error.text) for name in self.refused
+        )
+
+    def of(self, *kinds: str) -> Iterator[str]:
+        """Names of the given kinds, in order of declaration."""
+        return (name for name, kind in self.kinds.items() if kind in kinds)
+
+
+class Scope:
+    """What the names of one expression mean.
+
+    Unknown and misplaced names are noted as faults at ``path`` and stood in for by a placeholder, so that one reading
+    tells all of them.
+    """
+
+    def __init__(
+        self, reader: Any, path: str, level: int, local: Mapping[str, Expr] | None = None, exclusive: bool = False
+    ) -> None:
+        self.reader = reader
+        self.graph: Graph = reader.graph
+        self.names: Namespace = reader.names
+        self.marker: Callable[[str], Marker] = reader.moving
+        self.output: Callable[[str], Expr] = reader.output
+        self.path, self.level, self.local, self.exclusive = path, level, local or {}, exclusive
+
+    def resolve(self, name: str) -> Expr:
+        """The expression of a name."""
+        if name in self.local:
+            kind = self.names.kinds.get(name) if self.exclusive else None
+            if kind not in (None, "output"):
+                message = (
+                    f"{name!r} is a variable of the element and also the {kind} at {self.names.places.get(name, '?')}"
+                )
+                self.names.faults.add(self.path, message, f"rename the {kind}", "EG-NAME-TAKEN")
+            return self.local[name]
+        if (call := call_of(name)) is not None:
+            try:
+                return self.locate(Named.read(call))
+            except ExpressionError as error:
+                self.names.faults.add(self.path, error.message, error.remedy, error.code)
+                return self.graph.symbol(name)
+        kind = self.names.kinds.get(name)
+        if kind == "output" and name in (*ENERGIES, *TOTALS) and self.path == f"{self.names.places[name]}.expression":
+            kind = None  # an output of that very sum
+        if self.level == NUMBER:
+            self._refuse(name, "name")
+        elif kind is None and name in ENERGIES and self.level >= OUTPUT:
+            return self.graph.symbol(f"{name}()")
+        elif kind is None and name in TOTALS and self.level >= LAW:
+            self.reader.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
+            return self.graph.symbol(f"{name}()")
+        elif kind is None:
+            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level), "pi"]
+            remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
+            self.names.faults.add(self.path, f"unknown name {name!r}", remedy, "EG-NAME-UNKNOWN")
+        elif LEVELS[kind] > self.level:
+            self._refuse(name, kind)
+        elif kind == "output":
+            return self._read(name)
+        return self.graph.symbol(name)
+
+    def _read(self, output: str) -> Expr:
+        """The expression of an output."""
+        found = self.output(output)
+        for name, what in late_names(self.names, symbols_of([found])) if self.level < OUTPUT else ():
+            message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
+        energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([found])
+        for name in sorted(energies) if self.level < OUTPUT else ():
+            message = f"the output {output!r} depends on {name.removesuffix('()')!r}, which cannot be used here"
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
+        return found
+
+    def locate(self, found: Named) -> Expr:
+        """The symbol of ``vx(rod.tip)`` or ``force(k1)``; raises ExpressionError for an unknown marker or element."""
+        if not found.is_motion:
+            if self.level < LAW:
+                carried = "reaction" if found.carried else "quantity of a force element"
+                self._refuse(str(found), carried)
+            else:
+                self.reader.ask(found, self.path)
+            return self.graph.symbol(str(found))
+        level, axis = QUANTITIES[found.name]
+        if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
+            self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")
+            return self.graph.symbol(str(found))
+        seen = found
+        if axis == 4 and found.origin == COM:  # a distance is the same from either end
+            seen = found._replace(of=found.origin, origin=found.of)
+        point = self._point(seen)
+        origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
+        self.reader.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
+        return self.graph.symbol(str(found))
+
+    def _fixed(self, label: str) -> Marker:
+        """The marker of a label that is not a centre of mass."""
+        try:
+            return self.marker(label)
+        except ExpressionError:
+            if label == COM:
+                remedy = "give a marker of a body here; com can be a marker of distance() and the first of x()"
+                raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
+            raise
+
+    def _point(self, found: Named) -> Marker | None:
+        """The marker of a quantity; None for the centre of mass of all bodies."""
+        try:
+            return self.marker(found.of)
+        except ExpressionError:
+            if found.of != COM:
+                raise
+        if found.name in ONE_OR_TWO or found.level in TURNING:
+            raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
+        return None
+
+    def _refuse(self, name: str, kind: str) -> None:
+        remedy = f"only {_LEVEL_REMEDY[self.level]}"
+        self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")

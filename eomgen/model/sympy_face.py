@@ -20,9 +20,8 @@ from ..expr.functions import Function
 from ..expr.shown import parts_of, quoted, shortened
 from .description import Description, items
 from .expressions import parse
-from .names import fault_of_name, unique
+from .names import RATES, fault_of_name, unique
 from .quantities import Named
-from .scope import RATES
 
 if TYPE_CHECKING:
     from ..expr.core import Expr, Graph

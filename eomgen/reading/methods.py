@@ -22,8 +22,8 @@ from ..mechanics import Kinematics
 from ..mechanics.methods.free_bodies import FreeBodies
 from ..mechanics.wrenches import JointWrenches, cut_drives
 from ..model.expressions import parse
-from ..model.printed_names import MULTIPLIERS, numbered
 from ..model.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
+from ..model.values import MULTIPLIERS, numbered
 from ..model.visit import rewritten
 from ..runtime.argument_checks import unknown
 from .quantities import Quantities, Row, Rows, require_bodies

@@ -1,19 +1,19 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..element_type import Types
-from . import attraction, bushing, creep, friction, muscle, normal_laws, springs, tyres
+from . import attraction, friction, muscle, normal_laws, springs, wheels
 from .springs import Actuator
-from .bushing import Bushing
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import ReactionFriction
 from .friction import Friction, LuGre
 from .muscle import Muscle
 from .paths import JointCoordinate, Line, Path, Route, Turn
 from .springs import Damper, Spring
-from .tyres import Tyre
+from .wheels import Tyre
+from .springs import Bushing
 
 FORCES: Types = {}
-for _home in (springs, bushing, attraction, friction, normal_laws, muscle, creep, tyres):
+for _home in (springs, attraction, friction, normal_laws, muscle, wheels):
     FORCES |= _home.TYPES
 
 __all__ = [
