@@ -87,7 +87,7 @@ def derive_as(
 def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """Stage 4, Derivation -> Program: the functions to generate for a target."""
     from .codegen.build import program_of
-    from .model.digest import model_digest
+    from .model.mechanism import model_digest
 
     row = find_target(target)
     kernels = read_names("kernels", kernels or ())

@@ -538,7 +538,7 @@ class Builder(ElementMethods):
         return f"<Model {self.name}: {', '.join(part for part in (kind, self._counts()) if part) or 'empty'}>"
 
     def _repr_html_(self) -> str:
-        from .display import model_html
+        from .description import model_html
 
         return model_html(self._description)
 
