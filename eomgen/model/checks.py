@@ -30,10 +30,8 @@ def unknown_key(key: object, fields: Iterable[str]) -> str:
     return remedy
 
 
-def check_names(
-    entries: Sequence[DescribedEntry], what: str, faults: Faults, reserved: Sequence[str] = ()
-) -> list[DescribedEntry]:
-    """Note names that are no identifiers, reserved or used twice; returns the entries whose names can be used."""
+def check_names(entries: Sequence[DescribedEntry], what: str, faults: Faults) -> list[DescribedEntry]:
+    """Note names that are no identifiers or used twice; returns the entries whose names can be used."""
     usable: list[DescribedEntry] = []
     seen: set[Any] = set()
     for entry in entries:
@@ -41,11 +39,7 @@ def check_names(
         if fault:
             faults.add(entry.path, *fault, "EG-NAME-FORM")
             continue
-        if entry.name in reserved:
-            faults.add(
-                entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}", "EG-NAME-TAKEN"
-            )
-        elif entry.name in seen:
+        if entry.name in seen:
             faults.add(
                 entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one", "EG-NAME-TAKEN"
             )

@@ -149,7 +149,7 @@ def _names_of_section(given: Mapping[str, Any]) -> list[str]:
     declared = ("coordinates", "velocities", "multipliers")
     found: set[str] = set()
     for part in values_in({key: value for key, value in given.items() if key not in declared}):
-        found |= {*names_in(part)} if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
+        found |= names_in(part) if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
     return sorted(found - {"t"})
 
 

@@ -78,7 +78,7 @@ def allowed() -> str:
     return f"{start}'a if c else b' and the functions {' '.join(function_words())}"
 
 
-def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
+def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
     """The graph expression of a text.
 
     Parameters
@@ -91,8 +91,6 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         Gives the expression of a name.
     locate : callable, optional
         Gives the expression of a marker's motion; without it such calls are refused.
-    any_function : bool, optional
-        Whether functions that the graph does not declare pass; what they stand for has no meaning then.
 
     Returns
     -------
@@ -134,22 +132,19 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
-    return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
+    return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
 
 
-def names_in(text: str) -> list[str]:
-    """Names that a text uses, in order; none if the text is not an allowed expression."""
-    graph, found = Graph(), dict[str, None]()
-
-    def resolve(name: str) -> Expr:
-        found[name] = None
-        return graph.symbol(name)
-
+def names_in(text: str) -> set[str]:
+    """Names of values that a text uses; none if the text is no expression."""
+    if len(text) > LENGTH or _JOINED.search(text):
+        return set()
     try:
-        parse(text, graph, resolve, any_function=True)
-    except ExpressionError:
-        return []
-    return list(found)
+        parts = [*ast.walk(parse_statement(re.sub(r"\s", " ", text).strip() + "\n"))]
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        return set()
+    called = {id(part.func) for part in parts if isinstance(part, ast.Call)}
+    return {part.id for part in parts if isinstance(part, ast.Name) and id(part) not in called} - {"pi"}
 
 
 @dataclass
@@ -161,7 +156,6 @@ class _Walker:
     graph: Graph
     resolve: Resolve
     locate: Locate | None
-    any_function: bool
     words: Mapping[str, tuple[int, int]] = field(default_factory=function_words)
     size: int = 0
 
@@ -263,10 +257,6 @@ class _Walker:
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
-        if self.any_function and (name == "diff" or (name not in self.words and declared is None)):
-            for argument in node.args:
-                self.walk(argument, depth + 1)
-            return self.graph.symbol("?")
         if name not in self.words and declared is None:
             known = [*self.words, *self.graph.functions, *((*QUANTITIES, *OF_ELEMENTS) if self.locate else ())]
             raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))

@@ -339,28 +339,11 @@ class Mechanism:
 
 #: Attributes that nothing is computed from.
 ASIDE = frozenset(
-    {
-        "doc",
-        "docs",
-        "latex",
-        "instances",
-        "lines",
-        "notes",
-        "place",
-        "graph",
-        "functions",
-        "file",
-        "named_markers",
-        "body_shapes",
-        "added_bodies",
-        "limits_told",
-        "default_gravity",
-        "of_velocities",
-        "requirements",
-    }
+    (
+        *("doc", "docs", "latex", "instances", "lines", "notes", "place", "graph", "functions", "file", "requirements"),
+        *("named_markers", "body_shapes", "added_bodies", "limits_told", "default_gravity", "of_velocities"),
+    )
 )
-
-
 #: What counts of a key of a joint's own, and how its kind is spelled: digests are compared over versions.
 _OF_A_KEY = (
     *("doc", "required", "default", "level", "choices", "own", "not_zero", "dimension", "along", "exponent", "local"),
