@@ -20,7 +20,7 @@ import numpy as np
 from ..base.algebra import about, from_quaternion
 from ..base.limits.numbers import ELEMENTS, IMPEDANCE, LARGEST, MEMORY, SECONDS, SIZE, WAIT
 from ..errors import MissingDependencyError, ModelError, Problem, at_odds
-from ..model.build_joints import limits_nothing
+from ..model.build_elements import limits_nothing
 from .mujoco_process import compile_model
 from .robot import (
     IDENTITY,

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.limits.numbers import LARGEST
 from ..base.value_rules import SWITCH
 from ..errors import ModelError
-from ..model.build_joints import limits_nothing
+from ..model.build_elements import limits_nothing
 from .robot import (
     CONVERTED,
     IDENTITY,

@@ -16,8 +16,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.shown import quoted, shown
 from .bodies import check_bodies, check_display, read_body, read_body_shapes
-from .build_functions import build_functions
-from .build_joints import (
+from .build_elements import (
     build_elements,
     build_joints,
     check_turns,
@@ -26,7 +25,8 @@ from .build_joints import (
     own_states,
     with_locks,
 )
-from .build_states import (
+from .build_functions import build_functions
+from .build_quantities import (
     Outputs,
     build_events,
     build_states,

@@ -18,8 +18,8 @@ from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from ..expr.core import Graph
-from .build_joints import declare_contacts, declare_coordinates, own_states
-from .build_states import declare_states, declare_switches
+from .build_elements import declare_contacts, declare_coordinates, own_states
+from .build_quantities import declare_states, declare_switches
 from .checks import unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .fields import ADDED, COMPONENT

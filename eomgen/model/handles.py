@@ -10,7 +10,7 @@ from ..base.records import dataclass
 from ..elements.joints import JOINTS
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.shown import shown
-from .build_joints import coordinate_names, sketch
+from .build_elements import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
 from .mechanism import velocity_names
 from .names import RATES

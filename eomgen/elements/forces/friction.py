@@ -457,9 +457,6 @@ def _lugre(e: Entry, level: Expr, viscous: Expr, static: str) -> LuGre | None:
     return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())
 
 
-# -- friction of a joint -----------------------------------------------------------------------------------------------
-
-
 # -- symbols of reactions ----------------------------------------------------------------------------------------------
 
 

@@ -1,4 +1,4 @@
-"""Entries of the joints section -> coordinate names in the namespace, then JointSpecs."""
+"""Entries of joints, forces and constraints -> coordinate names in the namespace, then JointSpecs and elements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Entries of ``states`` and ``events``, constraints that close and open -> first-order states, clocks, events."""
+"""Entries of parameters, inputs, outputs, states and events, constraints that close and open -> what they are in SI."""
 
 from __future__ import annotations
 
