@@ -13,7 +13,7 @@ FAULTS = (
         "tests/mechanics/test_lagrangians.py::test_a_length_that_an_input_prescribes[lagrange]",
     ),
     Fault(
-        "input-second-rates", "_differentiated",
+        "input-second-rates", "list_differentiated",
         '(positions, 2, "a constraint", section)',
         '(positions, 1, "a constraint", section)',
         "second rates of inputs in constraints are taken for 0",
