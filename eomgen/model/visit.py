@@ -48,26 +48,14 @@ def in_brackets(text: str) -> str:
 
 def names_of(value: Any) -> set[str]:
     """Names in a text, markers aside."""
-    found: set[str] = set()
-
-    def note(name: str) -> str:
-        found.add(name)
-        return name
-
-    rewritten(value, note)
-    return found
+    return {found[0] for found in _TOKEN.finditer(value) if found["name"]} if isinstance(value, str) else set()
 
 
 def motions_of(value: Any) -> set[Named]:
     """Every motion of a marker in a text."""
-    found: set[Named] = set()
-
-    def note(quantity: Named) -> str:
-        found.add(quantity)
-        return str(quantity)
-
-    rewritten(value, str, note)
-    return {quantity for quantity in found if quantity.is_motion}
+    tokens = _TOKEN.finditer(value) if isinstance(value, str) else ()
+    read = (Named.parse(found[0]) for found in tokens if found["quantity"])
+    return {quantity for quantity in read if quantity is not None and quantity.is_motion}
 
 
 class Visitor:
