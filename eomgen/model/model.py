@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
+from ..base.files import write_whole
 from ..base.names import hint
 from ..elements.constraints import CONSTRAINTS
 from ..elements.forces import FORCES
@@ -15,8 +16,9 @@ from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplet
 from .build_functions import PythonTwin
 from .build_mechanism import build
 from .components import Component, Instance, add_instance, component_of, named_attachments
-from .description import GROUND_NAME, SECTIONS, Description, Faults, items
+from .description import GROUND_NAME, SECTIONS, Description, Faults, items, model_html
 from .element_methods import ElementMethods
+from .equations import describe_equations, describe_lagrangian
 from .handles import (
     BodyHandle,
     Described,
@@ -31,8 +33,8 @@ from .handles import (
 from .methods import check_keywords, checked_keywords, keywords_of
 from .names import fault_of_name
 from .quantities import COM
-from .sympy_face import function, named, names_of, one_or_several, require_name, symbol
-from .yaml_file import plain, plain_description, yaml_text
+from .sympy_face import SympyNames, function, named, names_of, one_or_several, require_name, symbol
+from .yaml_file import describe_yaml_file, plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -136,9 +138,6 @@ class Builder(ElementMethods):
         ModelError
             A coordinate is neither a symbol nor a function of time ``q(t)``.
         """
-        from .equations import describe_lagrangian
-        from .sympy_face import SympyNames
-
         coordinates = one_or_several(coordinates)
         given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
         names = SympyNames(given, coordinates)
@@ -149,9 +148,6 @@ class Builder(ElementMethods):
         cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
     ) -> Self:
         """Make a model from equations M v' = f; see :func:`eomgen.model.equations.describe_equations`."""
-        from .equations import describe_equations
-        from .sympy_face import SympyNames
-
         check_keywords("from_equations", further, keywords_of(describe_equations))
         coordinates = one_or_several(coordinates)
         names = SympyNames([coordinates, mass_matrix, forcing, further], coordinates)
@@ -501,8 +497,6 @@ class Builder(ElementMethods):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the model to a model file; if writing fails, a file that already exists stays unchanged."""
-        from ..base.files import write_whole
-
         write_whole(path, self.to_yaml())
 
     # -- display --------------------------------------------------------------------------------------------------
@@ -538,8 +532,6 @@ class Builder(ElementMethods):
         return f"<Model {self.name}: {', '.join(part for part in (kind, self._counts()) if part) or 'empty'}>"
 
     def _repr_html_(self) -> str:
-        from .description import model_html
-
         return model_html(self._description)
 
 
@@ -550,8 +542,6 @@ def _component(given: Any) -> Component:
     """A component of a Model, or of the file of one."""
     faults = Faults(Description())
     if isinstance(given, str | os.PathLike):
-        from .yaml_file import describe_yaml_file
-
         description = describe_yaml_file(given)
     elif isinstance(given, Described):
         description = plain_description(given.description)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import suppress
 from functools import partialmethod
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unicodedata import normalize
 
 from ..base.latex import GREEK, NotationError, read_latex
@@ -23,10 +23,7 @@ from .expressions import parse
 from .names import RATES, fault_of_name, unique
 from .quantities import Named
 
-if TYPE_CHECKING:
-    from ..expr.core import Expr, Graph
-
-Resolve = Callable[[str], "Expr"]
+Resolve = Callable[[str], Expr]
 
 
 def require_name(what: str, name: Any) -> str:

@@ -18,12 +18,13 @@ from ..base.texts import WHOLE, comment_text, join_surrogates, lone_surrogate, v
 from ..elements import kinds
 from ..elements.kinds import Field, items
 from ..errors import ModelError, Problem, UsageError, cannot
+from ..expr.shown import shortened
 from .components import Components
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults
 from .fields import MODEL, PARTS, SHORT, fields_of
 from .names import nearest
 from .quantities import Named
-from .sympy_face import free_names, is_sympy, name_of, symbol, values_in, with_sympy
+from .sympy_face import free_names, is_sympy, name_of, symbol, sympy_text, values_in, with_intermediates, with_sympy
 from .visit import undotted
 
 SIZE = 1_000_000  #: bytes of a file
@@ -480,8 +481,6 @@ def yaml_text(description: Description) -> str:
         elif key in description.values:
             value = description.values[key]
             if key == "equations" and isinstance(value, Mapping):
-                from .sympy_face import with_intermediates
-
                 value = with_intermediates(value)
             if key in ("lagrangian", "equations") and value is not None:
                 lines += [f"{key}:", *(f"  {_key(k)}: {_value(v, functions)}" for k, v in value.items())]
@@ -520,8 +519,6 @@ def _value(value: Any, functions: Names) -> str:
             return _value(listed, functions)
         if is_sympy(value):
             return _sympy(value, functions)
-        from ..expr.shown import shortened
-
         raise cannot(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):
         return _sympy(value, functions)
@@ -543,8 +540,6 @@ def _key(key: Any) -> str:
 
 
 def _sympy(value: Any, functions: Names) -> str:
-    from .sympy_face import sympy_text
-
     text = sympy_text(value, functions)
     return text if isinstance(scalar(text), int | float) else _text(text)
 
@@ -572,8 +567,6 @@ def plain_description(given: Description) -> Description:
 def plain(value: Any, functions: Names = frozenset()) -> Any:
     """A value as numbers, texts, lists and mappings; functions of Python stay."""
     if is_sympy(value):
-        from .sympy_face import sympy_text
-
         return sympy_text(value, functions)
     if isinstance(value, Mapping):
         return {name_of(key): plain(part, functions) for key, part in value.items()}
