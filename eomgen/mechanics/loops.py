@@ -12,8 +12,7 @@ from ..base.limits.numbers import ROUNDED
 from ..base.notation import rate_of
 from ..base.records import dataclass
 from ..elements.constraints import Equation, RollingDisc
-from ..elements.constraints.constraint import VELOCITY, Condition
-from ..elements.constraints.couplings import ALLOWED
+from ..elements.constraints.constraint import ALLOWED, VELOCITY, Condition
 from ..elements.forces import Line, Route
 from ..elements.frames import Marker, WrapCylinder
 from ..errors import ModelError, Problem

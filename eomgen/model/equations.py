@@ -12,8 +12,7 @@ from ..base.notation import chains, rate_of, split_rate
 from ..base.operations import CONDITION, operations_with
 from ..elements import kinds
 from ..elements.constraints import Driver, Equation
-from ..elements.constraints.constraint import POSITION, Constraint
-from ..elements.constraints.couplings import NO_EQUATION
+from ..elements.constraints.constraint import NO_EQUATION, POSITION, Constraint
 from ..elements.kinds import MOTION, Fields
 from ..expr.core import Expr, Graph, is_comparison, reachable, substitute, symbols_of
 from ..expr.differentiate import gradient, hessian, jacobian, jvp

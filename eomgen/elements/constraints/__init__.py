@@ -1,16 +1,16 @@
 """Constraint elements: equations between coordinates or markers; :data:`CONSTRAINTS` is the table of their types."""
 
 from ..element_type import Types
-from . import cams, couplings, drivers, gears, rolling, switching
+from . import cams, constraint, drivers, gears, rolling, switching
 from .constraint import Condition, Constraint, ConstraintView
-from .couplings import Equation, Linear
+from .constraint import Equation, Linear
 from .drivers import CoordinateDriver, Driver
 from .gears import Gear, Planetary
 from .rolling import RollingDisc
 from .switching import switchable
 
 CONSTRAINTS: Types = {}
-for _home in (couplings, gears, cams, rolling, drivers, switching):
+for _home in (constraint, gears, cams, rolling, drivers, switching):
     CONSTRAINTS |= _home.TYPES if _home in (cams, drivers) else switchable(_home.TYPES)
 
 __all__ = [

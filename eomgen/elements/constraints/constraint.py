@@ -10,9 +10,11 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
 from ...base.records import dataclass
-from ...expr.core import Expr
-from ..element_type import Entry
+from ...expr.core import Expr, is_comparison, symbols_of
+from ...expr.differentiate import gradient
+from ..element_type import ElementType, Entry, Meaning, table
 from ..frames import Frame, Marker, MotionView
+from ..kinds import OUTPUT, Factors, Scalar
 from ..looks import Seen
 
 POSITION, VELOCITY = "position", "velocity"
@@ -79,3 +81,118 @@ def on_two_bodies(e: Entry, key: str, a: Marker, b: Marker) -> bool:
         remedy = "choose a marker on another body for one of them"
         e.fault(key, f"{a.label} and {b.label} are on the same body", remedy, "EG-REFERENCE")
     return a.body != b.body
+
+
+# -- relations between coordinates that the user writes out ------------------------------------------------------------
+
+
+#: Of what is true or false: message, remedy and code.
+NO_EQUATION = (
+    "is a comparison, not an expression that is to be 0", "give the difference of its sides: a - b for a = b",
+    "EG-EXPRESSION",
+)  # fmt: skip
+#: What can stand in an equation, as a remedy.
+ALLOWED = "a constraint can contain t, inputs, coordinates and velocities"
+#: Kinds of names that cannot, with what is added to that.
+_UNUSABLE = {
+    "energy": "not energies",
+    "reaction": "not reactions",
+    "multiplier": "not multipliers",
+    "rate of a state": "not rates of states",
+}
+
+
+@dataclass(frozen=True)
+class Linear(Constraint):
+    """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
+
+    sentence = "A linear relation between coordinates."
+    formula = r"\Sigma_k c_k q_k = c_0"
+    type_name = "linear"
+    written = True
+    terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
+    offset: Expr
+    kind: str
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        total = -self.offset
+        for coordinate, factor in self.terms:
+            total = total + factor * coordinate
+        return [Condition("relation", total, self.kind)]
+
+
+@dataclass(frozen=True)
+class Equation(Constraint):
+    """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
+
+    sentence = "An equation that the model gives."
+    formula = r"C = 0"
+    type_name = "equation"
+    written = True
+    expression: Expr
+    kind: str
+    level: str
+
+    def conditions(self, view: ConstraintView) -> list[Condition]:
+        return [Condition("equation", self.expression, self.kind, self.level)]
+
+
+def _coupling(e: Entry) -> Linear | Equation | None:
+    if "equation" in e.values:
+        e.refuse("offset", "offset belongs to coordinates, not to an equation")
+        return _equation(e)
+    terms = e["coordinates"]
+    if terms is None:
+        return None
+    kind = "length" if any(found.kind == "length" for found, _ in terms) else "angle"
+    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e["offset"], kind)
+
+
+def _equation(e: Entry) -> Equation | None:
+    expression = e["equation"]
+    if is_comparison(expression):
+        e.fault("equation", *NO_EQUATION)
+    used: dict[str, Meaning] = {name: e.reader.meaning(name) for name in sorted(symbols_of([expression]))}
+    for name, meant in used.items():
+        if meant.level == 2:
+            what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)
+            e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED, "EG-REFERENCE")
+        elif meant.kind in _UNUSABLE:
+            e.fault(
+                "equation",
+                f"the {meant.kind} {name!r} cannot be used here",
+                f"{ALLOWED}, {_UNUSABLE[meant.kind]}",
+                "EG-REFERENCE",
+            )
+    moving = [meant for meant in used.values() if meant.level is not None]
+    rates = [name for name, meant in used.items() if meant.level == 1]
+    if not moving and not e.at_fault("equation"):
+        remedy = f"coordinates are: {', '.join(e.known('coordinate'))}"
+        e.fault("equation", "the equation contains no coordinate", remedy, "EG-EXPRESSION")
+    if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
+        message = f"the equation is not linear in {', '.join(rates)}"
+        e.fault("equation", message, "a nonholonomic constraint must be linear in the velocities", "EG-EXPRESSION")
+    kind = "length" if any(meant.measure == "length" for meant in moving) else "angle"
+    return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
+
+
+TYPES = table(
+    ElementType(
+        "coupling",
+        "a relation between coordinates: a linear one, or any equation.",
+        {
+            "coordinates": Factors(
+                "mapping of coordinates to factors: the sum of factor times coordinate equals the offset"
+            ),
+            "offset": Scalar("value of that sum, an expression of parameters", default=0),
+            "equation": Scalar(
+                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, "
+                "places and velocities of markers; with velocities the constraint is nonholonomic and must be linear "
+                "in them",
+                level=OUTPUT,
+            ),
+        },
+        _coupling,
+        one_of=("coordinates", "equation"),
+    )
+)

@@ -1,7 +1,7 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..element_type import Types
-from . import attraction, friction, muscle, normal_laws, springs, wheels
+from . import friction, muscle, normal_laws, springs, wheels
 from .springs import Actuator
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import ReactionFriction
@@ -13,7 +13,7 @@ from .wheels import Tyre
 from .springs import Bushing
 
 FORCES: Types = {}
-for _home in (springs, attraction, friction, normal_laws, muscle, wheels):
+for _home in (springs, friction, normal_laws, muscle, wheels):
     FORCES |= _home.TYPES
 
 __all__ = [
