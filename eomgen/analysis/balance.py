@@ -59,8 +59,6 @@ def find_tangent(
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
     x : (n_x,) array
     jacobian : (n_x, n_x) array
         dx'/dx there.
@@ -202,8 +200,6 @@ def balance_forces(
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
     q : (n_q,) array
     s : (n_s,) array
         First-order states.
@@ -270,8 +266,6 @@ def slopes(
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
     x : (n_x,) array
     held : (k_h, n_v) array
         Gradients of held coordinates by displacements: unknowns leave them where they are.
@@ -311,9 +305,6 @@ def force_slopes(
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
-    here : Balance
     gradients : callable
         q -> gradients of the held coordinates, as for :func:`balance_forces`.
     step : float

@@ -53,7 +53,6 @@ def check_gaps(
 
     Parameters
     ----------
-    layout : Layout
     gaps, lock
         As a user gives them.
     words : (str, str)
@@ -90,7 +89,6 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
 
     Parameters
     ----------
-    layout : Layout
     friction
         As a user gives it: {gap: (coefficient, name or two names)}.
     gaps : mapping of str to float
@@ -332,7 +330,6 @@ class GapEvents(Events):
 
     Parameters
     ----------
-    gaps : Gaps
     restitutions : mapping of str to float
     rough : mapping
         As from :func:`check_friction`.

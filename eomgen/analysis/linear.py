@@ -42,7 +42,6 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     ----------
     module : BoundModel
         With given rates.
-    t : float
     x : (n_x,) array
     independent : sequence of str, optional
         All independent coordinates, all independent velocities, or both.

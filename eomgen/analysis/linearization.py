@@ -134,8 +134,6 @@ def own_accelerations(module: BoundModel, t: float, x: Array, B: Array, velociti
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
     x : (n_x,) array
     B : (n_v, n_dof) array
         Virtual displacements.

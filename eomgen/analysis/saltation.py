@@ -75,7 +75,6 @@ class InputSlopes:
 
     Parameters
     ----------
-    layout : Layout
     forcing : Forcing
         Attached to the module of the run.
     p : (n_p,) array
@@ -347,7 +346,6 @@ class Strike:
     ----------
     module : BoundModel
         With the inputs at that instant bound.
-    t : float
     x : (n_x,) array
         The state right after.
     closed : sequence of int
@@ -391,10 +389,8 @@ def after_impact(
 
     Parameters
     ----------
-    run : Variational
     module : BoundModel
         With the inputs at that instant bound.
-    t : float
     v : (n_v,) array
         Velocities before.
     move : Move
@@ -488,7 +484,6 @@ class Saltation(Events):
 
     Parameters
     ----------
-    run : Variational
     given : None, or one event or several
         As for :class:`~..runtime.runs.events.Events`.
     span : (float, float)

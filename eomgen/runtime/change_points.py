@@ -102,7 +102,6 @@ class StatesBetween:
 
     Parameters
     ----------
-    module : BoundModel
     t : (k,) array
     x : (n_x, k) array
     u : (n_u, k) array

@@ -128,7 +128,6 @@ def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
     C_q : (k, n_c, n_v) array
     force : (n_v, k) array
         M a + h.
-    scales : Scales
 
     Returns
     -------

@@ -148,8 +148,6 @@ class StartBranch:
 
     Parameters
     ----------
-    kernels : Kernels
-    t : float
     q : (n_q,) array
         A closed position.
     J : (n_c, n_v) array
@@ -393,7 +391,6 @@ class Initial:
 
     Parameters
     ----------
-    kernels : Kernels
     t : float
         Time; matters for driven constraints only.
     names : iterable of str, optional

@@ -285,7 +285,6 @@ class Forcing:
 
     Parameters
     ----------
-    layout : Layout
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
         Inputs not named keep their bound values.
 
@@ -569,7 +568,6 @@ def fill_rates(
 
     Parameters
     ----------
-    layout : Layout
     given : mapping
         Inputs of a run, by name.
     derive : callable

@@ -183,7 +183,6 @@ def motions(
 
     Parameters
     ----------
-    path : DependentMotion
     reference : callable
         t -> the closed position (n,) to start from.
     given : three arrays (n_dof,) or (n_dof, k), or None

@@ -39,7 +39,6 @@ class Bench:
 
     Parameters
     ----------
-    module : BoundModel
     equations : Derivation
         What it was made from.
     cases : sequence of Case

@@ -59,9 +59,6 @@ def random_cases(module: BoundModel, count: int, seed: int = 0, at_values: bool 
 
     Parameters
     ----------
-    module : BoundModel
-    count : int
-    seed : int
     at_values : bool
         Whether parameters and inputs have the values of the module, not others near them.
 

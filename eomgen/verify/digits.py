@@ -56,7 +56,6 @@ class Digits:
 
     Parameters
     ----------
-    mp : context
     outputs : sequence of Expr
     """
 

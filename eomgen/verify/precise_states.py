@@ -24,7 +24,6 @@ class PreciseSystem:
 
     Parameters
     ----------
-    equations : Derivation
     terms : SystemTerms
         Of the same equations.
     """

@@ -46,7 +46,6 @@ def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Findin
 
     Parameters
     ----------
-    bench : Bench
     seconds : float
         Time after which the changes that remain are left out, each with a note.
     seed : int

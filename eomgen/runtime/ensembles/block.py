@@ -1,4 +1,4 @@
-"""A block of cases -> RunBlock, what became of its runs, and what is kept of it: states, samples, statistics, files.
+"""A block of runs -> RunBlock, what became of them, and what is kept of it: states, samples, statistics, files.
 
 Blocks run in compiled code on threads, or one by one in Python.
 """
@@ -27,7 +27,7 @@ from ..runs.events import WAIT, Events
 from ..runs.integrate import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO
 from ..runs.simulate import simulate
 from ..storage import BROKEN, read_arrays, sealed
-from .given_cases import UNASSEMBLED, Cases, assemble_states
+from .variations import UNASSEMBLED, Variations, assemble_states
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -74,17 +74,17 @@ class Runs:
     """Many runs of a module: what differs between them, and what they have in common."""
 
     module: BoundModel
-    cases: Cases
+    varied: Variations
     plan: Plan
 
     @property
     def count(self) -> int:
         """How many there are."""
-        return self.cases.count
+        return self.varied.count
 
     def part(self, start: int, stop: int) -> Runs:
         """The runs from `start` to before `stop`."""
-        return replace(self, cases=self.cases.part(start, stop))
+        return replace(self, varied=self.varied.part(start, stop))
 
     @property
     def events(self) -> Events:
@@ -109,7 +109,7 @@ class Runs:
         """The inputs of run k."""
         forcing, bound = self.forcing, self.module
         with suppress(UsageError):  # where these parameters cannot be bound, the run does not begin
-            bound = bound.bind(**self.cases.column(k))
+            bound = bound.bind(**self.varied.column(k))
         forcing.attach(bound)
         forcing.unsettled = frozenset()
         forcing.begin(*self.plan.span)
@@ -117,13 +117,15 @@ class Runs:
 
     def inputs_at(self, t: Array, x: Array) -> Array:
         """Inputs (n_u, k) of every run at times (k,) and states (n_x, k)."""
-        cases, forcing = self.cases, self.forcing
-        u = np.array(np.broadcast_to(cases.u if cases.u.ndim > 1 else cases.u[:, None], (len(cases.u), cases.count)))
+        varied, forcing = self.varied, self.forcing
+        u = np.array(
+            np.broadcast_to(varied.u if varied.u.ndim > 1 else varied.u[:, None], (len(varied.u), varied.count))
+        )
         for i, signal in forcing.varying.items():
             u[i] = signal(t, x)  # type: ignore[arg-type]
         for i, formula in forcing.formulas.items():
-            for k in range(cases.count):
-                u[i, k] = formula.function(cases.column(k)["p"])(float(t[k]), x[:, k])
+            for k in range(varied.count):
+                u[i, k] = formula.function(varied.column(k)["p"])(float(t[k]), x[:, k])
         return u
 
     @property
@@ -134,17 +136,17 @@ class Runs:
 
     def with_outputs(self, x: Array, t: Array) -> Array:
         """States (n_x, k) at times (k,) with their outputs, as ``names`` has them; NaN where one has no value."""
-        module, cases = self.module, self.cases
+        module, varied = self.module, self.varied
         further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
         good = np.flatnonzero(np.isfinite(x).all(axis=0))
         y = np.full((module.n_y, x.shape[1]), np.nan)
         if further and good.size:
             outputs, u = module.kernels.kernel("outputs", nan=True), self.inputs_at(t, x)
-            if cases.p.ndim == 1:
-                y[:, good] = outputs(t[good], x[:, good], p=cases.p, u=np.ascontiguousarray(u[:, good]))
+            if varied.p.ndim == 1:
+                y[:, good] = outputs(t[good], x[:, good], p=varied.p, u=np.ascontiguousarray(u[:, good]))
             else:
                 for k in good:
-                    y[:, k] = outputs(float(t[k]), x[:, k], p=cases.column(int(k))["p"], u=u[:, k])
+                    y[:, k] = outputs(float(t[k]), x[:, k], p=varied.column(int(k))["p"], u=u[:, k])
         return np.concatenate([x, y[further]]) if further else x
 
 
@@ -201,19 +203,18 @@ def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None 
 
     Parameters
     ----------
-    runs : Runs
     threads : int
         Runs at a time; the results do not depend on it.
     watch : callable, optional
         Told now and then how many runs have ended.
     """
-    cases, plan, count = runs.cases, runs.plan, runs.count
-    x0, failed, words = assemble_states(runs.module, cases, plan.span[0], runs.forcing_of)
+    varied, plan, count = runs.varied, runs.plan, runs.count
+    x0, failed, words = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
     core: Any = eager(runs.module.core)
     run = _run_compiled if plan.method in core.methods else _run_python
     good = np.flatnonzero(~failed)
     some: Any = good if good.size < count else slice(None)
-    p, u = (a if a.ndim == 1 else a[:, some].T for a in (cases.p, cases.u))
+    p, u = (a if a.ndim == 1 else a[:, some].T for a in (varied.p, varied.u))
     block = run(runs, x0[:, some].T, p, u, threads, watch)
     if good.size < count:
         block = _spread(block, good, RunBlock.blank(runs, count, UNASSEMBLED))
@@ -341,24 +342,17 @@ def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -
     led = runs.forcing.constrained
 
     def bring(columns: list[int]) -> None:
-        part, at, given = states[:, :, columns], times[:, columns], runs.cases.column(columns[0])
+        part, at, given = states[:, :, columns], times[:, columns], runs.varied.column(columns[0])
         good = np.asarray(np.isfinite(part).all(axis=0))
         if not good.any():
             return
-        try:
-            if led:
-                given["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
-            part[:, good] = runs.module.project(part[:, good], t=at[good], **given)
-            states[:, :, columns] = part
-        except EomgenError as error:
-            if len(columns) == 1:
-                block.status[columns[0]], block.words[columns[0]] = FAILED, str(error)
-                states[:, :, columns[0]] = np.nan
-            for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
-                bring([k])
+        if led:
+            given["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
+        part[:, good] = runs.module.project(part[:, good], t=at[good], **given)
+        states[:, :, columns] = part
 
-    for columns in [[k] for k in range(runs.count)] if led else runs.cases.alike(runs.module.layout):
-        bring(columns)
+    for k, reason in runs.varied.in_groups(runs.module.layout, led, bring).items():
+        block.status[k], block.words[k], states[:, :, k] = FAILED, reason, np.nan
 
 
 # -- reductions --------------------------------------------------------------------------------------------------------

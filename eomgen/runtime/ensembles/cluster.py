@@ -20,7 +20,7 @@ from ..argument_checks import require
 from ..kernels import eager
 from ..pickling import processor_features, restore
 from .block import LOST, MEANING, Custom, Kept, Plan, Reduction, RunBlock, Runs, keep, run_block
-from .given_cases import Cases
+from .variations import Variations
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -178,7 +178,7 @@ def run_on_workers(
         index = next(waiting, None)
         if index is not None:
             start, stop = parts[index]
-            future = client.submit(_task, handle, runs.cases.part(start, stop), runs.plan, reduction, pure=False)
+            future = client.submit(_task, handle, runs.varied.part(start, stop), runs.plan, reduction, pure=False)
             indices[future.key] = index
             ready.add(future)
 
@@ -200,8 +200,8 @@ def run_on_workers(
         yield index, kept
 
 
-def _task(handle: Handle, cases: Cases, plan: Plan, reduction: Reduction) -> Kept:
-    runs = Runs(handle.open(), cases, plan)
+def _task(handle: Handle, varied: Variations, plan: Plan, reduction: Reduction) -> Kept:
+    runs = Runs(handle.open(), varied, plan)
     return keep(runs, reduction, run_block(runs))
 
 

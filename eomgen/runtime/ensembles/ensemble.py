@@ -86,7 +86,7 @@ class Ensemble(Result):
         self, runs: Runs, numbers: dict[str, Any], kept: dict[str, Any], words: dict[int, str], reduction: Reduction
     ) -> None:
         self._runs, self._words = runs, words
-        self._module, self._cases, self._plan = runs.module, runs.cases, runs.plan
+        self._module, self._variations, self._plan = runs.module, runs.varied, runs.plan
         self.count, self.names, plan = runs.count, runs.names, runs.plan
         self.grid: dict[str, Array] = {}
         self.t = np.array([plan.span[1]]) if plan.t_eval is None else plan.t_eval
@@ -176,11 +176,11 @@ class Ensemble(Result):
         """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs, events."""
         if not -self.count <= k < self.count:
             raise off_range(f"there are runs 0 to {self.count - 1}, not {k}")
-        cases, column = self._cases, self._cases.column(k)
-        if cases.states is not None:
-            initial: Any = cases.states[:, k]
+        varied, column = self._variations, self._variations.column(k)
+        if varied.states is not None:
+            initial: Any = varied.states[:, k]
         else:
-            initial = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
+            initial = {name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()} or None
         declared = set(self._module.info.signals)
         constants = dict(zip(self._module.u_names, column["u"].tolist(), strict=True))
         rates = self._module.layout.input_rates
@@ -294,19 +294,19 @@ class Ensemble(Result):
 
     def varied(self) -> dict[str, Array]:
         """The parameters, inputs and initial values (k,) that differ between the runs."""
-        cases, module = self._cases, self._module
+        varied, module = self._variations, self._module
         found: dict[str, Array] = {}
-        for names, rows in ((module.p_names, cases.p), (module.u_names, cases.u)):
+        for names, rows in ((module.p_names, varied.p), (module.u_names, varied.u)):
             found |= dict(zip(names, rows, strict=True)) if rows.ndim > 1 else {}
-        starts = cases.values if cases.states is None else dict(zip(module.x_names, cases.states, strict=True))
+        starts = varied.values if varied.states is None else dict(zip(module.x_names, varied.states, strict=True))
         found |= {f"initial_{name}": np.asarray(row) for name, row in starts.items() if np.ndim(row)}
         return {name: row for name, row in found.items() if row.size and np.ptp(row)}
 
     @property
     def metadata(self) -> dict[str, Any]:
         """Metadata of all runs, as in a trajectory's ``metadata``; ``values`` is a digest of what differs."""
-        plan, cases = self._plan, self._cases
-        rows = cases.p if cases.p.ndim > 1 else cases.p[:, None]
+        plan, varied = self._plan, self._variations
+        rows = varied.p if varied.p.ndim > 1 else varied.p[:, None]
         shared = zip(self._module.p_names, rows, strict=True)
         return {
             "name": self._module.name,
@@ -318,7 +318,7 @@ class Ensemble(Result):
             "options": {name: plain(value) for name, value in plan.options.items()},
             "inputs": {name: spell_input(value) for name, value in self._runs.forcing.values.items()},
             "parameters": {name: float(row[0]) for name, row in shared if row.size and np.ptp(row) == 0.0},
-            "values": cases.digest(),
+            "values": varied.digest(),
         }
 
     def save(self, path: str | Path) -> Path:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -40,7 +39,7 @@ from .block import (
     stored_length,
 )
 from .ensemble import Ensemble
-from .given_cases import collect_cases, grid_axes, spread_grid
+from .variations import collect_variations, grid_axes, spread_grid
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -140,21 +139,21 @@ def simulate_many(
     if grid is not None:
         initial, parameters, inputs = spread_grid(module, grid, (initial, parameters, inputs))
     tables, constants = _separate(module.layout, inputs)
-    cases = collect_cases(module, initial, parameters, constants, count)
+    varied = collect_variations(module, initial, parameters, constants, count)
     reduction = choose_reduction(reduce)
     named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
     plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, {**options}, (events, keep_events))
-    runs = Runs(module, cases, plan)
+    runs = Runs(module, varied, plan)
     threads = (os.cpu_count() or 1) if threads is None else read_count("threads", threads, 1)
-    watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
+    watch = Progress(0.0, float(varied.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
     each = module.n_x * (1 if plan.t_eval is None else len(plan.t_eval))
     watched = bool(runs.events.names)
     each += plan.keep_events * (2 + module.n_x) if watched else 0
-    whole = cases.count * (len(RUNS) + 2 * module.n_x) + each * (
-        cases.count if reduce in (None, "states", "events") else 1
+    whole = varied.count * (len(RUNS) + 2 * module.n_x) + each * (
+        varied.count if reduce in (None, "states", "events") else 1
     )
     fewer = "give fewer runs, fewer t_eval, fewer keep_events, or reduce='statistics'"
-    require_room(f"simulate_many with {cases.count} runs", whole, fewer)
+    require_room(f"simulate_many with {varied.count} runs", whole, fewer)
     with ExitStack() as stack:
         if watch is not None:
             stack.callback(watch.close)
@@ -164,13 +163,13 @@ def simulate_many(
 
             client = stack.enter_context(open_client(cluster))
             workers = count_workers(client)
-        length = choose_size(cases.count, 8 * each, workers or 1) if block is None else read_count("block", block, 1)
+        length = choose_size(varied.count, 8 * each, workers or 1) if block is None else read_count("block", block, 1)
         if store is not None and block is None:
             lanes = 1 if watched else WIDEST
-            length = stored_length(store) or min(length, max(lanes * threads, -(-cases.count // STORED)))
+            length = stored_length(store) or min(length, max(lanes * threads, -(-varied.count // STORED)))
         if reduce == "statistics":  # whole grains, so that rounding does not depend on blocks
             length = -(-length // GRAIN) * GRAIN
-        parts = split(cases.count, length)
+        parts = split(varied.count, length)
         store_of = None if store is None else _open_store(store, runs, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
@@ -205,14 +204,10 @@ def _run(
     before = 0
     for index in missing:
         start, stop = parts[index]
-        look = None if watch is None else partial(_look_from, watch, before)
+        look = None if watch is None else lambda done, before=before: watch(before + done)
         part = runs.part(start, stop)
         yield index, keep(part, reduction, run_block(part, threads, look))
         before += stop - start
-
-
-def _look_from(watch: Callable[[float], None], before: int, done: int) -> None:
-    watch(before + done)
 
 
 def _gather(runs: Runs, reduction: Reduction, parts: list[tuple[int, int]], kept: dict[int, Kept]) -> Ensemble:
@@ -269,7 +264,7 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
 
 def _open_store(folder: str | Path, runs: Runs, reduce: Any, parts: list[tuple[int, int]]) -> Store:
     """The store of an ensemble, whose identity is all that its results depend on."""
-    module, cases, plan = runs.module, runs.cases, runs.plan
+    module, varied, plan = runs.module, runs.varied, runs.plan
 
     def _plain(x: Any) -> Any:
         if isinstance(x, Signal):
@@ -278,7 +273,7 @@ def _open_store(folder: str | Path, runs: Runs, reduce: Any, parts: list[tuple[i
 
     identity = {
         "model": module.name, "model_digest": module.info.model_digest, "code": code_digest(module),
-        "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
+        "runs": varied.count, "values": varied.digest(), "span": list(plan.span),
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
         "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,

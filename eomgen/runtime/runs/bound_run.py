@@ -316,7 +316,6 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
     ----------
     rhs : callable
         f(t, x).
-    crawl : Crawling
     names : names of the states
     atol : float or (n_x,) array
         Absolute tolerance; the changes tried are no less, nor less than the motion of ten steps.
@@ -348,7 +347,6 @@ class Crawling(Exception):
 
     Parameters
     ----------
-    t : float
     x : (n_x,) array
     step : float
         Mean length of the last steps (s).

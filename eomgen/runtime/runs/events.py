@@ -64,7 +64,6 @@ class RunEvent:
     ----------
     function : callable f(t, x), or None
         The user's, with SciPy's attributes unless these are given; None where the loop itself evaluates it.
-    name : str
     terminal : int
         The run ends when it has happened so often; 0: never.
     direction : {1, -1, 0}
@@ -109,7 +108,6 @@ class Events:
 
     Parameters
     ----------
-    layout : Layout
     given : None, or one event or several: names, texts, functions; a mapping names them
         None watches all of the model.  Those of the model that reset the state are watched always.
     """
@@ -448,7 +446,6 @@ class ControlledEvents(Events):
 
     Parameters
     ----------
-    layout : Layout
     given : None, or one event or several
         As for :class:`Events`.
     controllers : mapping of str to callable

@@ -225,7 +225,6 @@ class ChangePointInterpolant:
     ----------
     supports : sequence of Point
         In order of s.
-    scales : Scales
     """
 
     def __init__(self, supports: Sequence[Point], scales: Scales) -> None:
@@ -261,7 +260,6 @@ def build_interpolant(
 
     Parameters
     ----------
-    continuation : Continuation
     before, after : Point
         Good points of one smooth branch, on either side of ``middle``.
     """

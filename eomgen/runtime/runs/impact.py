@@ -191,7 +191,6 @@ def find_sliding(
         Gap -> coefficient and names of the sliding velocities.
     gaps : sequence of str
         All gaps of the impact.
-    t : float
     x : (n_x,) array
     forcing : Forcing, optional
         Inputs that vary.
@@ -325,8 +324,6 @@ def strike_events(
 
     Parameters
     ----------
-    module : BoundModel
-    t : float
     x : (n_x,) array
     events : sequence of mappings
         As in the metadata; those with a restitution are gaps.

@@ -91,7 +91,6 @@ def check_options(solver: Any, options: Collection[str], own: Collection[str]) -
     ----------
     solver : OdeSolver subclass
         One that is not SciPy's may take anything.
-    options : names
     own : names
         Options of ``simulate`` itself, to suggest.
     """
@@ -142,15 +141,12 @@ def integrate(
 
     Parameters
     ----------
-    module : BoundModel
-    forcing : Forcing
     nodes : sequence of float
     x0 : (n,) array
         A state of the module; by a solver in Python others may follow it.
     method : str or OdeSolver subclass
         One of the module's own methods, or a class of solvers.
     t_eval : (n_t,) array, optional
-    dense : bool
     options : mapping
         Of the method.
     events : Events, optional

@@ -211,8 +211,6 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
 
     Parameters
     ----------
-    driven : DrivenCoordinates
-    t : float
     y : (n_led,) array
         Values of the led coordinates.
     near : (n_q,) array

@@ -253,7 +253,6 @@ class ForceSums:
     ----------
     lists : sequence of (str, int, int)
         Name, numbers and shapes of each contact between groups.
-    steps : int
     keep : bool
         Keep single contacts as well.
     """

@@ -50,9 +50,6 @@ def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callab
 
     Parameters
     ----------
-    layout : Layout
-    forcing : Forcing
-    t : float
     assembled : callable
         u (n_u,) -> the state assembled with these inputs.
     """

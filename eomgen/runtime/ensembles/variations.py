@@ -1,4 +1,4 @@
-"""What a user gives as values of many runs, or as a grid of values -> Cases, a column for each run."""
+"""What a user gives as values of many runs, or as a grid of values -> Variations, a column for each run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,6 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
 
     Parameters
     ----------
-    module : BoundModel
     grid : mapping
         Values by the name of a parameter, an input, a coordinate, a rate or an output: a list, or (low, high, count).
     groups : tuple
@@ -76,7 +75,7 @@ def grid_axes(grid: Mapping[str, Any]) -> dict[str, Array]:
     return {name: np.asarray(read_axis(f"grid {name}", values)) for name, values in grid.items()}
 
 
-# -- cases -------------------------------------------------------------------------------------------------------------
+# -- variations --------------------------------------------------------------------------------------------------------
 
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -85,7 +84,7 @@ UNASSEMBLED = -111  #: status of a run whose initial values could not be assembl
 
 
 @dataclass(frozen=True)
-class Cases:
+class Variations:
     """What differs between runs, and what does not.
 
     Attributes
@@ -105,12 +104,12 @@ class Cases:
     states: Array | None
     values: dict[str, Any]
 
-    def part(self, start: int, stop: int) -> Cases:
+    def part(self, start: int, stop: int) -> Variations:
         """The runs from `start` to before `stop`."""
         values = {name: x[start:stop] if np.ndim(x) else x for name, x in self.values.items()}
         states = None if self.states is None else self.states[:, start:stop]
         p, u = (a if a.ndim == 1 else a[:, start:stop] for a in (self.p, self.u))
-        return Cases(min(stop, self.count) - start, p, u, states, values)
+        return Variations(min(stop, self.count) - start, p, u, states, values)
 
     @property
     def differ(self) -> bool:
@@ -131,6 +130,21 @@ class Cases:
             groups.setdefault(row.tobytes(), []).append(k)
         return list(groups.values())
 
+    def in_groups(self, layout: Layout, singly: bool, work: Callable[[list[int]], None]) -> dict[int, str]:
+        """Work on runs that are alike together, or on each; the runs for which it fails, with the reason."""
+        left = [[k] for k in range(self.count)] if singly else self.alike(layout)
+        reasons = dict[int, str]()
+        while left:
+            columns = left.pop()
+            try:
+                work(columns)
+            except EomgenError as error:
+                if len(columns) == 1:
+                    reasons[columns[0]] = str(error)
+                else:  # some cannot be: find out which
+                    left += [[k] for k in columns]
+        return reasons
+
     def column(self, k: int) -> dict[str, Any]:
         """Parameters and inputs of one run, as ``Module.bind`` takes them."""
         given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
@@ -146,18 +160,17 @@ class Cases:
         return found.hexdigest()
 
 
-def collect_cases(
+def collect_variations(
     module: BoundModel,
     initial: Mapping[str, Any] | ArrayLike | None,
     parameters: Mapping[str, Any] | ArrayLike | None,
     inputs: Mapping[str, Any] | ArrayLike | None,
     count: int | None,
-) -> Cases:
+) -> Variations:
     """Bring initial values, parameters and inputs together.
 
     Parameters
     ----------
-    module : BoundModel
     initial : mapping of str to float or (k,), or (n_x,) or (n_x, k) array, optional
     parameters : mapping of str to float or (k,), or (n_p,) or (n_p, k) array, optional
     inputs : mapping of str to float or (k,), or (n_u,) or (n_u, k) array, optional
@@ -192,18 +205,16 @@ def collect_cases(
     require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
-    return Cases(k, p, u, states, values)
+    return Variations(k, p, u, states, values)
 
 
 def assemble_states(
-    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+    module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
 ) -> tuple[Array, Mask, list[str]]:
     """The initial states of all runs, on the constraints.
 
     Parameters
     ----------
-    module : BoundModel
-    cases : Cases
     t : float
         Time of the start (s).
     forcing_of : callable
@@ -217,70 +228,68 @@ def assemble_states(
     words : list of str
         Why, for each of these in order.
     """
-    with silent():  # for all runs, when their cases were collected
-        x, reasons = _assemble_all(module, cases, t, forcing_of)
+    with silent():  # for all runs, when their values were collected
+        x, reasons = _assemble_all(module, varied, t, forcing_of)
     if module.info.clocks:
-        for k in set(range(cases.count)) - reasons.keys():
-            x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
+        for k in set(range(varied.count)) - reasons.keys():
+            x[:, k] = at_next_samples(module.bind(**varied.column(k)), t, x[:, k])
     if module.layout.switches:
-        _refuse_disagreement(module, cases, t, x, reasons)
-    failed = np.array([k in reasons for k in range(cases.count)], dtype=bool)
+        _refuse_disagreement(module, varied, t, x, reasons)
+    failed = np.array([k in reasons for k in range(varied.count)], dtype=bool)
     return x, failed, [reasons[k] for k in sorted(reasons)]
 
 
-def _refuse_disagreement(module: BoundModel, cases: Cases, t: float, x: Array, reasons: dict[int, str]) -> None:
+def _refuse_disagreement(module: BoundModel, varied: Variations, t: float, x: Array, reasons: dict[int, str]) -> None:
     """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
-    layout, by_name = module.layout, cases.states is None and bool(module.info.held_rows)
-    for k in set(range(cases.count)) - reasons.keys():
+    layout, by_name = module.layout, varied.states is None and bool(module.info.held_rows)
+    for k in set(range(varied.count)) - reasons.keys():
         try:
             require_switched(layout, x[layout.n_x - layout.n_states :, k])
             if by_name:
-                require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
+                require_agreement(module.bind(**varied.column(k)), t, x[:, k], varied.values)
         except UsageError as error:
             reasons[k], x[:, k] = str(error), np.nan
 
 
 @np.errstate(all="ignore")
 def _assemble_all(
-    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+    module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
 ) -> tuple[Array, dict[int, str]]:
     """The states (n_x, k), and why runs have none; what several runs have in common is solved for once."""
-    free = not module.n_rows and not module.layout.space
-    if cases.states is not None and free:
-        return np.array(cases.states), {}
-    if cases.states is None and _is_free(module, cases, free):
-        return _assemble_entries(module, cases, t)
-    x, reasons = np.full((module.n_x, cases.count), np.nan), dict[int, str]()
+    layout = module.layout
+    free = not module.n_rows and not layout.space
+    if varied.states is not None and free:
+        return np.array(varied.states), {}
+    bound = layout.loops or layout.initial_outputs or any(name not in layout.x for name in varied.values)
+    if varied.states is None and free and not bound:  # named values are entries of the state, whatever the others are
+        return _assemble_entries(module, varied, t)
+    x = np.full((module.n_x, varied.count), np.nan)
     led = forcing_of(0).constrained
 
     def assemble(columns: list[int]) -> None:
-        try:
-            if led:
-                x[:, columns] = _assemble_led(module, cases, columns[0], t, forcing_of(columns[0]))[:, None]
-            elif cases.states is not None:
-                x[:, columns] = module.project(cases.states[:, columns], t=t, **cases.column(columns[0]))
-            else:
-                x[:, columns] = _assemble_named(module, cases, columns, t)
-        except EomgenError as error:
-            if len(columns) == cases.count and not (led or cases.differ):
-                raise
-            if len(columns) == 1:
-                reasons[columns[0]] = str(error)
-            for k in columns if len(columns) > 1 else ():  # some cannot be: find out which
-                assemble([k])
+        k = columns[0]
+        if led:  # constraints depend on inputs that vary
+            values = {name: float(value[k] if np.ndim(value) else value) for name, value in varied.values.items()}
+            given: Any = (values or None) if varied.states is None else varied.states[:, k]
+            x[:, k] = find_state(module.rebound(**varied.column(k)), given, t, forcing_of(k))
+        elif varied.states is not None:
+            x[:, columns] = module.project(varied.states[:, columns], t=t, **varied.column(columns[0]))
+        else:
+            x[:, columns] = _assemble_named(module, varied, columns, t)
 
-    for columns in [[k] for k in range(cases.count)] if led else cases.alike(module.layout):
-        assemble(columns)
-    return x, reasons
+    if not (led or varied.differ) and varied.count:
+        assemble([*range(varied.count)])
+        return x, {}
+    return x, varied.in_groups(module.layout, led, assemble)
 
 
-def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array, dict[int, str]]:
+def _assemble_entries(module: BoundModel, varied: Variations, t: float) -> tuple[Array, dict[int, str]]:
     """The states where each named value is an entry of them, whatever the others are."""
-    late = {name: value for name, value in values_at(module.layout, cases.p).items() if np.ndim(value)}
-    values = late | cases.values
+    late = {name: value for name, value in values_at(module.layout, varied.p).items() if np.ndim(value)}
+    values = late | varied.values
     scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in values.items()}
-    shared: dict[str, Any] = {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
-    x = np.repeat(module.x0(scalars, t=t, **shared)[:, None], cases.count, axis=1)
+    shared: dict[str, Any] = {name: a for name, a in (("p", varied.p), ("u", varied.u)) if a.ndim == 1}
+    x = np.repeat(module.x0(scalars, t=t, **shared)[:, None], varied.count, axis=1)
     for name, value in values.items():
         if np.ndim(value):
             x[module.x_names.index(name)] = value
@@ -291,11 +300,11 @@ def _assemble_entries(module: BoundModel, cases: Cases, t: float) -> tuple[Array
     return x, unknown
 
 
-def _assemble_named(module: BoundModel, cases: Cases, columns: list[int], t: float) -> Array:
+def _assemble_named(module: BoundModel, varied: Variations, columns: list[int], t: float) -> Array:
     """The states of runs that differ, as far as starts can tell, in their named values alone."""
-    kernels = Kernels(module.core, module.layout, **cases.column(columns[0]))
-    initial = Initial(kernels, t, cases.values)
-    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
+    kernels = Kernels(module.core, module.layout, **varied.column(columns[0]))
+    initial = Initial(kernels, t, varied.values)
+    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()})
              for k in columns]  # fmt: skip
     alike: dict[tuple[float, ...], list[int]] = {}
     for i, one in enumerate(given):
@@ -309,19 +318,6 @@ def _assemble_named(module: BoundModel, cases: Cases, columns: list[int], t: flo
         x[: module.n_q, places] = q[:, None]
         x[module.n_q :, places] = v if v.ndim > 1 else v[:, None]
     return x
-
-
-def _assemble_led(module: BoundModel, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
-    """The state of one run whose constraints depend on inputs that vary."""
-    values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
-    given = values if cases.states is None else cases.states[:, k]
-    return find_state(module.rebound(**cases.column(k)), given, t, forcing)
-
-
-def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
-    """Whether named initial values are entries of the state, whatever the others are."""
-    layout = module.layout
-    return free and not (layout.loops or layout.initial_outputs) and all(n in layout.x for n in cases.values)
 
 
 def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
