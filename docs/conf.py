@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -104,10 +105,12 @@ def copy_mathjax(app: Any, failure: Exception | None) -> None:
         shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / name, folder / name)
 
 
-def make_page(app: Any, failure: Exception | None) -> None:
-    """A page in which a mechanism runs, beside the others."""
+def make_pages(app: Any, failure: Exception | None) -> None:
+    """Pages in which mechanisms run, beside the others that link to them."""
     if failure is None and app.builder.format == "html":
-        eomgen.load_example("slider_crank").compile().page(Path(app.outdir) / "slider_crank.html")
+        texts = [(HERE / name).read_text(encoding="utf-8") for name in ("gallery.md", "pictures.md")]
+        for name in re.findall(r'<a href="(\w+)\.html">', "".join(texts)):
+            eomgen.load_example(name).compile(target="numpy").page(Path(app.outdir) / f"{name}.html")
 
 
 def setup(app: Any) -> None:
@@ -115,4 +118,4 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", copy_notebooks)
     app.connect("source-read", fill_contents)
     app.connect("build-finished", copy_mathjax)
-    app.connect("build-finished", make_page)
+    app.connect("build-finished", make_pages)

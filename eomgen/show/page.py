@@ -235,8 +235,11 @@ def page_html(
             "poses": 0 if model else numbers.add(scene.frames[:, :-1, :3, :])[0],
         }  # fmt: skip
     data["numbers"] = numbers.text()
-    script, style = (shipped("templates") / f"web/page.{kind}" for kind in ("js", "css"))
-    texts = {"script": script.read_text("utf-8"), "style": style.read_text("utf-8")}
+    picture, script, style, page = (
+        (shipped("templates") / "web" / name).read_text("utf-8")
+        for name in ("picture.js", "page.js", "page.css", "page.html")
+    )
+    texts = {"script": picture + script, "style": style}
     hashes = {f"{k}_hash": f"sha256-{b64encode(sha256(v.encode()).digest()).decode()}" for k, v in texts.items()}
     words = {
         "title": html_text(scene.name), "doc": html_text(module.doc or ""), "note": html_text(scene.note),
@@ -246,5 +249,4 @@ def page_html(
         "data": re.sub("[<>&]", lambda found: f"\\u{ord(found[0]):04x}", json.dumps(data, allow_nan=False)),
     }  # fmt: skip
     fill = {**texts, **hashes, **words}
-    text = (shipped("templates") / "web/page.html").read_text("utf-8")
-    return re.sub(r"{{ (\w+) }}", lambda found: fill[found[1]], text)
+    return re.sub(r"{{ (\w+) }}", lambda found: fill[found[1]], page)

@@ -198,6 +198,10 @@ def test_what_a_page_refuses_is_told_and_changes_nothing_else(opened: Browser) -
     for text in ("max(3)", "atan2(2)", "sin(1,2,3)", "const(7)", "x(2)", "2 constructor 3", "1e999*t", "toString(1)"):
         assert text in put("tau (", text)
     assert put("tau (", "max(1, t, 2*sin(t))") == ""
+    copied = opened.evaluate("(page.copy('yaml'), get('copied').value)")
+    assert 'inputs: {tau: {signal: "max(1, t, 2*sin(t))"}}\ninitial: {theta: 0.3, theta_dot: 10}' in copied
+    assert put("tau (", "2000") == ""
+    assert opened.evaluate("page.forces[0].slide.max") == "2000"
     opened.evaluate("get('declared').click()")
     assert opened.evaluate(
         "page.model.p.every((p, k) => p === page.model.info.pValues[k]) && page.model.inputs[0] === 0"
@@ -220,6 +224,23 @@ def test_what_a_page_refuses_is_told_and_changes_nothing_else(opened: Browser) -
     assert opened.evaluate("[0.0000187, -150000, 0.05, 0, 99999].map((x) => shown(x, 3))") == [
         "1.87e-5", "-1.5e5", "0.05", "0", "1e5"
     ]  # fmt: skip
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
+def test_arrows_the_branch_and_steps_of_one_size_are_chosen(opened: Browser) -> None:
+    assert opened.evaluate("[...get('trace').options].at(-1).textContent") == "rod.tip"
+    opened.evaluate("get('arrows').value = 'both'")
+    opened.wait_for("page.picture.arrows.every((one) => one.count > 0)")
+    assert "longest arrow" in opened.evaluate("get('scale').textContent")
+    opened.click("#play")
+    opened.evaluate("get('branch').value = 1; get('branch').onchange()")
+    assert opened.evaluate("get('branch').offsetWidth > 0 && page.frames[0].x[2] < 0")
+    opened.evaluate("get('method').value = 2; get('method').onchange(); get('size').value = 0; get('size').onchange()")
+    assert "must be a finite positive number" in opened.evaluate("get('message').textContent")
+    opened.click("#play")
+    opened.wait_for("page.frames.length > 5")
+    assert opened.evaluate(RESIDUAL) < CLOSED
 
 
 @pytest.mark.needs("chromium")
