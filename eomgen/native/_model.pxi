@@ -22,10 +22,8 @@ cdef extern from "eomgen_solvers.h" nogil:
         memcpy(m->areas, areas, sizeof m->areas);
         memcpy(&m->scales, functions, N_FUNCTIONS * sizeof *functions);
     }
-    static const eom_solvers eom_table = {
-        EOM_LAYOUT, eom_project, eom_rhs, eom_outputs, eom_jacobian, eom_input_jacobian, eom_parameter_jacobian, eom_mass_matrix,
-        eom_embedded_mass_matrix, eom_kinematics, eom_dae_jacobian, eom_inverse_dynamics_derivatives, eom_finish_rhs
-    };
+    #define EOM_FUNCTION(name) eom_##name,
+    static const eom_solvers eom_table = { EOM_LAYOUT, EOM_EACH(EOM_FUNCTION) eom_finish_rhs };
     #define EOM_SOLVERS (&eom_table.project)
     """
     enum: AREAS

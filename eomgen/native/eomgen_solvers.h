@@ -171,46 +171,30 @@ typedef struct eom_at {
 
 /* Public functions that are no straight-line code; x and out as in the model's header. */
 typedef int (*eom_solver)(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_project(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_rhs(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_outputs(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_jacobian(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_input_jacobian(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_parameter_jacobian(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_mass_matrix(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_embedded_mass_matrix(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_kinematics(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_dae_jacobian(const eom_at *at, const double *x, double *out);
-EOMGEN_PIECE int eom_inverse_dynamics_derivatives(const eom_at *at, const double *x, double *out);
-
-/* x' where the straight-line right-hand side is not enough (eomgen_straight.h); sound: whether it has been evaluated
-   and holds, next to a singular position perhaps. */
-EOMGEN_PIECE int eom_finish_rhs(const eom_at *at, const double *x, double *out, int sound);
+#define EOM_EACH(X) \
+    X(project) X(rhs) X(outputs) X(jacobian) X(input_jacobian) X(parameter_jacobian) X(mass_matrix) X(embedded_mass_matrix) \
+    X(kinematics) X(dae_jacobian) X(inverse_dynamics_derivatives)
 
 /* The same as a table: models that a session opens are compiled without the solvers and take those of eomgen._native,
-   where both have the same layout. */
+   where both have the same layout. finish_rhs: x' where the straight-line right-hand side is not enough
+   (eomgen_straight.h); sound: whether it has been evaluated and holds, next to a singular position perhaps. */
+#define EOM_ENTRY(name) eom_solver name;
 typedef struct {
     int layout;
-    eom_solver project, rhs, outputs, jacobian, input_jacobian, parameter_jacobian, mass_matrix, embedded_mass_matrix,
-        kinematics, dae_jacobian, inverse_dynamics_derivatives;
+    EOM_EACH(EOM_ENTRY)
     int (*finish_rhs)(const eom_at *at, const double *x, double *out, int sound);
 } eom_solvers;
 enum { EOM_LAYOUT = (int)sizeof(eom_model) };
 #ifdef EOMGEN_OPENED
 EOMGEN_PIECE extern const eom_solvers *eom_library;
-#define eom_project eom_library->project
-#define eom_rhs eom_library->rhs
-#define eom_outputs eom_library->outputs
-#define eom_jacobian eom_library->jacobian
-#define eom_input_jacobian eom_library->input_jacobian
-#define eom_parameter_jacobian eom_library->parameter_jacobian
-#define eom_mass_matrix eom_library->mass_matrix
-#define eom_embedded_mass_matrix eom_library->embedded_mass_matrix
-#define eom_kinematics eom_library->kinematics
-#define eom_dae_jacobian eom_library->dae_jacobian
-#define eom_inverse_dynamics_derivatives eom_library->inverse_dynamics_derivatives
+#define EOM_SOLVER(name) \
+    static inline int eom_##name(const eom_at *at, const double *x, double *out) { return eom_library->name(at, x, out); }
 #define eom_finish_rhs eom_library->finish_rhs
+#else
+#define EOM_SOLVER(name) EOMGEN_PIECE int eom_##name(const eom_at *at, const double *x, double *out);
+EOMGEN_PIECE int eom_finish_rhs(const eom_at *at, const double *x, double *out, int sound);
 #endif
+EOM_EACH(EOM_SOLVER)
 
 #ifdef __cplusplus
 }
