@@ -37,7 +37,7 @@ AT_RANDOM = """(async () => {
     worst = Math.max(worst, RESIDUAL);
   }
   const before = page.count;
-  await new Promise((done) => setTimeout(done, 500));
+  for (let k = 0; k < 3; k += 1) await new Promise(requestAnimationFrame);
   return page.count > before ? worst : Infinity;
 })()"""
 BOUNCER = """name: bouncer
