@@ -20,7 +20,7 @@ from ..errors import Problem, UsageError
 from ..expr.core import Graph
 from .build_elements import declare_contacts, declare_coordinates, own_states
 from .build_quantities import declare_states, declare_switches
-from .checks import unknown_key
+from .checks import check_keys, unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .fields import ADDED, COMPONENT
 from .names import ENERGIES, RATES, Namespace, fault_of_name, function_words, nearest
@@ -601,11 +601,7 @@ class Components:
         self, given: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
     ) -> None:
         self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
-        self.given: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
-        if given is not None and not isinstance(given, Mapping):
-            faults.add(
-                "components", f"is not {kinds.Table.says}", "write the names of the components as keys", "EG-TYPE"
-            )
+        self.given = faults.mapping("components", given, "write the names of the components as keys")
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
 
@@ -639,9 +635,7 @@ class Components:
         if not isinstance(given, Mapping):
             self.fault(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
             return None
-        for key in given:
-            if key not in COMPONENT:
-                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT), "EG-NAME-UNKNOWN")
+        check_keys(path, given, COMPONENT, self.faults)
         if "file" in given:
             if len(given) > 1:
                 remedy = "give file alone; the file describes the whole component"
@@ -694,14 +688,7 @@ class Components:
     # -- instances ------------------------------------------------------------------------------------------------
     def add(self, given: Any, start: str, target: Description) -> None:
         """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
-        if given is None:
-            return
-        if not isinstance(given, Mapping):
-            self.fault(
-                f"{start}add", f"is not {kinds.Table.says}", "write the names of the instances as keys", "EG-TYPE"
-            )
-            return
-        for name, keys in given.items():
+        for name, keys in self.faults.mapping(f"{start}add", given, "write the names of the instances as keys").items():
             self._add_one(name, keys, f"{start}add.{name}", target)
 
     def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:

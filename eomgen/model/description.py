@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..base.texts import html_text
+from ..elements.kinds import Table
 from ..elements.kinds import is_zero as is_zero
 from ..elements.kinds import items as items
 from ..errors import Problem, cannot
@@ -153,6 +154,12 @@ class Faults:
     def add(self, path: str, message: str, remedy: str = "", code: str = "") -> None:
         """Note a fault at a dotted path."""
         self.take(Problem(path, message, remedy, *place_of(path, self.lines), code))
+
+    def mapping(self, path: str, value: Any, remedy: str) -> Mapping[Any, Any]:
+        """A value, if it is a mapping, else an empty one; noted unless it is None."""
+        if value is not None and not isinstance(value, Mapping):
+            self.add(path, f"is not {Table.says}", remedy, "EG-TYPE")
+        return value if isinstance(value, Mapping) else {}
 
     def missing(self, path: str, remedy: str) -> None:
         """Note that something is missing."""

@@ -267,11 +267,10 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
                 _add_section(target, faults, start, key, given[key], origin)
             elif key == "contacts" and not start:
                 _add_contacts(target, faults, given[key], origin)
-            elif key in ("initial", "guess") and start:
-                if isinstance(given[key], Mapping):
-                    target.values[key] = given[key]
-                elif given[key] is not None:
-                    faults.add(f"{start}{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
+            elif key not in ("initial", "guess") or not start:
+                continue
+            elif values := faults.mapping(f"{start}{key}", given[key], "write names as keys"):
+                target.values[key] = values
 
     def open_file(name: str) -> Description | None:
         return _open_part(name, file, origin, faults)
@@ -323,16 +322,11 @@ def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Descrip
 
 def _add_contacts(description: Description, faults: Faults, value: Any, origin: _Origin) -> None:
     """Take in the section ``contacts``: forces of that type, whose law may be a mapping of its own."""
-    if value is None:
-        return
-    if not isinstance(value, Mapping):
-        faults.add("contacts", f"is not {kinds.Table.says}", "write the names of the contacts as keys", "EG-TYPE")
-        return
     for path, place in list(description.lines.items()):
         if path.startswith("contacts."):
             description.lines["forces" + path.removeprefix("contacts")] = place
     forces: dict[str, Any] = {}
-    for name, given in value.items():
+    for name, given in faults.mapping("contacts", value, "write the names of the contacts as keys").items():
         if isinstance(given, Mapping) and "type" in given:
             faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out", "EG-CONFLICT")
         forces[name] = {"type": "contacts", **given} if isinstance(given, Mapping) else given
@@ -359,14 +353,8 @@ def _add_section(
     description: Description, faults: Faults, start: str, section: str, value: Any, origin: _Origin
 ) -> None:
     """Take in the entries of a section; an empty section is one that was left out."""
-    if value is None:
-        return
-    if not isinstance(value, Mapping):
-        faults.add(
-            f"{start}{section}", f"is not {kinds.Table.says}", f"write the names of the {section} as keys", "EG-TYPE"
-        )
-        return
-    for name, given in value.items():
+    named = faults.mapping(f"{start}{section}", value, f"write the names of the {section} as keys")
+    for name, given in named.items():
         values, place = given, f"{section}.{name}"
         if not isinstance(given, dict):
             key = SHORT.get(section)
