@@ -14,7 +14,6 @@ from ..elements.frames import GROUND, Frame, Marker
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
-from ..expr.shown import quoted, shown
 from .bodies import check_bodies, check_display, read_body, read_body_shapes
 from .build_elements import (
     build_elements,
@@ -57,7 +56,7 @@ from .equations import (
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Mechanism, Simulation
-from .names import Namespace, fault_of_model_name, nearest
+from .names import Namespace, fault_of_model_name
 from .quantities import SUMS, CarriedQuantity, WrenchQuantity
 from .read_shapes import read_shapes
 from .sympy_face import in_order, name_of
@@ -309,8 +308,8 @@ def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -
             result[f"{place[0]}({place[1]})"] = reader.expression(path, value)
             _check_place(reader, path, *place)
         else:
-            remedy = nearest(shown(name), known, _listed([_PLURAL[what] for what in whats], "and"))
-            reader.fault(path, f"no {_listed(whats, 'or')} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            listed = _listed([_PLURAL[what] for what in whats], "and")
+            reader.unknown(path, _listed(whats, "or"), name, known, listed)
     return result
 
 
@@ -319,7 +318,7 @@ def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
     marker = reader.markers.get(label)
     if marker is None:
         named = [known for known, marker in reader.markers.items() if marker.body != GROUND]
-        reader.fault(path, f"no marker {quoted(label)}", nearest(label, named, "markers"), "EG-NAME-UNKNOWN")
+        reader.unknown(path, "marker", label, named, "markers")
     elif marker.body == GROUND:
         kind = "velocity" if what.startswith("v") else "position"
         reader.fault(
@@ -346,8 +345,7 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known and name not in rates:
-            remedy = nearest(shown(name), known, "coordinates")
-            reader.fault(f"independent[{k}]", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            reader.unknown(f"independent[{k}]", "coordinate", name, known, "coordinates")
         elif name in result:
             reader.fault(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once", "EG-CONFLICT")
         else:

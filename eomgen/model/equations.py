@@ -18,13 +18,12 @@ from ..expr.core import Expr, Graph, is_comparison, reachable, substitute, symbo
 from ..expr.differentiate import gradient, hessian, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import vanishes
-from ..expr.shown import quoted, shown
 from .checks import check_keys
 from .description import Description, Faults, items
 from .expressions import names_in
 from .fields import EQUATIONS, LAGRANGIAN
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
-from .names import ENERGIES, RATES, fault_of_name, nearest
+from .names import ENERGIES, RATES, fault_of_name
 from .sympy_face import derivative_names, free_names, function_names, in_order, name_of, named, names_of, values_in
 from .values import MULTIPLIERS, Reader, give_latex, numbered, take_coordinates_latex
 
@@ -243,8 +242,7 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     if isinstance(given, Mapping):
         for name, value in in_order(given, names):
             if name not in result:
-                remedy = nearest(shown(name), names, "coordinates")
-                reader.fault(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+                reader.unknown(f"{path}.{name}", "coordinate", name, names, "coordinates")
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result[name] for name in names)
@@ -444,8 +442,7 @@ def _rates(
     named = {name_of(key): value for key, value in given.items()}
     for name in named:
         if name not in q:
-            remedy = nearest(shown(name), q, "coordinates")
-            faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+            reader.unknown(f"{path}.{name}", "coordinate", name, q, "coordinates")
     result = []
     own = {f"{name}_dot" for name in q} - set(v)
     for name in q:

@@ -123,6 +123,10 @@ class Reader:
         else:
             self.fault(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
 
+    def unknown(self, path: str, what: str, name: object, known: Iterable[str], listed: str) -> None:
+        """Note a name that is none of the known ones, which are listed as such."""
+        self.fault(path, f"no {what} {quoted(name)}", nearest(shown(name), known, listed), "EG-NAME-UNKNOWN")
+
     def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
         """Note keys that a table does not know, and required ones that are missing."""
         check_keys(path, values, fields, self.faults)
@@ -350,12 +354,7 @@ class Reader:
             return None
         body = value["body"]
         if not isinstance(body, str) or body not in self.bodies:
-            self.fault(
-                f"{path}.body",
-                f"no body {quoted(body)}",
-                nearest(shown(body), self.bodies, "bodies"),
-                "EG-NAME-UNKNOWN",
-            )
+            self.unknown(f"{path}.body", "body", body, self.bodies, "bodies")
             return None
         return Marker(self.bodies[body], self.frame(path, value), label_of(value))
 
@@ -416,8 +415,7 @@ class Reader:
         if isinstance(value, str) and value in own:
             return own[value], self.mass_data[own[value]]
         if value is not None and not self.faults.under(f"bodies.{value}"):
-            remedy = nearest(shown(value), own, "bodies")
-            self.fault(path, f"no body {quoted(value)}", remedy, "EG-NAME-UNKNOWN")
+            self.unknown(path, "body", value, own, "bodies")
         return None
 
     def coordinate(self, path: str, value: Any, measure: str = "") -> Found | None:
@@ -451,8 +449,7 @@ class Reader:
         if not faults.under(f"joints.{given}"):  # else the joint itself is at fault, which is noted already
             known = [j.entry.name for j in self.joints]
             known += [c for c in self.names.of("coordinate") if c not in known]
-            remedy = nearest(shown(given), known, "joints and coordinates")
-            faults.add(path, f"no joint {quoted(given)}", remedy, "EG-NAME-UNKNOWN")
+            self.unknown(path, "joint", given, known, "joints and coordinates")
         return None
 
     def contact_point(self, entry: Entry, cam: Marker) -> tuple[Marker, Expr] | None:
@@ -516,8 +513,8 @@ def take_coordinates_latex(
             if name in coordinates or name in others:
                 take_latex(reader, f"{path}.{name}", name, text)
             else:
-                remedy = nearest(shown(name), [*coordinates, *others], f"coordinates{' and velocities' * bool(others)}")
-                reader.fault(f"{path}.{shown(name)}", f"no coordinate {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
+                kind = f"coordinates{' and velocities' * bool(others)}"
+                reader.unknown(f"{path}.{shown(name)}", "coordinate", name, [*coordinates, *others], kind)
         return
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
