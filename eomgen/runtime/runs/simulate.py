@@ -73,17 +73,8 @@ class Plan(NamedTuple):
     end: float  #: by default (s)
     size: float | None  #: of the steps of RK4 (s)
     settings: dict[str, Any]  #: tolerances, steps and options of the method, checked but for the length of the run
-
-    @property
-    def kept(self) -> bool:
-        """Whether another run can have it."""
-        return self.solver is None and self.size is None and not self.forcing.values
-
-    @property
-    def shared(self) -> bool:
-        """Whether runs that bind no values change nothing of the forcing: no rates, no sampled states."""
-        layout = self.forcing.layout
-        return not (layout.input_rates or layout.info.clocks or layout.switches)
+    kept: bool  #: whether another run can have it
+    shared: bool  #: whether runs that bind no values change nothing of the forcing: no rates, no sampled states
 
 
 def plan_run(
@@ -116,7 +107,9 @@ def plan_run(
     if solver is None or solver.__module__.startswith("scipy."):  # another's solver may take anything
         settings = check_tolerances(module.n_x, inf, settings)
     title = str(method) if solver is None else solver.__name__
-    return Plan(forcing, watched, solver, title, float(declared["end"]), size, settings)
+    kept = solver is None and size is None and not forcing.values
+    shared = not (layout.input_rates or layout.info.clocks or layout.switches)
+    return Plan(forcing, watched, solver, title, float(declared["end"]), size, settings, kept, shared)
 
 
 # -- runs --------------------------------------------------------------------------------------------------------------
