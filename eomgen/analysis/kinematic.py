@@ -381,7 +381,8 @@ def _follow_both_ways(
     y = driven.led_values(q, t)
     k = names.index(name) if name in names else -1
     here = t if name == "t" else float(y[k])
-    turns = name != "t" and driven.led_scales[k] == 1.0 and not _is_length(module, name)
+    kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))
+    turns = name != "t" and driven.led_scales[k] == 1.0 and kinds[name] != "length"
     reach = 2 * np.pi if turns else FAR * (1.0 if name == "t" else layout.length)
     low, high = here - reach, here + reach
     if within is not None:
@@ -412,9 +413,3 @@ def _follow_both_ways(
             break
     (upper, top, above), (lower, bottom, below) = found
     return MotionRange(name, lower, upper, (bottom, top), (below, above), tuple(singular))
-
-
-def _is_length(module: BoundModel, name: str) -> bool:
-    layout = module.layout
-    kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))
-    return kinds[name] == "length"

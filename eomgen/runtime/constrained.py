@@ -75,7 +75,7 @@ class ProjectedStates(NamedTuple):
 
     def jacobian(self) -> Array:
         """C_q of all rows, (k, n_c, n_v)."""
-        C_q = self.evaluate(_all_rows(self.module), self.q)
+        C_q = self.evaluate(self.module.kernels.constraint_jacobian, self.q)
         return np.ascontiguousarray(np.moveaxis(C_q, -1, 0))
 
     def accelerations(self) -> Array:
@@ -89,10 +89,6 @@ class ProjectedStates(NamedTuple):
     def shaped(self, result: Array, out: Array | None = None) -> Array:
         """A result (..., k) as it was asked for."""
         return into(out, np.ascontiguousarray(result[..., 0] if self.single else result))
-
-
-def _all_rows(module: BoundModel) -> Any:
-    return module.kernels.constraint_jacobian
 
 
 def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:

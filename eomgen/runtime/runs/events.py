@@ -336,15 +336,12 @@ def at_next_samples(
             raise off_range(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
         if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
             found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
-            while found[place] >= 1.0 and _lateness(values, t, _less_one(found, place), event, place)[0] <= instant(t):
+            unit = np.eye(len(found))[place]
+            while found[place] >= 1.0 and _lateness(values, t, found - unit, event, place)[0] <= instant(t):
                 found[place] -= 1.0  # the period has been rounded
         while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
             found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
     return found
-
-
-def _less_one(x: Array, place: int) -> Array:
-    return np.where(np.arange(len(x)) == place, x - 1.0, x)
 
 
 def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[float, float]:
