@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from .errors import UsageError as UsageError
     from .errors import ZenoError as ZenoError
     from .module import Module as Module
-    from .runtime import Signal as Signal
-    from .runtime import load_trajectory as load_trajectory
+    from .runtime.inputs import Signal as Signal
+    from .runtime.trajectory import load_trajectory as load_trajectory
     from .runtime.trajectory import Trajectory as Trajectory
 
 __version__ = "0.1.0"
@@ -52,7 +52,7 @@ _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "api.loading"
 _TYPES = {"Equations": "api.equations", "Module": "module", "Trajectory": "runtime.trajectory"}
 _HOMES |= _TYPES
 _MODULES = {"errors": ".errors", "rotations": ".elements.rotations"}
-_HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
+_HOMES |= {"Signal": "runtime.inputs", "load_trajectory": "runtime.trajectory"}
 _ERRORS = (
     "AssemblyError",
     "EomgenError",

@@ -222,7 +222,7 @@ class Module(BoundModel):
             raise ill_typed(f"{package!r} is no package that eomgen generated")
         core, file = module.core, str(module.core.__file__)
         if file.endswith(".py"):  # what it raises would be errors of the package, which nothing here knows
-            from .base.files import load_source
+            from .toolchain.trusted_files import load_source
 
             core = load_source(f"{__package__}._{module.name}", file, Path(file).read_bytes())
         return cls(core, module.p, module.u)

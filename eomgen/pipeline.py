@@ -1,7 +1,7 @@
 """From a model to its compiled functions, in stages; the output of each is the input of the next.
 
 Every stage is a package whose functions take and return frozen values; this file alone knows their order, and none of
-the targets, which are rows of :data:`~.base.targets.TARGETS`.
+the targets, which are rows of :data:`~.toolchain.targets.TARGETS`.
 
 Stages
 ------
@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from . import __version__
-from .base.targets import TARGETS, find_function, find_target
-from .base.without_gc import timed, without_gc
 from .errors import EomgenError, cannot
+from .expr.without_gc import timed, without_gc
 from .reading.derivation import Derivation, Derived, derive_mechanism
 from .runtime.argument_checks import read_names
+from .toolchain.targets import TARGETS, find_function, find_target
 
 if TYPE_CHECKING:
     from .codegen.program import Program

@@ -21,11 +21,11 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 #: Nothing that executes or parses code by other means than eomgen's own parser is called.
 FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
-#: Numbers below this are limits, which stand in base/limits alone; numbers in formulas, such as 1/720, are larger.
+#: Numbers below this are limits, which stand in files of that name alone; those in formulas, such as 1/720, are larger.
 SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 NO_LIMITS = {
-    "base/numeric/assembly.py": {1e-8},
+    "base/assembly.py": {1e-8},
     "codegen/loop_systems.py": {1e-100},
     "importers/robot.py": {1e-11},
     "elements/rotations.py": {1e-4},
@@ -39,9 +39,10 @@ LONGEST = 800  #: lines of a file of tests
 
 #: What runs reach beyond the folders that packages carry: texts, pictures, analyses.
 BEYOND = {
-    "module": {"analysis", "codegen", "verify"},
+    "module": {"analysis", "codegen", "toolchain", "verify"},
     "runtime.drawing": {"show"},
     "runtime.inputs": {"model"},
+    "runtime.plotting": {"expr"},
     "runtime.argument_checks": {"model"},
     "runtime.trajectory": {"show"},
 }
@@ -67,15 +68,15 @@ def forbidden() -> Iterator[str]:
 
 
 def limits() -> Iterator[str]:
-    """Limits that do not stand in eomgen/base/limits; files in C take theirs from there by name."""
+    """Limits that do not stand in files of limits; files in C take theirs from there by name."""
     for name, nodes in NODES.items():
-        if name.startswith("eomgen.base.limits"):
+        if "limits" in name.split("."):
             continue
         floats = {n.value for n in nodes if isinstance(n, ast.Constant) and type(n.value) is float}
         small = {x for x in floats if 0.0 < abs(x) < SMALL}
         if small != NO_LIMITS.get(str(FILES[name].relative_to(ROOT / "eomgen")), set()):
-            yield f"{name}: limits outside eomgen/base/limits, or no longer there: {small}"
-    definitions = import_module("eomgen.base.limits.in_c").definitions
+            yield f"{name}: limits outside files of limits, or no longer there: {small}"
+    definitions = import_module("eomgen.native.limits").definitions
     for folder, pattern in (
         ("eomgen/native", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
         ("eomgen/native/ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
@@ -189,12 +190,19 @@ def packages() -> Iterator[str]:
 
 def keywords() -> Iterator[str]:
     """Options that type checkers know (``TypedDict``), where they are not those that there are."""
-    types = import_module("eomgen.runtime.option_types")
+    homes = (
+        "runtime.protocols",
+        "runtime.trajectory",
+        "toolchain.compiler",
+        "analysis.sensitivities",
+        "importers.robot",
+    )
+    types = {name: of for home in homes for name, of in vars(import_module(f"eomgen.{home}")).items()}
 
     def arguments(home: str, name: str, *others: str) -> set[str]:
         return set(inspect.signature(getattr(import_module(f"eomgen.{home}"), name)).parameters) - {*others}
 
-    bound, robot = set(types.BoundValues.__annotations__), set(types.RobotKeywords.__annotations__)
+    bound, robot = (set(types[name].__annotations__) for name in ("BoundValues", "RobotKeywords"))
     shown = {"module", "file", "format"}
     for known, those in {
         "BuildOptions": arguments("toolchain.compiler", "Options"),
@@ -205,8 +213,8 @@ def keywords() -> Iterator[str]:
         "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},
         "FilmOptions": arguments("show.animate", "animate_mode", "x", "shape", *shown),
     }.items():
-        for name in sorted(those ^ set(getattr(types, known).__annotations__)):
-            yield f"eomgen.runtime.option_types: {known}: {name}"
+        for name in sorted(those ^ set(types[known].__annotations__)):
+            yield f"{types[known].__module__}: {known}: {name}"
 
 
 def codes() -> Iterator[str]:

@@ -12,7 +12,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
 
 import eomgen
-import eomgen.base.limits as eomgen_limits
+import eomgen
 from eomgen.elements.constraints import CONSTRAINTS
 from eomgen.elements.forces import FORCES
 from eomgen.elements.joints import JOINTS
@@ -79,14 +79,17 @@ class Codes(SphinxDirective):
 
 
 class Limits(SphinxDirective):
-    """``{eomgen-limits}``: every number of :mod:`eomgen.base.limits`, by the file it is in."""
+    """``{eomgen-limits}``: every number of files of limits, by the file it is in."""
 
     def run(self) -> list[nodes.Node]:
         """The nodes in place of the directive."""
         text = ""
-        for found in pkgutil.iter_modules(eomgen_limits.__path__):
-            name = f"eomgen.base.limits.{found.name}"
-            text += f"\n### {found.name}\n\n" + _rst(
+        for found in pkgutil.walk_packages(eomgen.__path__, "eomgen."):
+            name = found.name
+            if found.ispkg or "limits" not in name.split("."):
+                continue
+            title = " ".join(part for part in name.split(".")[1:] if part not in ("base", "limits"))
+            text += f"\n### {title}\n\n" + _rst(
                 [f".. automodule:: {name}", "   :members:", "   :member-order: bysource"]
             )
         return self.parse_text_to_nodes(text, allow_section_headings=True)

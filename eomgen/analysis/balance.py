@@ -13,13 +13,13 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.analyses import DISPLACED
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
-from ..base.numeric.projection import tangent_projector
-from ..base.numeric.ranks import Partition, partition, rank
+from ..base.ranks import Partition, partition, rank
+from ..base.scales import tangent_projector
 from ..errors import ill_chosen
 from ..runtime.argument_checks import read_names, unknown
+from .limits import DISPLACED
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import require_support
+from .limits import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from .regressor import (
     STANDARD,
     free_directions,

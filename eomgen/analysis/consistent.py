@@ -15,17 +15,17 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import NEAREST
+from ..base.assembly import ClosureSystem, close, closed
 from ..base.limits.constraints import ACCEPTED
 from ..base.limits.constraints import STATE as RANK
 from ..base.names import hint, joined
-from ..base.numeric.assembly import ClosureSystem, close, closed
-from ..base.numeric.projection import largest, least
+from ..base.scales import largest, least
 from ..base.texts import shown
 from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
 from ..runtime.argument_checks import read_names, read_number, read_numbers
 from ..runtime.kernels import constraint_system
 from ..runtime.layout import Layout
+from .limits import NEAREST
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -17,17 +17,17 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
-from ..base.numeric.ranks import partition
+from ..base.ranks import partition
 from ..base.results import Result, plain, same_keys
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
 from ..runtime.argument_checks import read_names, read_numbers
 from ..runtime.constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from ..runtime.layout import Layout
 from ..runtime.refusals import require_support
+from .limits import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -10,18 +10,18 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import DIFFERENCES
 from ..base.limits.constraints import STATE
 from ..base.results import Result, same_keys
-from ..base.texts import number, without_noise
+from ..base.texts import number
 from ..errors import AssemblyError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.initial import Initial
 from ..runtime.kernels import constraint_system
 from ..runtime.refusals import refuse_closed, require_support
 from .balance import Balance, balance_forces, force_slopes
+from .limits import DIFFERENCES
 from .linear import linearize
-from .linearization import Linearization, SecondOrder, stability_of_matrix, stiffness_errors, verdict
+from .linearization import Linearization, SecondOrder, stability_of_matrix, stiffness_errors, verdict, without_noise
 from .search import Search, SearchPoint, find_balance
 
 if TYPE_CHECKING:

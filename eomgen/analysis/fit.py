@@ -10,7 +10,6 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import IDENTIFIED, MEASURED, ROUNDS
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ParameterError, SimulationError, at_odds, ill_shaped, ill_typed, incomplete, no_choice, off_range
@@ -19,6 +18,7 @@ from ..runtime.layout import bounds_of, silent, warn_of_fixed
 from ..runtime.refusals import require_support
 from ..runtime.runs.simulate import simulate
 from .experiments import Experiment, read_experiments, read_sigma
+from .limits import IDENTIFIED, MEASURED, ROUNDS
 from .sensitivities import sensitivities
 
 if TYPE_CHECKING:

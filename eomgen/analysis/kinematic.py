@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.analyses import ALIGNED
 from ..base.limits.constraints import EXACT, UNMOVED
-from ..base.numeric.projection import largest
+from ..base.limits.positions import ALIGNED
 from ..base.results import Result, plain, same_keys
+from ..base.scales import largest
 from ..base.texts import shown
 from ..errors import (
     PartitionError,

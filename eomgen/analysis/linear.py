@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices
-from ..base.numeric.projection import minimum_norm
-from ..base.numeric.ranks import rank
+from ..base.ranks import rank
+from ..base.scales import minimum_norm
 from ..errors import cannot, ill_chosen, ill_shaped, no_choice
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.refusals import refuse_closed, require_support

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
+from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.analyses import COUPLED, STILL
-from ..base.limits.numbers import EPS, TINY
+from ..base.limits.numbers import EPS, SHOWN, TINY
 from ..base.results import Result, ResultTable, same_keys
-from ..base.texts import number, without_noise
+from ..base.texts import number
 from ..errors import cannot
 from ..runtime.argument_checks import require, unknown
+from .limits import COUPLED, STILL
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -598,3 +600,23 @@ class Linearization(Result):
                 lines = [[name, *(next(entries) for _ in columns)] for name in rows]
                 found.append(ResultTable(["", *columns], lines, title))
         return found
+
+
+def without_noise(
+    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
+) -> list[float]:
+    """Values for a table, 0 where one is nothing beside the largest of its unit.
+
+    Parameters
+    ----------
+    values : sequence of float
+    units : sequence of str, optional
+        Of each; one for all by default.
+    sizes : sequence of float, optional
+        What each value is like elsewhere, over a run for instance; by default the values themselves.
+    """
+    units = units or [""] * len(values)
+    largest = dict.fromkeys(units, 0.0)
+    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
+        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
+    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]

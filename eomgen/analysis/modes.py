@@ -16,23 +16,22 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array, definite_factor
-from ..base.inline_pictures import image_html
-from ..base.limits.analyses import SYMMETRIC
 from ..base.limits.numbers import SHOWN_COMPLEX
-from ..base.notation import Notation
-from ..base.results import Result, ResultTable, plain, same_keys
+from ..base.results import Result, ResultTable, image_html, plain, same_keys
 from ..base.texts import html_table, html_text, number
 from ..errors import EomgenError, cannot, off_range
 from ..runtime.argument_checks import read_numbers
 from ..runtime.drawing import load_show
 from ..runtime.initial import Initial
+from ..runtime.plotting import printed_names
 from .equilibrium import equilibrium
+from .limits import SYMMETRIC
 from .linear import linearize
 from .linearization import Linearization, symmetric_modes, uncertainty
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.option_types import FilmOptions
+    from ..runtime.trajectory import FilmOptions
     from ..show.page import InlinePage
     from ..show.writers import InlineFilm
 
@@ -141,7 +140,7 @@ class Modes(Result):
     def _table(self) -> str:
         """Frequencies and shapes, a row for each mode, and the eigenvalues with damping, for notebooks."""
         names = [name.removesuffix("_dot") for name in self.names[:COLUMNS]]
-        heads = [*map(Notation.of(self._module.metadata).html, names), *["..."] * (len(self.names) > COLUMNS)]
+        heads = [*map(printed_names(self._module.metadata, "html"), names), *["..."] * (len(self.names) > COLUMNS)]
         rows = [
             [str(k + 1), *self._frequency(k), *(f"{x:.4g}" for x in self.shapes[: len(names), k])]
             for k in range(len(self.squares))

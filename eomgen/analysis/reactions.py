@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import SEEN
 from ..base.limits.constraints import BALANCE as RANK
 from ..base.limits.constraints import UNMOVED
 from ..errors import cannot
 from ..runtime.constrained import ProjectedStates, evaluate, prepare, solve_multipliers
+from .limits import SEEN
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

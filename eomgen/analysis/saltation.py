@@ -28,7 +28,7 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.impacts import ASIDE, CONTRADICTS, OFF, SIMULTANEOUS, SMOOTH, TOUCHING
-from ..base.numeric.projection import minimum_norm
+from ..base.scales import minimum_norm
 from ..errors import NoDerivativeError, cannot
 from ..runtime.constrained import closed_rows, free_motions, solve_multipliers, with_closed_rows
 from ..runtime.inputs import Forcing, Table, rate_places

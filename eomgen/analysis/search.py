@@ -9,14 +9,14 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.analyses import ARRIVED, CLOSE, DIFFERENCES, LEAST_UNKNOWN, MOVING, SHORTEST
+from ..base.assembly import close
 from ..base.limits.numbers import EPS, TINY
-from ..base.numeric.assembly import close
-from ..base.numeric.projection import largest
+from ..base.scales import largest
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
 from ..runtime.argument_checks import unknown
 from ..runtime.initial import Initial
 from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes
+from .limits import ARRIVED, CLOSE, DIFFERENCES, LEAST_UNKNOWN, MOVING, SHORTEST
 from .linearization import BALANCED, own_accelerations
 
 if TYPE_CHECKING:

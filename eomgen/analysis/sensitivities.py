@@ -23,9 +23,9 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array, Indices
 from ..base.files import whole_file
-from ..base.limits.analyses import QUADRATURE, SINGULAR
 from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
 from ..base.limits.impacts import OPENS
+from ..base.limits.positions import SINGULAR
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..base.names import place_of_marker
 from ..base.results import Result, ResultTable, plain, same_keys
@@ -37,6 +37,7 @@ from ..runtime.failure import place
 from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing, Table
 from ..runtime.layout import Layout, start_slopes
+from ..runtime.protocols import BoundValues
 from ..runtime.refusals import require_support
 from ..runtime.runs.bound_run import Crawling, Run
 from ..runtime.runs.events import told_by_the_caller
@@ -45,12 +46,22 @@ from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_s
 from ..runtime.runs.simulate import simulate
 from ..runtime.storage import table_path
 from ..runtime.trajectory import Span, Start
+from .limits import QUADRATURE
 from .saltation import Differentiated, EventSlopes, Saltation, SlopesNow, Variational, assembly_rows
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.option_types import Number, ReducedOptions
+    from ..runtime.protocols import Number
     from ..runtime.trajectory import Trajectory
+
+
+class ReducedOptions(BoundValues, total=False):
+    """Steps of a run with sensitivities."""
+
+    max_step: Number | None
+    first_step: Number | None
+    min_step: float
+
 
 # -- the result --------------------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
-from ..base.inline_pictures import picture_html, side_by_side
+from ..base.results import picture_html, side_by_side
 from ..module import Module
 from ..reading.derivation import Derivation
 from ..runtime.argument_checks import find_lacking
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..model.model import Builder
     from ..runtime.device.cuda_device import Device
     from ..runtime.device.device_module import DeviceModule
-    from ..runtime.option_types import BuildOptions
+    from ..toolchain.compiler import BuildOptions
 
 
 DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its equations

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.files import as_path
-from ..base.targets import find_function, find_target
 from ..codegen.package import emit_package, write_package
 from ..errors import EomgenError, cannot
 from ..pipeline import build, compile_core, derive_as, with_start
 from ..runtime.bound_model import BoundModel
+from ..toolchain.targets import find_function, find_target
 from ..verify.cases import RECORDED, record_calls
 from .equations import Equations
 

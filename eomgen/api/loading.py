@@ -15,7 +15,7 @@ from ..model import describe_yaml_file
 from .model import Model
 
 if TYPE_CHECKING:
-    from ..runtime.option_types import LoadOptions, RobotKeywords
+    from ..importers.robot import LoadOptions, RobotKeywords
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}

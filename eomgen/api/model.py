@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
-from ..base.inline_pictures import picture_html, side_by_side
+from ..base.results import picture_html, side_by_side
 from ..errors import too_large
 from ..model.model import Builder
 from ..runtime.runs.bound_run import waiting
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from ..mechanics.report import MechanismReport
     from ..module import Module
-    from ..runtime.option_types import BuildOptions
+    from ..toolchain.compiler import BuildOptions
 
 
 SMALL = 30  #: bodies of a model that is drawn whenever a notebook shows it

@@ -1,4 +1,5 @@
-"""The floor: what every other package may use, and what uses no other: texts, names, files, operations, limits.
+"""The floor: what every other room may use, and what uses none: texts, names, files, operations, limits, positions.
 
-Exported packages carry this folder whole.
+Exported packages carry this folder whole, so nothing stands here that no run reaches.  Constraints as functions of
+numbers become assembled loops, ranks and curves here, on scaled quantities (:class:`~.scales.Scales`).
 """

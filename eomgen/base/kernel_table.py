@@ -74,6 +74,12 @@ class Kernel(NamedTuple):
 CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
 INERTIAL = "of bodies, about their origins: twist, its rate less gravity; m, m c, I"
 
+#: Numbers that say where two shapes are near each other: normal, penetration, point, direction out of the plane of
+#: shapes in the plane (0 in space), coefficient of friction, restitution.
+WITNESS = 12
+#: The same in the list of kernel ``near_pairs``, behind the numbers of both shapes.
+RECORD = 2 + WITNESS
+
 #: y, then y', of which only the rates of q and v are there
 DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -422,6 +422,21 @@ OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
 def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
     """Names of the operations that pass a test."""
     return frozenset(name for name, row in OPERATIONS.items() if test(row))
+
+
+def play_arrays(tape: Sequence[Any], p: Any, x: Any, t: Any = 0.0) -> list[Any]:
+    """The results of a tape at parameters (n_p,) or (n_p, k), x (n, k) and times (k,), each a number or (k,)."""
+    code, numbers, out = tape
+    leaves = {"const": numbers, "p": p, "x": x, "t": [t]}
+    results: list[Any] = []
+    with np.errstate(all="ignore"):
+        for op, a, b, c in code:
+            if op in leaves:
+                results.append(np.asarray(leaves[op][a], dtype=float))
+            else:
+                row = OPERATIONS[op]
+                results.append(row.array(*(results[a], results[b], results[c])[: row.arity]))
+    return [results[k] for k in out]
 
 
 def tape_rows() -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import cannot
 from .algebra import Array
-from .operations import OPERATIONS
+from .operations import play_arrays
 
 GROUND = -1
 _FRAME = ("rotation", "position")
@@ -71,7 +71,7 @@ def read_picture(metadata: Mapping[str, Any], p: Any) -> PictureData:
         )
         raise cannot(f"there is nothing to draw of model {metadata['name']!r}: {why}")
     tape = data["tape"]
-    values = [float(x) for x in _evaluate(tape, p, 0.0, 0.0)]
+    values = [float(x) for x in play_arrays(tape, p, (0.0, 0.0))]
 
     def plain(x: Any) -> Any:
         if isinstance(x, dict):
@@ -91,7 +91,7 @@ def read_picture(metadata: Mapping[str, Any], p: Any) -> PictureData:
                     at = np.linspace(x["low"], x["high"], len(x["samples"]))
                     found[:, axis] = np.interp(s0, at, x["samples"])
                 elif isinstance(x, dict):
-                    found[:, axis] = _evaluate(tape, p, s0, s1)[x["at"]]
+                    found[:, axis] = play_arrays(tape, p, (s0, s1))[x["at"]]
                 else:
                     found[:, axis] = x
             return found
@@ -142,19 +142,3 @@ def read_picture(metadata: Mapping[str, Any], p: Any) -> PictureData:
         elements,
         frozenset(data["hidden"]),
     )
-
-
-def _evaluate(tape: Sequence[Any], p: Sequence[float], s0: Any, s1: Any) -> list[Any]:
-    """The values of a tape: parameters p, and numbers or arrays of what runs along curves and surfaces."""
-    code, numbers, out = tape
-    runs, values = (s0, s1), list[Any]()
-    with np.errstate(all="ignore"):
-        for kind, a, b, c in code:
-            if kind == "const":
-                values.append(numbers[a])
-            elif kind in ("p", "s"):
-                values.append(float(p[a]) if kind == "p" else runs[a])
-            else:
-                row = OPERATIONS[kind]
-                values.append(row.array(*(values[k] for k in (a, b, c)[: row.arity])))
-    return [values[k] for k in out]

@@ -1,55 +1,18 @@
-"""Free text of a user -> the languages it is written in; lines -> the width of a terminal.
+"""Free text of a user -> messages, terminals, HTML; lines -> the width of a terminal; Python's text -> its tree.
 
-Names in generated code are ASCII identifiers, checked where a model is built.  Every other text of a user (doc, unit,
-labels that hold expressions, file names) goes through one of these functions, one for each language, wherever it is
-written: nothing else in eomgen quotes or escapes.  Metadata of a model holds texts as they are, as JSON.
+Nothing else in eomgen quotes or escapes but this, and :mod:`eomgen.expr.languages` for generated files.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import sys
+import threading
 from collections.abc import Iterable, Sequence
-from math import isfinite, tau
+from math import tau
 from typing import Any
 
-from .limits.numbers import SHOWN, SHOWN_COMPLEX
-
-#: Characters of the generated lines that hold a comment or a literal.
-WIDTH = 114
-#: What Python's docstrings and TOML's strings cannot hold as it is.
-_ESCAPED = re.compile(r"[^ !#-\[\]-~]")
-#: What a comment cannot hold: all but printable ASCII, and the backslash, which joins lines.
-_OUTSIDE = re.compile(r"[^ -\[\]-~]")
-#: Beginnings and ends of comments, and of trigraphs.
-_PAIRS = re.compile(r"(?<=\*)(?=/)|(?<=/)(?=\*)|(?<=\?)(?=\?)")
-#: Markup of Markdown, of the formulas that some readers show in it, and of HTML.
-_MARKUP = re.compile(r"[\\`*_{}\[\]<>()#+\-!|~$&@^]|(?<=^[0-9])\.")
-_SURROGATES = re.compile("[\ud800-\udbff][\udc00-\udfff]")
-_LONE = re.compile("[\ud800-\udfff]")
-
-
-def join_surrogates(text: str) -> str:
-    """The text with each pair of surrogates, as JSON writes a character beyond U+FFFF, as that character."""
-    return _SURROGATES.sub(lambda pair: pair[0].encode("utf-16", "surrogatepass").decode("utf-16"), text)
-
-
-def lone_surrogate(text: str) -> str:
-    """``U+D83D`` of the first half of a pair that stands alone, which no file can hold; empty if there is none."""
-    found = _LONE.search(join_surrogates(text))
-    return f"U+{ord(found[0]):04X}" if found else ""
-
-
-#: What to do about one.
-WHOLE = "write the character itself, or both halves of its pair"
-
-
-def _number(c: str) -> str:
-    """A character as Python and TOML both write it where it cannot stand for itself."""
-    if c in '\\"':
-        return f"\\{c}"
-    return f"\\u{ord(c):04x}" if ord(c) <= 0xFFFF else f"\\U{ord(c):08x}"
+from .limits.numbers import SHOWN_COMPLEX
 
 
 def visible(text: str, lines: bool = True) -> str:
@@ -73,59 +36,9 @@ def shortened(text: str, longest: int) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def comment_text(text: str) -> str:
-    """One line for the inside of a comment of C, Python, TOML, YAML or make.
-
-    The result is printable ASCII without a backslash and without ``*/``, ``/*`` and ``??``; other characters are shown
-    as ``<U+00B5>``.  So C's trigraphs and joined lines change nothing in it, and no comment ends in it.
-    """
-    shown = _OUTSIDE.sub(lambda c: f"<U+{ord(c[0]):04X}>", " ".join(text.split()))
-    return _PAIRS.sub(" ", shown)
-
-
-def comment_lines(text: str, margin: str) -> str:
-    """A comment as lines after the first begin with a margin; only spaces become newlines."""
-    from textwrap import wrap
-
-    return f"\n{margin}".join(wrap(comment_text(text), WIDTH, break_long_words=False, break_on_hyphens=False))
-
-
-def docstring_text(text: str) -> str:
-    """The inside of a Python text in three double quotes, whose value is the text itself."""
-    return "\n".join(_ESCAPED.sub(lambda c: _number(c[0]), line) for line in text.split("\n"))
-
-
-def toml_text(text: str) -> str:
-    """A TOML string with its quotes, whose value is the text."""
-    return f'"{_ESCAPED.sub(lambda c: _number(c[0]), text)}"'
-
-
-def yaml_quoted(text: str) -> str:
-    """A YAML string in double quotes, whose value is the text; what prints stays as it is."""
-    shown = (c if c.isprintable() and c not in '\\"\ufeff' else _number(c) for c in text)
-    return f'"{"".join(shown)}"'
-
-
 def one_line(text: str) -> str:
     """One printable line, as the attributes of XML hold it."""
     return visible(" ".join(text.split()), lines=False)
-
-
-def summary_text(text: str) -> str:
-    """One printable line, as the descriptions of packages must be; shortened where it is long."""
-    return shortened(one_line(text), 500)
-
-
-def markdown_text(text: str) -> str:
-    """Paragraphs of Markdown that show the text: no markup of it takes effect, nor HTML."""
-    paragraphs = re.split(r"\n\s*\n", visible(text).strip())
-    words = (" ".join(paragraph.split()) for paragraph in paragraphs)
-    return "\n\n".join(_MARKUP.sub(lambda c: f"&#{ord(c[0])};" if c[0] in "&<>" else f"\\{c[0]}", w) for w in words)
-
-
-def markdown_code(text: str) -> str:
-    """A line of code within Markdown, with its backticks."""
-    return f"`{one_line(text).replace('`', chr(39))}`"
 
 
 def html_text(text: str) -> str:
@@ -212,21 +125,29 @@ def number(value: complex, digits: int = 6) -> str:
     return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"
 
 
-def without_noise(
-    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
-) -> list[float]:
-    """Values for a table, 0 where one is nothing beside the largest of its unit.
+# -- axes of plots -----------------------------------------------------------------------------------------------------
 
-    Parameters
-    ----------
-    values : sequence of float
-    units : sequence of str, optional
-        Of each; one for all by default.
-    sizes : sequence of float, optional
-        What each value is like elsewhere, over a run for instance; by default the values themselves.
-    """
-    units = units or [""] * len(values)
-    largest = dict.fromkeys(units, 0.0)
-    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
-        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
-    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+
+TIME = "$t$ (s)"
+
+
+def label(printed: str, unit: str) -> str:
+    """A name as it is printed with its unit, or either alone; no dollar of the unit begins a formula."""
+    unit = visible(unit, lines=False).replace("$", r"\$")
+    return f"{printed} ({unit})" if printed and unit else printed or unit
+
+
+# -- Python's own text -------------------------------------------------------------------------------------------------
+
+
+# CPython 3.11 counts the depth of trees that it builds for all threads together, so two at once may fail with
+# SystemError: AST constructor recursion depth mismatch (python/cpython issue 106905).
+_LOCK = threading.Lock()
+
+
+def parse_python(text: str, statement: bool = False) -> Any:
+    """As :func:`ast.parse`, one thread at a time; of a module Python would look for a file to quote from."""
+    import ast
+
+    with _LOCK:
+        return ast.parse(text, mode="single") if statement else ast.parse(text)

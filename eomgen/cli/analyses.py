@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from ..analysis.linearization import without_noise
 from ..base.files import whole_file
 from ..base.limits.numbers import SHOWN_FORCE
 from ..base.results import ResultTable
-from ..base.texts import without_noise
 from ..errors import at_odds, bad_file, ill_typed, incomplete, no_such
 from .options import (
     Number,

@@ -16,8 +16,8 @@ from ..expr.pairs import PairCall
 if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..mechanics import Kinematics
-    from ..runtime import Trajectory
     from ..runtime.bound_model import BoundModel
+    from ..runtime.trajectory import Trajectory
 
 MOREAU = "moreau"
 POINTS = 8  #: of Gauss's quadrature in each step of the integrator

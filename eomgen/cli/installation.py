@@ -24,9 +24,9 @@ from ..base.files import example_files, find_example, shipped, write_whole
 from ..base.limits.constraints import UNMOVED
 from ..base.names import hint
 from ..base.results import ResultTable
-from ..base.syntax_trees import parse_module
-from ..base.texts import visible
+from ..base.texts import parse_python, visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
+from ..expr.without_gc import timed
 from .options import NumberRange, Verb, json_option, target_option
 from .output import MODEL, TOOLCHAIN, exit_code, lines_of, print_json, readable_size, reports_failures, say, show, stage
 
@@ -278,7 +278,7 @@ def describe_example(file: Path) -> str:
     """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
     text = file.read_text(encoding="utf-8")
     if file.name.endswith(".py"):
-        return (ast.get_docstring(parse_module(text)) or "").split("\n", 1)[0]
+        return (ast.get_docstring(parse_python(text)) or "").split("\n", 1)[0]
     if file.name.endswith(".urdf"):
         comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
         return " ".join(comment.group(1).split()) if comment else ""
@@ -419,33 +419,24 @@ def run_example(name: str, file: Path, target: str) -> ExampleRun:
     return ExampleRun(name, file.name, code, error, seconds=seconds, warnings=[str(w.message) for w in told], **found)
 
 
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    start = perf_counter()
-    try:
-        yield
-    finally:
-        seconds[stage] = perf_counter() - start
-
-
 def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[str, Any]) -> None:
     """Derive, compile and simulate a part of the time that the file asks for."""
     from ..api.loading import load
 
-    with _timed(seconds, "derive"):
+    with timed(seconds, "derive"):
         equations = load(file).derive()
     found["degrees_of_freedom"] = equations.report.degrees_of_freedom
-    with _timed(seconds, "compile"):
+    with timed(seconds, "compile"):
         module = equations.compile(target=target)
     found["end"] = PART * float(module.info.simulation["end"])
-    with _timed(seconds, "simulate"):
+    with timed(seconds, "simulate"):
         trajectory = module.simulate(found["end"])
     found["steps"] = len(trajectory) - 1
 
 
 def _run_script(file: Path, seconds: dict[str, float]) -> tuple[int, str]:
     """Run a script by this Python in an empty folder; its exit code and the last line of what it complains of."""
-    with _timed(seconds, "script"), TemporaryDirectory() as folder:
+    with timed(seconds, "script"), TemporaryDirectory() as folder:
         command = [sys.executable, str(file.resolve())]
         with subprocess.Popen(
             command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace"

@@ -10,7 +10,7 @@ import click
 
 from ..base.files import save_figure, write_whole
 from ..base.results import ResultTable
-from ..base.targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
+from ..toolchain.targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
 from .options import Source, file_option, model_verb, require_document_folder, require_folder, target_option
 from .output import print_json, say, show, stage
 from .plot import require_plotting

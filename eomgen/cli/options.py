@@ -15,9 +15,9 @@ import click
 from ..base.files import kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
-from ..base.targets import TARGETS
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
 from ..runtime.argument_checks import unknown
+from ..toolchain.targets import TARGETS
 from .output import name_options, reports_failures, say, show, stage
 
 if TYPE_CHECKING:

@@ -11,14 +11,14 @@ import click
 import numpy as np
 
 from ..base.files import save_figure
-from ..base.notation import Notation
 from ..errors import MissingDependencyError, bad_file, incomplete
+from ..expr.notation import Notation
 from .options import split_names
 
 if TYPE_CHECKING:
     from ..model.mechanism import Mechanism
     from ..module import Module
-    from ..runtime import Trajectory
+    from ..runtime.trajectory import Trajectory
 
 
 def require_plotting(file: Path, option: str = "--plot") -> None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from ..analysis.linearization import without_noise
 from ..base.limits.numbers import RESTING
 from ..base.results import ResultTable
-from ..base.texts import without_noise
 from ..errors import ModelError, ToolchainError, at_odds, bad_file, ill_shaped, incomplete
 from ..runtime.storage import RUNS
 from .models import operations_of, summary
@@ -34,8 +34,8 @@ from .plot import Picture, check_columns, check_picture, find_paths, picture_opt
 if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..module import Module
-    from ..runtime import Trajectory
     from ..runtime.runs.kinematic import KinematicAnalysis
+    from ..runtime.trajectory import Trajectory
     from .energy import EnergyBalance
 
 POINTS = 5  #: change points listed

@@ -16,11 +16,11 @@ import numpy as np
 
 from ..base.kernel_table import KERNELS, NAMED, Kernel
 from ..base.names import hint, joined
-from ..base.numeric.user_functions import Curve, Surface
 from ..errors import UsageError, ill_placed, no_such
 from ..expr.core import Expr, Graph, reachable, symbols_of
 from ..expr.functions import Function, NativeCode
 from ..expr.schedule import count
+from ..expr.user_functions import Curve, Surface
 from ..mechanics import Kinematics
 from ..mechanics.methods.positive import require_inertia
 from ..mechanics.methods.tree_equations import TreeEquations

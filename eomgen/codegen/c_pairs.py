@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from ..base.kernel_table import RECORD, WITNESS
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from ..base.numeric.outline_pieces import CHOSEN, PIECE
-from ..base.numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, WITNESS
-from ..base.numeric.polygon_edges import OTHER, OWN
 from ..expr.core import symbols_of
+from ..expr.pair_features import CHOSEN, OTHER, OWN, PIECE
+from ..expr.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..expr.pairs import PairFunction, PairKind, PairPart
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..base.numeric.pair_sums import POSE
 from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
 from ..expr.differentiate import jvp
+from ..expr.pair_sums import POSE
 from ..expr.pairs import PairFunction, pair_call
 from .terms import SystemTerms
 

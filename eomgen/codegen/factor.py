@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..base.limits.numbers import NOTHING, SINGULAR
-from ..base.records import dataclass
 from ..expr.core import Expr
+from ..expr.records import dataclass
 
 LONG = 24  #: velocities on the way to ground, on average, with which a mass matrix is written out
 

@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base import algebra, texts
+from ..base import algebra
 from ..base.algebra import Array
-from ..base.files import Kept, shipped
+from ..base.files import shipped
 from ..errors import EomgenError, bad_file
+from ..expr import languages
 from ..expr.evaluate import Evaluator
+from ..toolchain.trusted_files import Kept
 from .program import Program
 
 if TYPE_CHECKING:
@@ -42,12 +44,12 @@ def environment() -> Environment:
         autoescape=False,
     )
     made.filters |= {
-        "comment": texts.comment_text,
-        "comment_lines": texts.comment_lines,
-        "docstring": texts.docstring_text,
-        "toml": texts.toml_text,
-        "markdown": texts.markdown_text,
-        "code": texts.markdown_code,
+        "comment": languages.comment_text,
+        "comment_lines": languages.comment_lines,
+        "docstring": languages.docstring_text,
+        "toml": languages.toml_text,
+        "markdown": languages.markdown_text,
+        "code": languages.markdown_code,
         "listing": lambda names: repr(tuple(names)),
     }
     return made

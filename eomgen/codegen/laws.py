@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
-from ..base.limits.systems import FIXED
 from ..base.operations import CONDITION, operations_with
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import jacobian
 from ..mechanics.motion import Matrix, combined, eliminate, total
+from ..native.limits.systems import FIXED
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64

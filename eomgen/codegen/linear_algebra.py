@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple, TypeVar
 
-from ..base.records import dataclass
 from ..expr import vectors as vec
 from ..expr.core import Expr
+from ..expr.records import dataclass
 
 Row = dict[int, Expr]  #: column -> entry; zeros left out
 Alike = TypeVar("Alike")

@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from ..base.limits.constraints import LOST
-from ..base.limits.crossings import NEAR_SQUARE
 from ..expr.core import Expr, substitute
 from ..expr.schedule import count
+from ..native.limits.crossings import NEAR_SQUARE
 from .linear_algebra import (
     Leg,
     OrthogonalFactor,

@@ -11,13 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 
-from ..base.algebra import DiagonalBlock, diagonal_blocks
 from ..base.limits.constraints import GENTLE, KEPT, LEFT, LOST, ROUNDED, TIKHONOV, UNMOVED, VANISHED
-from ..base.limits.crossings import NEAR_SQUARE, SMALL
 from ..base.limits.numbers import ROW, STILL
 from ..expr.core import Expr, substitute
 from ..mechanics.constraint_functions import ALL, UNIT
+from ..mechanics.diagonal_blocks import DiagonalBlock, diagonal_blocks
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
+from ..native.limits.crossings import NEAR_SQUARE, SMALL
 from .factor import exceeding, outward
 from .linear_algebra import (
     Leg,

@@ -9,7 +9,6 @@ from typing import Any
 
 from ..base.limits.constraints import HELD_STEP
 from ..base.names import acceleration_name
-from ..base.notation import split_rate
 from ..base.operations import OPERATIONS
 from ..base.value_rules import RANGE
 from ..elements.constraints import RollingDisc
@@ -19,6 +18,7 @@ from ..errors import TO_BE_FINITE, ModelError, UsageError
 from ..expr.core import Expr, reachable, symbols_of
 from ..expr.differentiate import gradient
 from ..expr.evaluate import Evaluator, evaluate
+from ..expr.notation import split_rate
 from ..expr.schedule import record_tape
 from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import row_groups, row_scales, row_velocities

@@ -14,11 +14,13 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 from ..base.files import open_plain, refuse_link
-from ..base.targets import PRECISIONS, find_target
-from ..base.texts import summary_text
 from ..errors import UsageError, bad_file, cannot, no_choice
-from ..runtime.layout import Layout
+from ..expr.languages import summary_text
+from ..expr.notation import Notation
+from ..runtime.columns import column_names
+from ..runtime.layout import Layout, ModelInfo
 from ..toolchain.layer import read_native
+from ..toolchain.targets import PRECISIONS, find_target
 from .c import emit_c
 from .c_lanes import DERIVATIVES
 from .files import SourceSet, describe_layouts, metadata_json, number_texts, render, trace_provenance
@@ -87,6 +89,8 @@ def emit_package(
     if precision != "double" and not row.precisions:
         raise cannot(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
+    if row.module:
+        made["printed"] = print_names(program.metadata)
     program = replace(program, metadata={**program.metadata, **made})
     if analyses and not row.module:
         raise cannot(f"analyses are for Python packages; target {target} is none")
@@ -94,6 +98,16 @@ def emit_package(
     files = {"LICENSE.txt": render("python/LICENSE.txt.j2", context), **row.files(program, context)}
     files["README.md"] += render("python/provenance.md.j2", context)
     return SourceSet({"model.json": metadata_json(program), **files})
+
+
+def print_names(metadata: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """How names are printed where that is not as they are: for Matplotlib, and in HTML."""
+    layout, notation = Layout(metadata), Notation.of(metadata)
+    turning = layout.info.joint_names if layout.quaternion_slots else ()
+    turns = (f"{joint}_r{axis}" for joint in turning for axis in "xyz")  # small rotations, in modes
+    names = ("t", *column_names(layout), *layout.p, *layout.velocity_labels, *turns)
+    forms = {"mathtext": notation.mathtext, "html": notation.html}
+    return {form: {name: of(name) for name in names if of(name) != name} for form, of in forms.items()}
 
 
 def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
@@ -113,19 +127,35 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
     """What is generated in Python besides the core, and what is carried of eomgen."""
-    carried = carry((*CARRIED, *(CARRIED_ANALYSES if context["analyses"] else ())))
+    carried = carry(
+        (*CARRIED, *(CARRIED_ANALYSES if context["analyses"] else ())),
+        _unused(context["metadata"], context["analyses"]),
+    )
     names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
     own = context | {"folders": folders_of(carried), "compiled": True}
     return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **carried}
 
 
-def carry(names: Iterable[str]) -> dict[str, str]:
+def _unused(metadata: Mapping[str, Any], analyses: bool) -> tuple[str, ...]:
+    """Parts of ``runtime`` that no call of a package reaches: GPUs, and methods of runs that its model cannot have."""
+    info = ModelInfo.of(metadata)
+    impacts = analyses or any(event.get("restitution") is not None for event in info.events)
+    methods = {
+        "moreau": bool(info.rigid_contacts),
+        **dict.fromkeys(("kinematic", "followed_path"), analyses or not info.sizes.n_dof),
+        **dict.fromkeys(("impact", "impact_equations"), impacts),
+    }
+    return ("runtime/device", *(f"runtime/runs/{name}.py" for name, used in methods.items() if not used))
+
+
+def carry(names: Iterable[str], left_out: tuple[str, ...] = ()) -> dict[str, str]:
     """Files and whole folders of eomgen, as they are, by their place in a package."""
     root = Path(__file__).parents[1]
     files = [
         file for name in names for file in ([root / name] if name.endswith(".py") else (root / name).rglob("*.py"))
     ]
-    return {file.relative_to(root).as_posix(): file.read_text(encoding="utf-8") for file in sorted(files)}
+    carried = {file.relative_to(root).as_posix(): file for file in sorted(files)}
+    return {name: file.read_text(encoding="utf-8") for name, file in carried.items() if not name.startswith(left_out)}
 
 
 def folders_of(carried: Iterable[str]) -> list[str]:

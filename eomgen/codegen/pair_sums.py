@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
-from ..base.numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 from ..errors import cannot
 from ..expr.core import Expr, Graph, reachable
+from ..expr.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 from ..expr.pairs import PairCall, PairFunction, pair_call
 from .contact_columns import WRENCH
 from .loop_slopes import BY_BODIES

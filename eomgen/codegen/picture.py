@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..base.numeric.user_functions import Curve
 from ..elements.forces import Force
 from ..elements.frames import Frame, Marker, WrapCylinder
 from ..elements.looks import (
@@ -31,6 +30,7 @@ from ..errors import UsageError
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import evaluate
 from ..expr.schedule import record_tape
+from ..expr.user_functions import Curve
 from ..model.mechanism import JointSpec, Mechanism
 
 #: Symbols that stand for the parameters of a curve or a surface.
@@ -44,7 +44,7 @@ class _Numbers:
     def __init__(self, mechanism: Mechanism) -> None:
         self.graph = mechanism.graph
         self.places = {p.name: ("p", k) for k, p in enumerate(mechanism.parameters)}
-        self.places |= {name: ("s", k) for k, name in enumerate(RUNNING)}
+        self.places |= {name: ("x", k) for k, name in enumerate(RUNNING)}
         self.declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
         coordinates = [spec.joint.coordinates for spec in mechanism.joints]
         #: joints whose first coordinate is a length

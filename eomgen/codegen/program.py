@@ -13,8 +13,8 @@ from math import prod
 from typing import Any
 
 from ..base.kernel_table import Sizes
-from ..base.records import dataclass
 from ..expr.core import LEAVES, Expr, Graph, reachable
+from ..expr.records import dataclass
 from ..expr.schedule import Operations
 from ..mechanics.methods.tree_equations import LinearSystem
 from .contact_columns import ContactColumns

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..base.numeric.user_functions import Curve, Surface
 from ..base.operations import CONDITION, OPERATIONS
 from ..expr.core import symbols_of
 from ..expr.differentiate import square_under_root
 from ..expr.functions import Function
 from ..expr.pairs import PairCall, PairFunction, PairPart, pair_call
+from ..expr.user_functions import Curve, Surface
 from .program import Block, Program
 from .statements import Pieces, PrintedFunction, cut, references
 

@@ -13,8 +13,6 @@ from ..base import algebra
 from ..base.algebra import correlated
 from ..base.limits.constraints import STRUCTURE
 from ..base.limits.numbers import SINGULAR
-from ..base.limits.systems import UNTOUCHED
-from ..base.numeric.ranks import SparseRows
 from ..base.operations import CONDITION, OPERATIONS
 from ..elements.forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
 from ..elements.forces.friction import is_carried, multiplier_of, reaction_of
@@ -30,9 +28,11 @@ from ..mechanics.methods import METHODS
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.motion import Matrix, combined, dot, eliminate, entries_of, force_and_moment, total, with_entries
+from ..mechanics.sparse_rows import SparseRows
 from ..mechanics.switched import SwitchedRow, switched_rows
 from ..mechanics.wrenches import JointWrenches, Row6, carried_reactions
 from ..model.mechanism import Mechanism
+from ..native.limits.systems import UNTOUCHED
 from .factor import factorize, solve
 from .laws import MANY, laws_in, pieces_of, solve_laws
 from .switched_constraints import AfterEvents, LinearValues, solve_rows

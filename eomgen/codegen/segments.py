@@ -16,8 +16,8 @@ from itertools import chain, groupby
 
 import numpy as np
 
-from ..base.records import dataclass
 from ..expr.core import LEAVES, Expr, Graph, parts, reachable
+from ..expr.records import dataclass
 from .pair_sums import PairLists
 from .statements import CIRCULAR
 

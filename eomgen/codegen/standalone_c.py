@@ -12,12 +12,12 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from math import floor, log, log2, prod
 
-from ..base.limits.crossings import REACH, SHORTEST
-from ..base.limits.in_c import KINDS
 from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..base.operations import FUNCTION, OPERATIONS
 from ..errors import cannot
 from ..expr.schedule import Operations
+from ..native.limits import KINDS
+from ..native.limits.crossings import REACH, SHORTEST
 from .c_functions import used_calls
 from .factor import factoring_operations
 from .pair_sums import refuse_sums

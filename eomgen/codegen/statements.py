@@ -12,8 +12,8 @@ from math import prod
 from typing import NamedTuple
 
 from ..base.operations import CONDITION, operations_with
-from ..base.records import dataclass
 from ..expr.core import LEAVES, Expr, Graph
+from ..expr.records import dataclass
 from ..expr.schedule import chunk, order
 from .program import Program
 

@@ -8,12 +8,12 @@ from functools import cached_property, partial
 
 from ..base.kernel_table import Sizes
 from ..base.names import acceleration_name
-from ..base.notation import rate_of
 from ..base.operations import operations_with
 from ..elements.forces.force import where
 from ..elements.frames import Frame, Marker
 from ..errors import UsageError
 from ..expr.core import Expr, reachable, substitute
+from ..expr.notation import rate_of
 from ..mechanics import Kinematics
 from ..mechanics.closing import shortest_gamma, shortest_rows
 from ..mechanics.constraint_functions import row_groups, row_scales

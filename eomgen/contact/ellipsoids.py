@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 
-from ..base.limits.contacts import COMMON, FOCAL, NEAREST, TWICE
-from ..base.records import dataclass
 from ..elements.forces.force import View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
+from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
+from .limits import COMMON, FOCAL, NEAREST, TWICE
 from .point import Contact, Touch
 from .rounds import along_axis, direction, seen_from, settled
 

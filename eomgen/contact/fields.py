@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.limits.contacts import ASTRAY, FOOT, STEEP
 from ..base.limits.runs import BEYOND, UP_TO
-from ..base.numeric.user_functions import Surface
-from ..base.records import dataclass
 from ..elements.forces.force import View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import gradient
+from ..expr.records import dataclass
+from ..expr.user_functions import Surface
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import quadratic_form
+from .limits import ASTRAY, FOOT, STEEP
 from .point import Contact, Touch
 from .rounds import seen_from, settled
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, Entry, table
@@ -20,6 +19,7 @@ from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
 from ..expr.pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, PairLaw, meet, pair_kind
 from .point import CURVED
@@ -295,7 +295,7 @@ class _SharedData:
         return self._places[x]
 
     def row(self, body: int, feature: Feature) -> tuple[int, ...]:
-        """A row of a table of shapes; see :class:`~eomgen.base.numeric.pair_sums.PairSum`."""
+        """A row of a table of shapes; see :class:`~eomgen.expr.pair_sums.PairSum`."""
         frame = feature.frame
         entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
         bound = -1 if feature.bound is None else self.place(feature.bound)

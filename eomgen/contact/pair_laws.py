@@ -8,10 +8,6 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple, cast
 
-from ..base.limits.contacts import NOWHERE
-from ..base.numeric.outline_pieces import CHOSEN, PIECE
-from ..base.numeric.pair_sums import POSE
-from ..base.numeric.polygon_edges import EDGE, OTHER, OWN
 from ..elements.forces.force import MarkerLoad, View, where
 from ..elements.forces.friction import DryFriction
 from ..elements.forces.normal_laws import ElasticPart, NormalLaw
@@ -19,10 +15,13 @@ from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, substitute
 from ..expr.differentiate import jvp
+from ..expr.pair_features import CHOSEN, EDGE, OTHER, OWN, PIECE
+from ..expr.pair_sums import POSE
 from ..expr.pairs import PairKind
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import BlockEllipsoid, EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .fields import FieldEllipsoid, FieldRound, HeightField, planted
+from .limits import NOWHERE
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, BowlRound, EdgeRound, InsideRound, NotchRound

@@ -6,7 +6,6 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, Entry, table
@@ -35,6 +34,7 @@ from ..elements.kinds import Fields, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.

@@ -19,14 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..base.limits.contacts import FLAT_CORNER, NOWHERE
-from ..base.numeric.polygon_edges import FACING, OWN
-from ..base.records import dataclass
 from ..elements.forces.force import View, where
 from ..elements.forces.normal_laws import NormalLaw, PartOfLaw
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
+from ..expr.pair_features import FACING, OWN
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
+from .limits import FLAT_CORNER, NOWHERE
 from .point import Contact, Touch
 from .profiles import Point, dot, minus, times, unit
 
@@ -80,7 +80,7 @@ class _Matter(NamedTuple):
 
 
 def _matter(sizes: Sequence[Expr]) -> _Matter:
-    """The numbers of :mod:`~eomgen.base.numeric.polygon_edges` in the polygon's own axes."""
+    """The numbers of :mod:`~eomgen.expr.pair_features` in the polygon's own axes."""
     graph = sizes[0].graph
     start, end, normal, before, after, *others = zip(sizes[0 : FACING + 8 : 2], sizes[1 : FACING + 8 : 2], strict=True)
     bend = graph.apply("max", dot(normal, after), dot(before, normal))
@@ -110,7 +110,7 @@ class _Parts(NamedTuple):
 class PolygonPolygon(Contact):
     """A convex polygon about the second marker on one about the first, in its x-y plane: one of two contact points.
 
-    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.base.numeric.polygon_edges`);
+    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.expr.pair_features`);
     ``witness`` is 0 or 1.
     """
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from ..base.limits.contacts import PARALLEL
-from ..base.numeric.polygon_edges import EDGE
-from ..base.records import dataclass
 from ..elements.forces.force import View, where
 from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.differentiate import jvp
+from ..expr.pair_features import EDGE
+from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
+from .limits import PARALLEL
 from .point import Contact, SphereSphere, Touch
 from .states import BLOCK, CORE
 

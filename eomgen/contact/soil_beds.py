@@ -10,14 +10,14 @@ from functools import partial
 from operator import truediv
 from typing import NamedTuple
 
-from ..base.limits.contacts import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
-from ..base.records import dataclass
 from ..elements.forces.force import Load, View, beyond_zero, where
 from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
+from .limits import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from .point import Contact, Touch
 from .shapes import SOLE
 from .soil_laws import SoilPressure, SoilShear

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
-from ..base.limits.contacts import CAUGHT_UP
-from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
 from ..elements.element_type import Entry
@@ -18,7 +16,9 @@ from ..elements.forces.normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, Normal
 from ..elements.kinds import Choice, Fields, Flag, Radii, Scalar
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
+from .limits import CAUGHT_UP
 from .states import WHEEL, cells_of, given_groups
 
 # -- numbers of soils --------------------------------------------------------------------------------------------------

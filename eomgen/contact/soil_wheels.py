@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.limits.contacts import FOREMOST, SHORT_WAY
-from ..base.records import dataclass
 from ..elements.forces.force import Load, MarkerLoad, View, beyond_zero, where
 from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
+from .limits import FOREMOST, SHORT_WAY
 from .point import Contact, Touch
 from .soil_laws import SoilPressure, SoilShear
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ..base.records import dataclass
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
+from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 
 GROUND = -1

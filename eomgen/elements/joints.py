@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
 
-from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_of
 from ..expr.differentiate import jvp
+from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from . import dimensions
 from .dimensions import LENGTH

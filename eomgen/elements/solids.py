@@ -14,10 +14,10 @@ import numpy as np
 
 from ..base.files import as_name
 from ..base.limits.numbers import MESH
-from ..base.records import dataclass
 from ..errors import UsageError, bad_data, bad_file, off_range, too_large
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
+from ..expr.records import dataclass
 from ..expr.tensors import add_matrices, shift_tensor
 from ..expr.vectors import Mat3, Vec3
 from .dimensions import LENGTH

@@ -1,6 +1,6 @@
 """Derived equations -> the worked solution as HTML, Markdown, LaTeX or PDF.
 
-Every formula comes from :mod:`eomgen.reading`, is printed by :mod:`eomgen.base.notation`, and is compared with the
+Every formula comes from :mod:`eomgen.reading`, is printed by :mod:`eomgen.expr.notation`, and is compared with the
 compiled module at the end.
 """
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import sympy
 
-from ..base.notation import dotted
 from ..errors import UnavailableError
 from ..expr.core import Expr
 from ..expr.differentiate import gradient
+from ..expr.notation import dotted
 from ..reading import Quantities
 from ..reading.document import Piece, Section, Sentence
 from ..reading.quantities import needed

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import sympy
 
-from ..base.notation import Notation, literal, with_instance
 from ..errors import UnavailableError
 from ..expr.core import Expr
+from ..expr.notation import Notation, literal
 from ..expr.printing import Formulas, number
 from ..expr.printing.formula import ROUNDED, Formula, Letter
 from ..mechanics.report import plane_axis
+from ..model.components import with_instance
 from ..reading import Quantities, ReadingView
 from ..reading.document import Folded, FormulaLine, Piece, Sentence
 from ..reading.printed import order_of

@@ -8,8 +8,8 @@ from typing import Any
 
 import sympy
 
-from ..base.inline_pictures import trimmed_png
 from ..base.names import acceleration_name
+from ..base.results import trimmed_png
 from ..elements.constraints.switching import event_of
 from ..elements.frames import GROUND
 from ..errors import EomgenError, UnavailableError

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..base.numeric.user_functions import Curve, Orders, Surface, Twin
-from ..base.records import dataclass
 from ..errors import ModelError, Problem
+from .records import dataclass
+from .user_functions import Curve, Orders, Surface, Twin
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from functools import cached_property
 from operator import itemgetter
 from typing import Any, Literal
 
-from ..base.numeric.outline_pieces import nearest
-from ..base.numeric.pair_sums import MEETING, MOTION, POSE, RECORD, WITNESS, PairSum, pairs_of_rows
-from ..base.numeric.polygon_edges import facing
-from ..base.records import dataclass
+from ..base.kernel_table import RECORD, WITNESS
 from ..errors import cannot
 from .core import Expr, Graph, Node, reachable, substitute
 from .functions import Function
+from .pair_features import facing, nearest
+from .pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
+from .records import dataclass
 
 # -- pair kinds --------------------------------------------------------------------------------------------------------
 
@@ -40,12 +40,12 @@ class PairKind:
     symbols : tuple of str
         Numbers of the first shape, of the second, of the law, and then their rates.
     outputs, slopes : tuple of int
-        What a pair exerts (:data:`~eomgen.base.numeric.pair_sums.RESULT` nodes), and its directional derivative.
+        What a pair exerts (:data:`~eomgen.expr.pair_sums.RESULT` nodes), and its directional derivative.
     touch : tuple of int
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
     witness : tuple of int
-        Where they touch: :data:`~eomgen.base.numeric.pair_sums.WITNESS` nodes for each place.
+        Where they touch: :data:`~eomgen.expr.pair_sums.WITNESS` nodes for each place.
     held : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
@@ -57,8 +57,8 @@ class PairKind:
         What nodes that call declared functions mean, as in a graph.
     corners : tuple of int
         Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
-        :mod:`~..base.numeric.polygon_edges` finds.  Of the inside of an outline and another shape: how many pieces it
-        has, of which :mod:`~..base.numeric.outline_pieces` finds the nearest.
+        :mod:`~.pair_features` finds.  Of the inside of an outline and another shape: how many pieces it has, of which
+        the nearest is found there.
     lines : tuple of (start, count)
         Of first shapes that are columns of soil: rows of the first table that stand in line along their x axis, each
         its first size farther than the one before.  Columns reach down without end, so that what is below their top
@@ -140,7 +140,7 @@ class PairFunction:
     data : tuple of float or None
         Operands that follow the ``POSE`` numbers of each body, where they are numbers; states of pairs are the last.
     tables : tuple
-        Of shapes; see :class:`~eomgen.base.numeric.pair_sums.PairSum`.
+        Of shapes; see :class:`~eomgen.expr.pair_sums.PairSum`.
     kinds : tuple of PairKind
     states : int
         How many states all pairs have together.
@@ -346,7 +346,7 @@ def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> 
 def pair_meeting(
     graph: Graph, function: PairFunction, operands: Sequence[Expr], accelerations: Sequence[Expr]
 ) -> list[Expr]:
-    """When shapes that are apart may meet, and more: see :meth:`~eomgen.base.numeric.pair_sums.PairSum.meeting`."""
+    """When shapes that are apart may meet, and more: see :meth:`~eomgen.expr.pair_sums.PairSum.meeting`."""
     assert len(accelerations) == MOTION * function.bodies
     given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
     ids = [given, *(x.id for x in accelerations)]
@@ -355,7 +355,7 @@ def pair_meeting(
 
 
 def pair_witnesses(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
-    """Pairs that are near: see :meth:`~eomgen.base.numeric.pair_sums.PairSum.witnesses`."""
+    """Pairs that are near: see :meth:`~eomgen.expr.pair_sums.PairSum.witnesses`."""
     given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
     listed = _node(graph, PairCall(function, "witnesses"), f"pairs {function.name}(witnesses)", [given])
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.witnesses)]

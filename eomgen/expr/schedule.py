@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Any
 
 from ..base.operations import ARITHMETIC, OPERATIONS, operations_with
-from ..base.records import dataclass
 from ..errors import cannot
 from .core import LEAVES, Expr, Graph, common_graph, reachable
 from .pairs import pair_call
+from .records import dataclass
 
 # -- numbers of operations ---------------------------------------------------------------------------------------------
 

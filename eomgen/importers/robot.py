@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
-from ..base.algebra import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..base.files import as_name
-from ..base.limits.numbers import LARGEST
 from ..base.value_rules import CHECKS, word_of_check
+from ..elements.matrices import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..errors import Problem, ill_typed, no_choice, no_such
 from ..model.expressions import constant
 from ..model.names import nearest
+from .limits import LARGEST
 
 Place = tuple[str, int]  # file, line
 Range = tuple[float, float]  # lowest and highest value
@@ -32,6 +32,30 @@ WORDS = {
     "rotation": ("euler_angles", "euler_parameters"),
     "limits": ("note", "stop", "off"),
 }
+
+
+class RobotKeywords(TypedDict, total=False):
+    """Fields of :class:`RobotOptions`, which calls pass on, besides ``check_inertia``."""
+
+    floating: bool
+    rotation: str
+    gravity: Any
+    mimic: str
+    lock: Any
+    merge: bool
+    symbolic: bool
+    actuate: Any
+    friction: Any
+    snap: float
+    assets: str | None
+    limits: str
+
+
+class LoadOptions(RobotKeywords, total=False):
+    """What :func:`eomgen.load` takes."""
+
+    allow_native: bool
+    check_inertia: bool | str | None
 
 
 # -- options -----------------------------------------------------------------------------------------------------------

@@ -11,12 +11,12 @@ import numpy as np
 from ..base import algebra
 from ..base.limits.constraints import GIVEN as SMALL
 from ..base.limits.numbers import ROUNDED
-from ..base.notation import rate_of
 from ..errors import ExpressionError, ModelError, Problem, ill_typed, incomplete
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import with_bounds
+from ..expr.notation import rate_of
 from ..model.description import Description
 from ..model.names import RATES, nearest
 from ..model.sympy_face import (

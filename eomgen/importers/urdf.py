@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.limits.numbers import LARGEST
 from ..base.value_rules import SWITCH
 from ..errors import ModelError
 from ..model.build_elements import limits_nothing
+from .limits import LARGEST
 from .robot import (
     CONVERTED,
     IDENTITY,

@@ -13,9 +13,9 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from ..base.files import open_plain
-from ..base.limits.numbers import DEPTH, ELEMENTS, LONGEST, SIZE
 from ..errors import ModelError, Problem
 from ..model.names import listing
+from .limits import DEPTH, ELEMENTS, LONGEST, SIZE
 
 
 @dataclass

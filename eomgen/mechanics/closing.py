@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..base.records import dataclass
 from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute
 from ..expr.differentiate import jacobian, jvp
+from ..expr.records import dataclass
 from ..expr.schedule import count
 from ..expr.tensors import skew
 from ..expr.vectors import Mat3, Vec3

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.assembly import RESTARTS, Assembly, ConstraintSystem, CutJoints, close, close_nearest
 from ..base.limits.numbers import BY_CHANCE, LARGE_LOOP, ROUNDED, SMALL_LOOP, TINY_ROOT
-from ..base.numeric.assembly import RESTARTS, Assembly, ConstraintSystem, CutJoints, close, close_nearest
-from ..base.numeric.scales import Scales, Space
+from ..base.scales import Scales, Space
 from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.evaluate import Evaluator
 from ..expr.identity import is_rounding, terms_of, with_bounds, with_likely_bounds

@@ -7,13 +7,13 @@ from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
 from ..base.names import acceleration_name
-from ..base.records import dataclass
 from ..elements.forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..elements.frames import Marker
 from ..elements.joints import QuaternionSlot
 from ..errors import ModelError
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jvp
+from ..expr.records import dataclass
 from ..expr.spatial import Twist
 from ..model.equations import clock
 from ..model.mechanism import Mechanism

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
 
-from ..base.records import dataclass
 from ..elements.frames import GROUND
 from ..elements.joints import about
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.differentiate import jvp
+from ..expr.records import dataclass
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import subtract_matrices, symmetric
 from ..expr.vectors import Mat3, Vec3

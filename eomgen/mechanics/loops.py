@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.limits.numbers import ROUNDED
-from ..base.notation import rate_of
-from ..base.records import dataclass
 from ..elements.constraints import Equation, RollingDisc
 from ..elements.constraints.constraint import ALLOWED, VELOCITY, Condition
 from ..elements.forces import Line, Route
@@ -21,6 +19,8 @@ from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import gradient, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import random_point, vanishes
+from ..expr.notation import rate_of
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from ..model.mechanism import JointSpec, Mechanism
 from .motion import MarkerMotion

@@ -7,21 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.assembly import Assembly, ConstraintSystem, differences
+from ..base.continuation import Continuation, HeldPath
 from ..base.limits.constraints import BESIDE, CHOSEN, CONTRADICTION, FLAT
 from ..base.names import hint, joined
-from ..base.numeric.assembly import Assembly, ConstraintSystem, differences
-from ..base.numeric.continuation import Continuation, HeldPath
-from ..base.numeric.ranks import SparseRows, choose_independent, conditioning, independent_rows, rank
-from ..base.records import dataclass
+from ..base.ranks import rank
 from ..elements.constraints import Driver, RollingDisc
 from ..elements.constraints.rolling import LYING
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
+from ..expr.records import dataclass
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .loops import place_of
+from .sparse_rows import SparseRows, choose_independent, conditioning, independent_rows
 
 # -- constraints that hold nothing -------------------------------------------------------------------------------------
 

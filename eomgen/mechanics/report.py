@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.assembly import close, closed, starts
 from ..base.files import as_path, save_figure
-from ..base.inline_pictures import picture_html, side_by_side
-from ..base.limits.analyses import BESIDE, MOST_ANGLE, SLACK
 from ..base.limits.constraints import MEASURED
 from ..base.limits.numbers import ACROSS
-from ..base.numeric.assembly import close, closed, starts
-from ..base.numeric.projection import largest
+from ..base.limits.positions import BESIDE, MOST_ANGLE, SLACK
 from ..base.operations import CHOICE, OPERATIONS
-from ..base.records import dataclass
+from ..base.results import picture_html, side_by_side
+from ..base.scales import largest
 from ..base.texts import angle_in_degrees, fold, html_table, terminal_width
 from ..elements.constraints import Driver
 from ..elements.frames import Frame, Marker
@@ -26,6 +25,7 @@ from ..errors import bad_file
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable, symbols_of
 from ..expr.identity import vanishes
+from ..expr.records import dataclass
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .mobility import Mobility, initial_values

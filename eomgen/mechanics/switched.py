@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from ..base.records import dataclass
 from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.forces.force import Force, Load, View, where
 from ..elements.frames import Frame, Marker
@@ -18,6 +17,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
 from ..expr.differentiate import jacobian
 from ..expr.identity import vanishes
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from ..model.mechanism import Switched
 from .kinematics import ForceTerms, Kinematics

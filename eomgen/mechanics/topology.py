@@ -16,7 +16,6 @@ from itertools import combinations
 import numpy as np
 
 from ..base.limits.numbers import HAIR, NO_LENGTH
-from ..base.records import dataclass
 from ..elements.constraints import CoordinateDriver
 from ..elements.frames import GROUND
 from ..elements.joints import Distance, QuaternionSlot, RevoluteSpherical, parameter_rates
@@ -26,6 +25,7 @@ from ..expr.core import Expr, Graph
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import Evaluator
 from ..expr.identity import settled_vector, size_of
+from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
 from ..model.mechanism import JointSpec, Mechanism

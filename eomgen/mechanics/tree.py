@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.limits.numbers import PLANE, ROUNDED
-from ..base.records import dataclass
 from ..elements.frames import GROUND, Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
 from ..expr.differentiate import gradient
 from ..expr.evaluate import evaluate
 from ..expr.identity import DRAWS, random_point, settled_rotation, settled_vector, size_of, vanishes
+from ..expr.records import dataclass
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
 from ..expr.vectors import Mat3, Vec3

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from ..base.records import dataclass
 from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.frames import GROUND, Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute
 from ..expr.differentiate import jacobian, vjp
+from ..expr.records import dataclass
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, shift_tensor, symmetric
 from ..expr.vectors import Vec3

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from ..base.records import dataclass
 from ..base.value_rules import NOT_NEGATIVE, TURN
 from ..elements import kinds
 from ..elements.constraints import Constraint
@@ -19,6 +18,7 @@ from ..elements.joints import JOINTS, Joint
 from ..elements.kinds import LIMITS, Law, Scalar
 from ..errors import ModelError
 from ..expr.core import Expr, symbols_of
+from ..expr.records import dataclass
 from ..expr.shown import quoted, shown
 from .checks import check_keys, check_names, unknown_key
 from .description import DescribedEntry, Description, items

@@ -16,12 +16,12 @@ import numpy as np
 
 from ..base.files import open_plain
 from ..base.limits.numbers import APART, PERIODIC
-from ..base.numeric.splines import curve_coefficients, slopes, surface_nodes
-from ..base.numeric.user_functions import Curve, Orders, Surface, Twin, up_to
-from ..base.records import dataclass
+from ..base.splines import curve_coefficients, slopes
 from ..elements import kinds
 from ..errors import UsageError
 from ..expr.functions import Function, NativeCode
+from ..expr.records import dataclass
+from ..expr.user_functions import Curve, Orders, Surface, Twin, up_to
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import FUNCTION, function_fields
@@ -389,3 +389,11 @@ def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | 
             reader.fault(f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y", "EG-SHAPE")
     found = [row for row in read if row is not None and len(row) == n_y]
     return np.array(found) if len(found) == n_x else None
+
+
+def surface_nodes(x: Array, y: Array, z: Array, kind: str) -> Array:
+    """Values and derivatives (n_x, n_y, 4) of a surface: a tensor product spline."""
+    along_x = slopes(x, z, kind)
+    along_y = slopes(y, z.T, kind).T
+    both = slopes(y, along_x.T, kind).T
+    return np.stack([z, along_x, along_y, both], axis=-1)

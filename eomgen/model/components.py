@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, NamedTuple
 
-from ..base.notation import with_instance
 from ..elements import kinds
 from ..elements.joints import JOINTS
 from ..elements.kinds import MARKER, ROUNDS, items
 from ..errors import Problem, UsageError
 from ..expr.core import Graph
+from ..expr.latex import Group, NotationError, Scripts, head_of, read_latex, spaced
+from ..expr.notation import literal
 from .build_elements import declare_contacts, declare_coordinates, own_states
 from .build_quantities import declare_states, declare_switches
 from .checks import check_keys, unknown_key
@@ -793,3 +794,27 @@ def component_of(description: Description, name: str, place: str, faults: Faults
         for entry in entries:
             visit_entry(section, entry, check)
     return component
+
+
+def with_instance(latex: str, instance: str) -> str:
+    r"""LaTeX with the name of an instance as a further subscript: ``m_{c}`` -> ``m_{c,\mathrm{leg1}}``.
+
+    What is not the LaTeX of a symbol stays as it is.
+    """
+    latex = spaced(latex)
+    try:
+        tree = read_latex(latex)
+    except NotationError:  # told when the model is checked
+        return latex
+    while isinstance(tree, Group) and len(tree.parts) > 1:
+        head = head_of(tree) or tree.parts[0]
+        tree = next(part for part in tree.parts if part.end >= head.end)
+    word = literal(instance)
+    if not isinstance(tree, Scripts):
+        return f"{latex[: tree.end]}_{{{word}}}{latex[tree.end :]}"
+    if tree.sub is None:
+        return f"{latex[: tree.base.end]}_{{{word}}}{latex[tree.base.end :]}"
+    start, end = tree.sub.start, tree.sub.end
+    sub = f"{latex[start:end]},{word}"
+    braced = latex[start - 1] == "{"
+    return f"{latex[:start]}{sub if braced else f'{{{sub}}}'}{latex[end:]}"

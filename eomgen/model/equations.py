@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ..base.limits.numbers import TENSOR
-from ..base.notation import chains, rate_of, split_rate
 from ..base.operations import CONDITION, operations_with
 from ..elements import kinds
 from ..elements.constraints import Driver, Equation
@@ -18,6 +17,7 @@ from ..expr.core import Expr, Graph, is_comparison, reachable, substitute, symbo
 from ..expr.differentiate import gradient, hessian, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import vanishes
+from ..expr.notation import rate_of, split_rate
 from .checks import check_keys
 from .description import Description, Faults, items
 from .expressions import names_in
@@ -634,3 +634,17 @@ def _rate_of_signal(reader: Reader, signal: Expr, name: str, order: int) -> Expr
             return None
     direction = {symbol(n): symbol(rate) for n, rate in along.items()}
     return jvp([signal], {symbol("t"): reader.graph.one, **direction})[0]
+
+
+def chains(names: Iterable[str]) -> dict[str, list[str]]:
+    """The rates that are inputs too, by the name of each input that has some, in order: first, second, ..."""
+    known = list(names)
+    orders: dict[str, dict[int, str]] = {}
+    for name in known:
+        stem, order = split_rate(name)
+        orders.setdefault(stem, {})[order] = name
+    return {
+        by_order[k]: [by_order[j] for j in sorted(by_order) if j > k]
+        for by_order in orders.values()
+        for k in sorted(by_order)[:-1]
+    }

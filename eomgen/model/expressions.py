@@ -15,8 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..base.operations import OPERATIONS
-from ..base.syntax_trees import parse_statement
-from ..base.texts import shown
+from ..base.texts import parse_python, shown
 from ..errors import ExpressionError, no_number
 from ..expr.core import Expr, Graph
 from .names import function_words, nearest
@@ -122,7 +121,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     line = _KEYWORD.sub(lambda found: _KEYWORDS[found[1]], re.sub(r"\s", " ", text))
     start = len(line) - len(line.lstrip())
     try:
-        tree = parse_statement(line[start:].rstrip() + "\n")
+        tree = parse_python(line[start:].rstrip() + "\n", statement=True)
     except SyntaxError as error:
         column = (error.offset or 1) + start
         remedy = _UNFINISHED if "never closed" in error.msg else allowed()
@@ -140,7 +139,7 @@ def names_in(text: str) -> set[str]:
     if len(text) > LENGTH or _JOINED.search(text):
         return set()
     try:
-        parts = [*ast.walk(parse_statement(re.sub(r"\s", " ", text).strip() + "\n"))]
+        parts = [*ast.walk(parse_python(re.sub(r"\s", " ", text).strip() + "\n", statement=True))]
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         return set()
     called = {id(part.func) for part in parts if isinstance(part, ast.Call)}

@@ -9,7 +9,6 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..base.numeric.splines import KINDS as TABLES
 from ..contact import CONTACTS
 from ..elements import kinds as k
 from ..elements.constraints import CONSTRAINTS
@@ -24,6 +23,14 @@ from ..elements.kinds import MARKER, Fields, Schema, Table, definitions, object_
 from ..elements.kinds import PLACED as PLACED
 from ..elements.solids import SOLIDS
 from .mechanism import Simulation
+
+#: Kind of a table -> what it is, for messages and documents.
+TABLES = {
+    "cubic": "a spline with continuous curvature, the ends not-a-knot",
+    "natural": "a spline with continuous curvature, none at the ends",
+    "periodic": "a spline with continuous curvature that repeats",
+    "monotone": "a cubic with continuous slope that never overshoots (PCHIP)",
+}
 
 # Contact stands before muscles, creep and tyres in lists of types.
 FORCES |= CONTACTS | {name: FORCES.pop(name) for name in ("muscle", "creep", "tyre")}

@@ -17,11 +17,11 @@ import numpy as np
 
 from ..base.limits.runs import ATOL, RTOL
 from ..base.operations import OPERATIONS
-from ..base.records import dataclass
 from ..elements.frames import Frame, Marker
 from ..elements.kinds import Field
 from ..errors import ModelError, Problem
 from ..expr.core import LEAVES, Expr, Graph, reachable
+from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .description import place_of
 from .placement import TURNS, Columns

@@ -344,3 +344,22 @@ class Scope:
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"
         self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")
+
+
+_SURROGATES = re.compile("[\ud800-\udbff][\udc00-\udfff]")
+_LONE = re.compile("[\ud800-\udfff]")
+
+
+def join_surrogates(text: str) -> str:
+    """The text with each pair of surrogates, as JSON writes a character beyond U+FFFF, as that character."""
+    return _SURROGATES.sub(lambda pair: pair[0].encode("utf-16", "surrogatepass").decode("utf-16"), text)
+
+
+def lone_surrogate(text: str) -> str:
+    """``U+D83D`` of the first half of a pair that stands alone, which no file can hold; empty if there is none."""
+    found = _LONE.search(join_surrogates(text))
+    return f"U+{ord(found[0]):04X}" if found else ""
+
+
+#: What to do about one.
+WHOLE = "write the character itself, or both halves of its pair"

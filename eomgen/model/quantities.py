@@ -10,11 +10,11 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from ..base.records import dataclass
 from ..elements import dimensions
 from ..elements.dimensions import Dimension
 from ..elements.frames import Marker
 from ..errors import ExpressionError
+from ..expr.records import dataclass
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
 SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)

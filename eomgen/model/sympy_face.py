@@ -10,13 +10,13 @@ from itertools import count
 from typing import Any
 from unicodedata import normalize
 
-from ..base.latex import GREEK, NotationError, read_latex
-from ..base.notation import split_rate
 from ..base.operations import OPERATIONS
 from ..base.texts import shown
 from ..errors import ExpressionError, ModelError, Problem, cannot, ill_typed
 from ..expr.core import Expr, Graph
 from ..expr.functions import Function
+from ..expr.latex import GREEK, NotationError, read_latex
+from ..expr.notation import split_rate
 from ..expr.shown import parts_of, quoted, shortened
 from .description import Description, items
 from .expressions import parse

@@ -13,10 +13,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ..base.files import usable_name
-from ..base.latex import NotationError, read_latex, spaced
 from ..base.limits.numbers import PERPENDICULAR
 from ..base.names import hint
-from ..base.texts import WHOLE, join_surrogates, lone_surrogate
 from ..base.value_rules import ROTATION, word_of_check
 from ..elements import kinds
 from ..elements.element_type import Entry, Found, Meaning
@@ -26,13 +24,14 @@ from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
 from ..errors import ExpressionError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
+from ..expr.latex import NotationError, read_latex, spaced
 from ..expr.shown import quoted, shown
 from ..expr.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
 from .mechanism import Body, JointSpec
-from .names import ENERGIES, RATES, Namespace, Scope, nearest
+from .names import ENERGIES, RATES, WHOLE, Namespace, Scope, join_surrogates, lone_surrogate, nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .quantities import TURNING, Named, Quantity
 from .requirements import Requirements

@@ -14,15 +14,16 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..base.files import as_name, beside, open_plain
-from ..base.texts import WHOLE, comment_text, join_surrogates, lone_surrogate, visible, yaml_quoted
+from ..base.texts import visible
 from ..elements import kinds
 from ..elements.kinds import Field, items
 from ..errors import ModelError, Problem, UsageError, cannot
+from ..expr.languages import comment_text, yaml_quoted
 from ..expr.shown import shortened
 from .components import Components
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults
 from .fields import MODEL, PARTS, SHORT, fields_of
-from .names import nearest
+from .names import WHOLE, join_surrogates, lone_surrogate, nearest
 from .quantities import Named
 from .sympy_face import free_names, is_sympy, name_of, symbol, sympy_text, values_in, with_intermediates, with_sympy
 from .visit import undotted

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
-from ..base.records import dataclass
 from ..base.texts import fold, shown
-from ..base.without_gc import timed, without_gc
 from ..errors import AssemblyError, cannot, ill_typed, off_range
 from ..expr.core import Expr, copied
+from ..expr.records import dataclass
 from ..expr.schedule import Operations, count
+from ..expr.without_gc import timed, without_gc
 from ..mechanics import Kinematics, analyse
 from ..mechanics.methods import GIVEN, METHODS, TreeEquations, take_given
 from ..mechanics.mobility import Mobility, find_mobility

@@ -7,9 +7,9 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ..base.inline_pictures import image_html
-from ..base.notation import Notation
+from ..base.results import image_html
 from ..base.texts import html_text, visible
+from ..expr.notation import Notation
 from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
 from ..expr.printing.formula import Formula, Letter, MatrixOf
 from ..expr.printing.writers import row

@@ -15,10 +15,10 @@ from sympy.core.function import AppliedUndef
 from sympy.printing.c import reserved_words as c_words
 from sympy.printing.mathematica import MCodePrinter
 
-from ..base.targets import FORMATS
 from ..errors import UnavailableError
 from ..expr.printing.formula import DIGITS
 from ..runtime.argument_checks import unknown
+from ..toolchain.targets import FORMATS
 from .readable import Readable
 from .writers import COLUMNS, equations_text, latex_formulas
 
@@ -70,8 +70,9 @@ def write_format(equations: Readable, form: str) -> str:
     ----------
     equations : Readable
     form : str
-        One of :data:`~eomgen.base.targets.FORMATS`.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function of the
-        symbols, in alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define M and f.
+        One of :data:`~eomgen.toolchain.targets.FORMATS`.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function
+        of the symbols, in alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define
+        M and f.
 
     Returns
     -------

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..base.names import acceleration_name
-from ..base.notation import Notation
 from ..elements.frames import GROUND
 from ..errors import ExpressionError, UnavailableError, UsageError, at_odds, ill_typed
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import evaluate
+from ..expr.notation import Notation
 from ..expr.shown import quoted
 from ..expr.spatial import Wrench
 from ..expr.tensors import solve_symmetric

@@ -10,7 +10,7 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import correlated
 from ..base.limits.numbers import LEAST, SINGULAR
-from ..base.numeric.ranks import partition
+from ..base.ranks import partition
 from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UnavailableError
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import sympy
 
 from ..base.names import acceleration_name
-from ..base.notation import Notation, dotted, raised
 from ..elements.frames import GROUND
 from ..expr.core import Expr, symbols_of
+from ..expr.notation import Notation, dotted, raised
 from ..expr.printing import PAGE, Formulas, Order, number, text, width
 from ..expr.printing.formula import (
     COORDINATE,

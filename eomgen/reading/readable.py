@@ -9,10 +9,10 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from ..base.names import acceleration_name, hint
-from ..base.notation import Notation, split_rate
 from ..errors import NonFiniteError, at_odds, incomplete
 from ..expr.core import Expr, Graph, copied, symbols_of
 from ..expr.evaluate import evaluate
+from ..expr.notation import Notation, split_rate
 from ..mechanics import Kinematics
 from ..mechanics.methods import TreeEquations
 from ..mechanics.mobility import Mobility

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from ..base.latex import SUPERSCRIPTS, read_latex, text_form
-from ..base.notation import Notation
 from ..base.texts import fold, html_text, visible
+from ..expr.latex import SUPERSCRIPTS, read_latex, text_form
+from ..expr.notation import Notation
 from ..expr.printing import latex, text
 from ..expr.printing.formula import DIGITS, ROUNDED, MatrixOf, times
 from ..expr.printing.writers import TIGHT

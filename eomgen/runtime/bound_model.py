@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.analyses import MOST_ANGLE
 from ..base.limits.constraints import CHOSEN
+from ..base.limits.positions import MOST_ANGLE
 from ..base.texts import angle_in_degrees
 from ..errors import calls_within, ill_placed, ill_shaped, no_number
 from .argument_checks import both_names, read_number, read_numbers, require_mapping

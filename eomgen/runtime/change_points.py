@@ -18,7 +18,7 @@ from ..base.algebra import Array
 from ..base.limits.constraints import GONE
 from ..base.limits.constraints import PASSED as SINGULAR
 from ..base.limits.numbers import TINY
-from ..base.numeric.splines import cubic_piece
+from ..base.splines import cubic_piece
 from ..errors import EvaluationError
 
 if TYPE_CHECKING:

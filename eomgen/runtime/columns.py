@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 import numpy as np
 
 from ..base.algebra import Array, Indices
-from ..base.numeric.projection import largest
+from ..base.scales import largest
 from ..errors import too_large
 from .argument_checks import plain_name, unknown
 from .inputs import Forcing
@@ -271,6 +271,7 @@ def _described(layout: Layout) -> dict[str, Any]:
         "model_method": layout.info.method,
         "docs": layout.info.docs,
         "latex": layout.info.latex,
+        **({"printed": layout.info.printed} if layout.info.printed else {}),
         "instances": layout.info.instances,
     }
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
-from ..base.numeric.scales import Scales
+from ..base.scales import Scales
 from ..base.texts import shown
 from ..errors import ill_shaped, no_number
 from .argument_checks import as_real, read_number, read_numbers, with_numbers

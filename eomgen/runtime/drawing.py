@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.inline_pictures import picture_html, side_by_side
 from ..base.kernel_table import KERNELS, Kernel
-from ..base.notation import Notation
 from ..base.picture_data import read_picture
+from ..base.results import picture_html, side_by_side
 from ..base.texts import aligned_rows, html_table, html_text, shown, visible
 from ..errors import MissingDependencyError, ill_shaped, ill_typed, incomplete
 from .argument_checks import read_number, require, unknown, with_numbers
-from .plotting import choose, height, refined, stack, states_at
+from .plotting import choose, height, printed_names, refined, stack, states_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -304,7 +303,7 @@ def mechanism_html(module: BoundModel) -> str:
 def _quantities(module: BoundModel) -> str:
     """Coordinates, parameters, inputs and outputs: name, symbol, unit, value, doc; folded up."""
     layout, docs = module.layout, module.info.docs
-    printed = Notation.of(module.metadata).html
+    printed = printed_names(module.metadata, "html")
     values = dict(zip(layout.p, (f"{value:.6g}" for value in module.kernels.context.p), strict=True))
     kinds = {"coordinate": (*layout.q, *layout.loops), "parameter": layout.p, "input": layout.u, "output": layout.y}
     rows = {name: kind for kind, names in kinds.items() for name in names}

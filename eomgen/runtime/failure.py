@@ -10,8 +10,8 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array, correlated
 from ..base.kernel_table import NAMED
-from ..base.limits.analyses import FLAT, LOCKED
 from ..base.limits.numbers import LARGE_ROOT, SINGULAR, TINY_ROOT
+from ..base.limits.positions import FLAT, LOCKED
 from ..errors import STATUS, EvaluationError, UsageError
 from .layout import Layout
 

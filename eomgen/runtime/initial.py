@@ -12,6 +12,17 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
+from ..base.assembly import (
+    RESTARTS,
+    ClosureSystem,
+    CutJoints,
+    VelocityEquations,
+    assemble_velocity,
+    close,
+    closed,
+    starts,
+)
+from ..base.continuation import follow
 from ..base.limits.constraints import (
     ACCEPTED,
     BRANCH_STEP,
@@ -27,20 +38,9 @@ from ..base.limits.constraints import (
     UNMOVED,
 )
 from ..base.names import place_of_marker
-from ..base.numeric.assembly import (
-    RESTARTS,
-    ClosureSystem,
-    CutJoints,
-    VelocityEquations,
-    assemble_velocity,
-    close,
-    closed,
-    starts,
-)
-from ..base.numeric.continuation import follow
-from ..base.numeric.projection import largest
-from ..base.numeric.ranks import parts, rank
 from ..base.picture_data import read_picture
+from ..base.ranks import parts, rank
+from ..base.scales import largest
 from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
 from .argument_checks import UnknownNameError, unknown, without_dots
 from .failure import place
@@ -586,7 +586,7 @@ class Initial:
         if set(guess) <= set(favoured):
             with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
-        from ..base.numeric.assembly import close_nearest
+        from ..base.assembly import close_nearest
 
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         declared = self.used({k: v for k, v in declared.items() if k not in guess})

@@ -20,7 +20,8 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE, LOCATED, MOMENT
-from ..base.numeric.splines import curve_coefficients, slopes
+from ..base.operations import play_arrays
+from ..base.splines import curve_coefficients, slopes
 from ..base.texts import shown
 from ..errors import (
     ExpressionError,
@@ -46,7 +47,7 @@ from .argument_checks import (
     without_dots,
 )
 from .layout import Layout
-from .tapes import Expression, play_arrays
+from .tapes import Expression
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
 #: How a table goes on between its times -> the order of its pieces.

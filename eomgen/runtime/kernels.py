@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..base.algebra import Array, Indices
+from ..base.assembly import ConstraintSystem, CutJoints
 from ..base.kernel_table import NAMED
-from ..base.numeric.assembly import ConstraintSystem, CutJoints
 from ..errors import UsageError, cannot, ill_shaped, no_choice, not_finite
 from .argument_checks import fitting, read_numbers
 from .failure import Fail

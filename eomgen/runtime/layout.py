@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
-from dataclasses import MISSING, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -17,12 +16,11 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
 from ..base.names import acceleration_name
-from ..base.numeric.scales import Scales, Space
-from ..base.records import dataclass
+from ..base.operations import play_arrays
+from ..base.scales import Scales, Space
 from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
 from ..errors import ParameterError, Problem, bad_data, calls_within, cannot, ill_shaped
 from .argument_checks import check_names, plain_name, read_number, read_numbers, without_dots
-from .tapes import play_arrays
 
 # -- model.json --------------------------------------------------------------------------------------------------------
 
@@ -31,7 +29,6 @@ ABI = 1  #: version of the generated functions' signatures and of the metadata t
 ALWAYS = ("events", "resets")  #: entries that every model has, also where they are empty
 
 
-@dataclass(frozen=True)
 class ModelInfo:
     """What a module knows of its model without any expression: the schema of model.json, both ways.
 
@@ -100,28 +97,28 @@ class ModelInfo:
     energy_known: bool = True
     row_groups: Sequence[int] = ()
     row_velocities: Sequence[Sequence[int]] | None = None  #: on which each constraint row depends
-    not_finite_where: Mapping[str, str] = field(default_factory=dict)  #: force -> where its law has no number
+    not_finite_where: Mapping[str, str] = {}  #: force -> where its law has no number
     reaction_laws: Sequence[str] = ()  #: elements whose forces depend on reactions of joints
-    switched: Mapping[str, str] = field(default_factory=dict)  #: constraint that closes and opens -> its state
+    switched: Mapping[str, str] = {}  #: constraint that closes and opens -> its state
     held_rows: Sequence[Sequence[str]] = ()  #: label, state and kind of each of their equations
-    latex: Mapping[str, str] = field(default_factory=dict)
-    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix of their names
-    initial_outputs: Mapping[str, float] = field(default_factory=dict)
-    start_fixed: Mapping[str, Sequence[int]] = field(default_factory=dict)  #: initial values that no tape can play
-    start_terms: Mapping[str, Sequence[Any]] = field(default_factory=dict)  #: section -> names and tape
+    latex: Mapping[str, str] = {}
+    instances: Mapping[str, str] = {}  #: of components: name -> prefix of their names
+    initial_outputs: Mapping[str, float] = {}
+    start_fixed: Mapping[str, Sequence[int]] = {}  #: initial values that no tape can play
+    start_terms: Mapping[str, Sequence[Any]] = {}  #: section -> names and tape
     start_slopes: Sequence[Any] = ((), ((), (), ()))  #: name and place in p of each derivative; tape
     limits_told: bool = True
     events: Sequence[Mapping[str, Any]] = ()
     resets: Sequence[Sequence[int]] = ()  #: event, and place in x of what it gives a value
     clocks: Sequence[Mapping[str, Any]] = ()
     translations: Sequence[Sequence[Any]] = ()  #: joint, the next one towards the ground, body, velocities
-    signals: Mapping[str, Any] = field(default_factory=dict)  #: input over time -> tape
-    signal_slopes: Mapping[str, Any] = field(default_factory=dict)
-    input_rates: Mapping[str, Sequence[Sequence[Any]]] = field(default_factory=dict)
+    signals: Mapping[str, Any] = {}  #: input over time -> tape
+    signal_slopes: Mapping[str, Any] = {}
+    input_rates: Mapping[str, Sequence[Sequence[Any]]] = {}
     constraint_inputs: Sequence[str] = ()
     contact_shapes: Sequence[Sequence[str]] = ()
-    rigid_contacts: Mapping[str, Any] = field(default_factory=dict)
-    rigid_by_motion: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    rigid_contacts: Mapping[str, Any] = {}
+    rigid_by_motion: Mapping[str, Sequence[str]] = {}
     rigid_only: Sequence[str] = ()
     no_inertia: str = ""  #: why the model is for kinematics only
     indefinite: bool = False
@@ -129,9 +126,16 @@ class ModelInfo:
     series: bool = False
     no_series: str = "its module was compiled without one, as with target='numpy'"
     start: Sequence[float] = ()  #: x at the start, of a package
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = {}
+    printed: Mapping[str, Mapping[str, str]] = {}  #: of a package: form -> name -> how it is printed
     precision: str = ""
     files: Sequence[str] = ()
+
+    def __init__(self, **entries: Any) -> None:
+        names = type(self).__annotations__
+        if odd := (names.keys() - vars(type(self)).keys() - entries.keys()) | (entries.keys() - names.keys()):
+            raise bad_data(f"the model's metadata lacks entries, or has others: {', '.join(sorted(odd))}")
+        vars(self).update(entries)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> ModelInfo:
@@ -140,21 +144,19 @@ class ModelInfo:
             raise bad_data(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
         try:
             sizes = Sizes(**{name: data[name] for name in Sizes._fields if name in data})
-            return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data}, sizes=sizes)
         except TypeError as error:
             raise bad_data(f"the model's metadata lacks entries: {error}") from None
+        return cls(**{name: data[name] for name in cls.__annotations__ if name in data}, sizes=sizes)
 
     def to_dict(self) -> dict[str, Any]:
         """What model.json holds."""
         found: dict[str, Any] = {}
-        for one in fields(self):
-            value, usual = getattr(self, one.name), one.default
-            if one.default_factory is not MISSING:
-                usual = one.default_factory()
-            if one.name == "sizes":
+        for name in type(self).__annotations__:
+            value, usual = getattr(self, name), getattr(type(self), name, None)
+            if name == "sizes":
                 found |= value._asdict()
-            elif usual is MISSING or one.name in ALWAYS or (value != usual and (value or usual)):
-                found[one.name] = value
+            elif not hasattr(type(self), name) or name in ALWAYS or (value != usual and (value or usual)):
+                found[name] = value
         return found
 
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.analyses import FOLLOWED
-from ..base.numeric.continuation import ASTRAY, LONG, STEPS, Continuation, StraightPath, Tangent, interpolate
-from ..base.numeric.projection import largest
+from ..base.continuation import ASTRAY, LONG, STEPS, Continuation, StraightPath, Tangent, interpolate
+from ..base.limits.positions import FOLLOWED
+from ..base.scales import largest
 from ..errors import EvaluationError, PartitionError, ProjectionError, at_odds, ill_shaped, no_number, too_large
 from .argument_checks import both_names, read_number, read_numbers
 from .failure import place

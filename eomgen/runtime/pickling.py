@@ -6,18 +6,15 @@ and the kind of processor), not for keeping: generate a package for that.
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from functools import cache
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from ..base.algebra import Array
-from ..base.files import MANIFEST, find_module, load_source, read_entry, read_trusted, require_trusted
+from ..base.files import find_module
 from ..base.kernel_table import NAMED
-from ..errors import ToolchainError, cannot
+from ..errors import cannot
 from .kernels import LateCore, eager
 
 #: Names of all kernels of a module that makes some of them late, and of those made the name and file of the code.
@@ -70,42 +67,4 @@ def _find_core(name: str, file: str) -> Any:
         return _find_loaded(name)
     except ModuleNotFoundError:
         pass
-    path = Path(file)
-    try:
-        if (path.parent / MANIFEST).exists():
-            _require_features(read_entry(path.parent)[0], file)
-        require_trusted(path)
-        if path.suffix == ".py":
-            return load_source(name, file, read_trusted(path)).model
-    except (OSError, ValueError) as error:
-        what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
-        raise ToolchainError(
-            f"the compiled code of the pickled module is {what}: {file}; compile the model again",
-            code="EG-FILE-DAMAGED",
-        ) from error
-    return import_module("eomgen.toolchain.load").open_core(name, path)
-
-
-def _require_features(manifest: Mapping[str, Any], file: str) -> None:
-    """Refuse code with instructions that this processor does not know, which would end the process without a word."""
-    lacking = set(manifest.get("recipe", {}).get("needs", ())) - processor_features()
-    if lacking:
-        raise ToolchainError(
-            f"the compiled code of the pickled module needs a processor with {', '.join(sorted(lacking))}, which "
-            f"this one lacks: {file}; compile the model again here"
-        )
-
-
-@cache
-def processor_features() -> frozenset[str]:
-    """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
-    found = {platform.machine()}
-    with suppress(ImportError, AttributeError):
-        features = import_module("numpy._core._multiarray_umath").__cpu_features__
-        found |= {name for name, there in features.items() if there}
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith(("flags", "Features")):
-                found |= set(line.partition(":")[2].split())
-                break
-    return frozenset(found)
+    return import_module("eomgen.toolchain.load").find_core(name, Path(file))

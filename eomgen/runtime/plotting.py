@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.limits.pictures import FAINT
-from ..base.notation import TIME, Notation, label
-from ..base.numeric.splines import cubic_piece
+from ..base.limits.runs import SPECTRUM
+from ..base.splines import cubic_piece
+from ..base.texts import TIME, html_text, label
 from ..errors import at_odds, cannot, incomplete
 from .argument_checks import plain_name, read_names, require, unknown
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
     from .columns import Columns
-    from .protocols import TrajectoryLike
 
 # -- states between steps ----------------------------------------------------------------------------------------------
 
@@ -71,6 +71,14 @@ def states_at(trajectory: Any, module: BoundModel, times: Array) -> tuple[Array,
     if module.n_rows or module.layout.space:
         states = module.project(states, t=times, u=u)
     return states, u
+
+
+def _columns_at(trajectory: Any, module: BoundModel, times: Array) -> Columns:
+    """All columns of a run at times within it."""
+    from .columns import Columns
+
+    states, u = states_at(trajectory, module, times)
+    return Columns(module, times, states, np.empty((0, len(times))) if u is None else u)
 
 
 def monotone_slopes(t: Array, y: Array) -> Array:
@@ -130,8 +138,7 @@ def _between_steps(
         layout = module.layout
         own = [n for n in names if n in ENERGIES and n not in layout.x + layout.loops + layout.y + layout.u]
         try:
-            states, u = states_at(trajectory, module, times)
-            columns = Columns(module, times, states, np.empty((0, len(times))) if u is None else u)
+            columns = _columns_at(trajectory, module, times)
             found = {name: columns[name] if name != "t" else times for name in names if name not in own}
             three = refined_energies(trajectory, times, columns) if energies or own else None
             if three is not None:
@@ -175,7 +182,7 @@ class Curves(NamedTuple):
 
 
 def plot(
-    trajectory: TrajectoryLike,
+    trajectory: Any,
     names: Sequence[str | Sequence[str]],
     ax: Any = None,
     x: str | None = None,
@@ -187,7 +194,7 @@ def plot(
 
 
 def choose(
-    trajectory: TrajectoryLike,
+    trajectory: Any,
     given: Sequence[str | Sequence[str]],
     x: str | None,
     y: str | Sequence[str] | None,
@@ -297,7 +304,17 @@ def draw_panel(ax: Any, panel: Curves, below: bool = False) -> None:
         ax.legend(ncols=columns, loc=place[0], bbox_to_anchor=place[1], **look)
 
 
-def by_unit(trajectory: TrajectoryLike, names: Sequence[str]) -> list[list[str]]:
+def printed_names(metadata: Mapping[str, Any], form: str = "mathtext") -> Callable[[str], str]:
+    """How names are printed: for Matplotlib, or as ``html``; a generated package brings these forms of its names."""
+    known = metadata.get("printed")
+    if known is None:
+        notation = import_module("..expr.notation", __package__).Notation.of(metadata)
+        found: Callable[[str], str] = getattr(notation, form)
+        return found
+    return lambda name: str(known[form].get(name, html_text(name) if form == "html" else name))
+
+
+def by_unit(trajectory: Any, names: Sequence[str]) -> list[list[str]]:
     """Names in groups of one unit, in the order in which they come."""
     groups: dict[str, list[str]] = {}
     for name in names:
@@ -305,8 +322,8 @@ def by_unit(trajectory: TrajectoryLike, names: Sequence[str]) -> list[list[str]]
     return list(groups.values())
 
 
-def _grouped(trajectory: TrajectoryLike, names: Sequence[str], x: Array, columns: dict[str, Array]) -> list[Curves]:
-    printed = Notation.of(trajectory.metadata).mathtext
+def _grouped(trajectory: Any, names: Sequence[str], x: Array, columns: dict[str, Array]) -> list[Curves]:
+    printed = printed_names(trajectory.metadata)
     return [
         Curves(
             label(printed(group[0]) if len(group) == 1 else "", trajectory.units.get(group[0], "")),
@@ -316,7 +333,7 @@ def _grouped(trajectory: TrajectoryLike, names: Sequence[str], x: Array, columns
     ]
 
 
-def over_time(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None = None) -> tuple[list[Curves], str]:
+def over_time(trajectory: Any, names: tuple[str, ...], x: str | None = None) -> tuple[list[Curves], str]:
     """Columns over time or over another column; all coordinates by default."""
     names = names or tuple(trajectory.metadata["q_names"])
     t, columns = refined(trajectory, (*names, *(() if x is None else (x,))))
@@ -326,7 +343,7 @@ def over_time(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None 
     unit = trajectory.units.get(x, "")
     others = [trajectory.units.get(group[0], "") for group in by_unit(trajectory, names)]
     alike = [_one_scale(columns[x], unit, panel, other) for panel, other in zip(panels, others, strict=True)]
-    across = label(Notation.of(trajectory.metadata).mathtext(x), unit)
+    across = label(printed_names(trajectory.metadata)(x), unit)
     return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], across
 
 
@@ -339,14 +356,14 @@ def _one_scale(x: Array, unit: str, panel: Curves, other: str) -> bool:
     return {unit, other} <= {"m", ""} and max(wide, high) <= ALIKE * min(wide, high)
 
 
-def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:
+def _phases(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:
     """Rates over coordinates, with a dot where each begins; two panels where angles and lengths are drawn."""
     chosen = names or tuple(n for n in trajectory.metadata["q_names"] if f"{n}_dot" in trajectory.names)
     for name in chosen:
         if f"{name}_dot" not in trajectory.names:
             raise cannot(f"{name!r} has no rate among the columns, so there is no phase portrait of it")
     columns = refined(trajectory, (*chosen, *(f"{name}_dot" for name in chosen)))[1]
-    panels, printed = [], Notation.of(trajectory.metadata).mathtext
+    panels, printed = [], printed_names(trajectory.metadata)
     for group in by_unit(trajectory, chosen):
         rates = [f"{name}_dot" for name in group]
         curves = [(printed(name), columns[name], columns[rate]) for name, rate in zip(group, rates, strict=True)]
@@ -357,7 +374,7 @@ def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -
     return panels, panels[0].across if panels else ""
 
 
-def _energy(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:
+def _energy(trajectory: Any, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:
     """Kinetic, potential and total energy, and the change of the total."""
     t, (T, V, E) = refined_energy(trajectory)
     parts = [("kinetic", t, T), ("potential", t, V), ("total", t, E)]
@@ -404,10 +421,7 @@ def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[l
     times = t[0] + span * np.arange(count) / count
     module = getattr(trajectory.columns, "module", None)
     if module is not None and type(trajectory.columns).__name__ == "Columns":
-        from .columns import Columns
-
-        states, u = states_at(trajectory, module, times)
-        columns: Any = Columns(module, times, states, np.empty((0, count)) if u is None else u)
+        columns = _columns_at(trajectory, module, times)
         values = [columns[name] for name in names]
     else:
         keep = np.append(True, np.diff(t) > 0.0)
@@ -421,7 +435,7 @@ def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[l
     panels = []
     for panel in _grouped(trajectory, names, frequencies[1:], rows):
         top = max(float(y.max()) for _, _, y in panel.curves)
-        curves = [(name, f, np.maximum(y, top * FAINT)) for name, f, y in panel.curves]
+        curves = [(name, f, np.maximum(y, top * SPECTRUM)) for name, f, y in panel.curves]
         panels.append(panel._replace(curves=curves, logarithmic=True))
     return panels, "frequency (Hz)"
 

@@ -1,9 +1,9 @@
-"""The interfaces of cores and kernels, for readers and type checkers; nothing imports it to run."""
+"""The interfaces of cores and kernels, and the keywords that calls pass on, for readers, editors and type checkers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypedDict
 
 from numpy.typing import ArrayLike
 
@@ -105,37 +105,6 @@ class Motion(Protocol):
     ) -> Array: ...
 
 
-class TrajectoryLike(Protocol):
-    """A trajectory as what draws and writes it sees it; see :class:`~.trajectory.Trajectory`."""
-
-    t: Array
-    x: Array
-    metadata: dict[str, Any]
-    t_events: Any
-    x_events: Any
-
-    def __getitem__(self, name: str) -> Array: ...
-
-    def to_numpy(self) -> Array: ...
-
-    def to_pandas(self) -> Any: ...
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
-    def units(self) -> dict[str, str]: ...
-
-    @property
-    def has_energies(self) -> bool: ...
-
-    @property
-    def energies(self) -> Array: ...
-
-
 class Core(Protocol):
     """What both targets give Python: a Model of ``eomgen._native``, or of a package's own."""
 
@@ -160,3 +129,39 @@ class Source(Protocol):
     def has_energies(self) -> bool: ...
 
     def __getitem__(self, name: str) -> Array: ...
+
+
+# -- keywords that calls pass on ---------------------------------------------------------------------------------------
+
+#: A number, or a text that is an expression of numbers: ``"1e-6"``, ``"deg(30)"``.
+Number: TypeAlias = float | str
+
+
+class BoundValues(TypedDict, total=False):
+    """The other names of ``parameters`` and ``inputs``."""
+
+    p: Any
+    u: Any
+
+
+class StepOptions(BoundValues, total=False):
+    """Tolerances and steps of a solver."""
+
+    rtol: Number | ArrayLike | None
+    atol: Number | ArrayLike | None
+    max_step: Number | None
+    first_step: Number | None
+
+
+class SolverOptions(BoundValues, total=False):
+    """What SciPy's solvers take besides tolerances and steps."""
+
+    jac: Any
+    jac_sparsity: Any
+    vectorized: bool
+    lband: int | None
+    uband: int | None
+    min_step: float
+    contact_tolerance: Number
+    contact_iterations: int
+    contact_forces: bool

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..errors import UnavailableError, no_choice
+from ..errors import UnavailableError, UsageError, cannot, no_choice
 
 if TYPE_CHECKING:
     from ..base.algebra import Array
@@ -119,6 +119,20 @@ def refuse_closed(layout: Layout, states: Array, what: str) -> None:
             f"{what} is not available while constraints that close and open are closed, and {', '.join(names)} of "
             f"{layout.name!r} {'are' if names[1:] else 'is'}: what holds for a time restricts no degree of freedom; "
             f"give {{{first!r}: 0}} to let it go, or a model where it holds always (without closes and opens)"
+        )
+
+
+def not_driven(layout: Layout) -> UsageError:
+    """The refusal of method kinematic where drivers do not move all."""
+    return cannot(f"method 'kinematic' is for mechanisms without degrees of freedom; {layout.name} has {layout.n_dof}")
+
+
+def require_rigid_contacts(layout: Layout) -> None:
+    """Refuse method moreau where no contacts can be rigid."""
+    if not layout.info.rigid_contacts:
+        raise cannot(
+            f"method moreau is for rigid contact between groups of shapes, and {layout.name} has no contacts that can "
+            "be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
         )
 
 

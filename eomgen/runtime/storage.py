@@ -23,7 +23,6 @@ from .argument_checks import require
 if TYPE_CHECKING:
     import xarray
 
-    from .protocols import TrajectoryLike
 
 # -- sealed arrays -----------------------------------------------------------------------------------------------------
 
@@ -153,7 +152,7 @@ def table_path(path: str | Path, what: str, endings: tuple[str, ...] = TABLES) -
     return target
 
 
-def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
+def save(trajectory: Any, path: str | Path) -> Path:
     """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
     target = table_path(path, "a trajectory is", RUNS)
     if target.suffix in (".nc", ".parquet"):
@@ -189,7 +188,7 @@ def split_head(head: str) -> tuple[str, str]:
     return (name.strip(), unit[:-1].strip()) if bracket and unit.endswith("]") else (head.strip(), "")
 
 
-def dataset(trajectory: TrajectoryLike) -> xarray.Dataset:
+def dataset(trajectory: Any) -> xarray.Dataset:
     """The columns of a trajectory over the dimension ``t``; see :meth:`.trajectory.Trajectory.to_xarray`."""
     xr = require("xarray", "xarray", "to_xarray")
     metadata = trajectory.metadata
@@ -224,7 +223,7 @@ def free(name: str, taken: Iterable[str]) -> str:
     return name
 
 
-def _write_for_others(trajectory: TrajectoryLike, target: Path) -> Path:
+def _write_for_others(trajectory: Any, target: Path) -> Path:
     """Write a trajectory as netCDF (``.nc``) by xarray, or as Parquet by pandas."""
     if target.suffix == ".nc":
         return write_netcdf(dataset(trajectory), target)

@@ -91,21 +91,6 @@ def joined(tapes: Iterable[Tape]) -> Tape:
     return code, numbers, out
 
 
-def play_arrays(tape: Sequence[Any], p: Array, x: Array, t: Any = 0.0) -> list[Any]:
-    """The results of a tape at parameters (n_p,) or (n_p, k), x (n, k) and times (k,), each a number or (k,)."""
-    code, numbers, out = tape
-    leaves = {"const": numbers, "p": p, "x": x, "t": [t]}
-    results: list[Any] = []
-    with np.errstate(all="ignore"):
-        for op, a, b, c in code:
-            if op in leaves:
-                results.append(np.asarray(leaves[op][a], dtype=float))
-            else:
-                row = OPERATIONS[op]
-                results.append(row.array(*(results[a], results[b], results[c])[: row.arity]))
-    return [results[k] for k in out]
-
-
 def player(tape: Sequence[Any], p: Array) -> Callable[[float, Array], list[float]]:
     """The results of a tape at time t and state x, and at given parameters (n_p,)."""
     code, numbers, out = tape

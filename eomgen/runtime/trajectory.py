@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, Unpack, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,8 +27,29 @@ if TYPE_CHECKING:
     from ..show.writers import InlineFilm
     from .bound_model import BoundModel
     from .change_points import ChangePoint
-    from .option_types import AnimationOptions
     from .protocols import Source
+
+# -- keywords of animations --------------------------------------------------------------------------------------------
+
+
+class FilmOptions(TypedDict, total=False):
+    """How an animation looks."""
+
+    fps: float
+    names: bool | None
+    axes: bool
+    trace: str | Sequence[str]
+    dpi: float
+
+
+class AnimationOptions(FilmOptions, total=False):
+    """And what of a run it shows."""
+
+    model: BoundModel | None
+    speed: float | None
+    plot: str | Sequence[str]
+    forces: bool | str | Sequence[str]
+
 
 # -- trajectories ------------------------------------------------------------------------------------------------------
 

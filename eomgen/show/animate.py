@@ -11,14 +11,14 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.files import as_path, whole_file
-from ..base.limits.pictures import NOTHING, SAME, STEP
-from ..base.notation import Notation
 from ..base.picture_data import GROUND, PlacedFrame, read_picture
 from ..base.texts import shown
 from ..errors import EvaluationError, ill_typed, no_such, off_range
+from ..expr.notation import Notation
 from .build_scene import build_scene
 from .draw import matplotlib
 from .frames import DPI, MOST_DOTS, Frames, ShownColumn, ShownMotion, States, moving_scene, sample, with_fine_traces
+from .limits import NOTHING, SAME, STEP
 from .page import InlinePage, page_html
 from .scene import Item, Scene, attachments, placed
 from .writers import FILMS, WRITERS, InlineFilm, gif_bytes, kind_of, require_target

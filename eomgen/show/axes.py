@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.pictures import NOTHING, SAME, SEEN
+from .limits import NOTHING, SAME, SEEN
 from .scene import Item, Scene, color_of, page_axes, passed, style_of
 from .solids import outline
 

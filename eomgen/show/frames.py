@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.limits.pictures import ROUNDED
-from ..base.notation import TIME, Notation, label
+from ..base.texts import TIME, label
 from ..errors import cannot, off_range, too_large
+from ..expr.notation import Notation
 from .axes import figure_size
 from .build_scene import build_scene
 from .draw import matplotlib, new_artist
+from .limits import ROUNDED
 from .scene import Scene
 
 # -- scenes at even times ----------------------------------------------------------------------------------------------

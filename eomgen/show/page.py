@@ -16,12 +16,12 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.files import shipped
-from ..base.limits.pictures import SAME
 from ..base.picture_data import PlacedFrame, read_picture
 from ..base.texts import html_text
 from ..errors import EomgenError
 from .build_scene import build_scene
 from .frames import ShownColumn, ShownMotion
+from .limits import SAME
 from .scene import Item, Scene, color_of, style_of
 from .symbols import Rope, Shifted, Stretched
 

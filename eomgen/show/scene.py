@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.pictures import NOTHING, SAME
 from ..base.picture_data import GROUND, JointData, PictureData, PlacedFrame
+from .limits import NOTHING, SAME
 from .solids import ROUND, Mesh, Triangles, mesh_of, rounded, solid, sphere, turned
 
 # -- plates with holes -------------------------------------------------------------------------------------------------

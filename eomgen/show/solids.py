@@ -18,9 +18,9 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.files import as_name, beside, open_plain
 from ..base.limits.numbers import MESH
-from ..base.limits.pictures import NOTHING, SAME
 from ..base.texts import shown, visible
 from ..errors import UsageError, bad_data, bad_file, too_large
+from .limits import NOTHING, SAME
 
 Triangles = NDArray[np.int64]
 Mesh = tuple[Array, Triangles]

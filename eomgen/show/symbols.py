@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.limits.pictures import NOTHING, ROUNDED, SAME
 from ..base.picture_data import GROUND, JointData, PictureData, PlacedFrame
+from .limits import NOTHING, ROUNDED, SAME
 from .scene import BAR, Item, _is_block, attached, attachments, disc, placed, symbol_mesh
 from .solids import Mesh, cone, turned
 

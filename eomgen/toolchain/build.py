@@ -14,7 +14,6 @@ from importlib import import_module
 from pathlib import Path
 from threading import Timer
 
-from ..base.files import read_entry
 from ..errors import ToolchainError, UsageError, bad_cache, no_choice
 from .cache import Cache, CacheEntry, cache_directory, compute_key, digest_writers
 from .compiler import (
@@ -36,6 +35,7 @@ from .compiler import (
     run_all,
 )
 from .layer import HEADERS, LAYER, SOLVER
+from .trusted_files import read_entry
 
 Progress = Callable[[str], None]
 Task = Callable[[Commands], Path]  #: makes an object file

@@ -5,7 +5,7 @@ A build works in a private directory under ``attempts/``, writes its manifest la
 processes that build the same thing the second to finish takes the first one's entry.
 
 What an entry holds is loaded as code. It counts only while every file is as its sealed manifest says, and while nobody
-but this user and root could have written it, or any folder above it; see :mod:`eomgen.base.files`.
+but this user and root could have written it, or any folder above it; see :mod:`.trusted_files`.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import _STARTED
-from ..base import files
-from ..base.files import MANIFEST, Kept, digest
+from ..base.files import MANIFEST, shipped
 from ..errors import ToolchainError, bad_cache
+from . import trusted_files as files
+from .trusted_files import Kept, digest
 
 #: Layout of keys, entries and manifests; part of every key.
 FORMAT = 3
@@ -273,7 +274,7 @@ WRITERS = ("expr", "codegen", "toolchain", "base", "native")
 def digest_writers() -> str | None:
     """SHA-256 of the code and templates that sources and flags follow from; None if they changed since they ran."""
     found, package = hashlib.sha256(), Path(__file__).parents[1]
-    folders = [*(str(package / name) for name in WRITERS), str(files.shipped("templates"))]
+    folders = [*(str(package / name) for name in WRITERS), str(shipped("templates"))]
     while folders:  # os.walk, at half its time
         with os.scandir(folders.pop()) as listing:
             listed = sorted(listing, key=lambda entry: entry.name)

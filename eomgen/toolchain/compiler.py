@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
 from ..base.texts import shown
 from ..base.value_rules import as_count, read_count
@@ -337,6 +337,18 @@ LARGE_SOURCE = 800_000
 #: Lanes of processors whose instructions write a third register: -mavx, to the same bits. gcc 12 copies registers less,
 #: so Talos and ANYmal take about 0.8 of the time (0.72 to 0.88 in four measurements on a Xeon), small arms 0.98.
 WITH_AVX = 4
+
+
+class BuildOptions(TypedDict, total=False):
+    """Fields of :class:`Options`, which calls pass on."""
+
+    optimize: int | None
+    native: bool
+    warnings: bool
+    extra: Sequence[str]
+    compiler: str | None
+    lanes: int | None
+    jobs: int | None
 
 
 @dataclass(frozen=True, slots=True)

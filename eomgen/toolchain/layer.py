@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from functools import cache
 
 from ..base.files import shipped
-from ..base.limits.in_c import definitions
 from ..base.operations import tape_rows
+from ..native.limits import definitions
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (

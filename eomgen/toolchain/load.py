@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import ctypes
+import json
+import platform
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial, reduce, wraps
+from contextlib import suppress
+from functools import cache, partial, reduce, wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.files import find_module, keep_module, load_source, require_trusted
+from ..base.files import MANIFEST, find_module, keep_module
 from ..errors import (  # fmt: skip
     STATUS,
     TO_BE_FINITE,
@@ -24,6 +28,7 @@ from ..errors import (  # fmt: skip
 )
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .native import find_native
+from .trusted_files import load_source, read_entry, read_trusted, require_trusted
 
 
 def load_core(entry: CacheEntry) -> Any:
@@ -60,6 +65,77 @@ def open_core(name: str, file: Path) -> Any:
             "again, and use another compiler (CC) if this happens again"
         ) from error
     return keep_module(name, core)
+
+
+def find_core(name: str, path: Path) -> Any:
+    """The core of a pickled module, which is not loaded, from the file of its code.
+
+    Raises
+    ------
+    ToolchainError
+        The file is gone or damaged, another user could have written it, or it needs another processor.
+    """
+    try:
+        if (path.parent / MANIFEST).exists():
+            _require_features(read_entry(path.parent)[0], path)
+        require_trusted(path)
+        if path.suffix == ".py":
+            return load_source(name, str(path), read_trusted(path)).model
+    except (OSError, ValueError) as error:
+        what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
+        raise ToolchainError(
+            f"the compiled code of the pickled module is {what}: {path}; compile the model again",
+            code="EG-FILE-DAMAGED",
+        ) from error
+    return open_core(name, path)
+
+
+def _require_features(manifest: Mapping[str, Any], file: Path) -> None:
+    """Refuse code with instructions that this processor does not know, which would end the process without a word."""
+    lacking = set(manifest.get("recipe", {}).get("needs", ())) - processor_features()
+    if lacking:
+        raise ToolchainError(
+            f"the compiled code of the pickled module needs a processor with {', '.join(sorted(lacking))}, which "
+            f"this one lacks: {file}; compile the model again here"
+        )
+
+
+@cache
+def processor_features() -> frozenset[str]:
+    """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
+    found = {platform.machine()}
+    with suppress(ImportError, AttributeError):
+        features = import_module("numpy._core._multiarray_umath").__cpu_features__
+        found |= {name for name, there in features.items() if there}
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith(("flags", "Features")):
+                found |= set(line.partition(":")[2].split())
+                break
+    return frozenset(found)
+
+
+def recipe_of(file: Path) -> str:
+    """What the build is made from that the file of a library or core belongs to, as JSON; empty without its sources.
+
+    Raises
+    ------
+    ToolchainError
+        The build is damaged.
+    """
+    try:
+        facts, files = read_entry(file.parent)
+    except (OSError, ValueError) as error:
+        raise ToolchainError(
+            f"the compiled code of the module is damaged: {error}; compile the model again", code="EG-FILE-DAMAGED"
+        ) from None
+    folder, recipe = "sources/", facts["recipe"]
+    sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
+    if not sources:
+        return ""
+    options = recipe.get("options", {})
+    needs = sorted(processor_features()) if options.get("native", False) else recipe.get("needs", [])
+    return json.dumps({"name": facts["name"], "sources": sources, "options": options, "needs": needs})
 
 
 def _table(library: ctypes.CDLL, name: str) -> int:
@@ -112,11 +188,11 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     if not twins and (found := find_module(module_name)) is not None:
         return found
     try:
-        cache = Cache(cache_directory())
-        if (entry := cache.find(key)) is None:
-            with cache.attempt(key) as attempt:
+        kept = Cache(cache_directory())
+        if (entry := kept.find(key)) is None:
+            with kept.attempt(key) as attempt:
                 (attempt / NUMPY).write_text(text, encoding="utf-8")
-                entry = cache.publish(attempt, key, "numpy", name, NUMPY, {})
+                entry = kept.publish(attempt, key, "numpy", name, NUMPY, {})
         path = str(entry.product)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         path = f"<{module_name}>"

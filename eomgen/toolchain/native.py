@@ -17,9 +17,9 @@ from threading import Lock
 from types import ModuleType
 from typing import Any
 
-from ..base.files import digest, locked
 from ..errors import MissingDependencyError, ToolchainError
 from .layer import SOLVER, read_native
+from .trusted_files import digest, locked
 
 NAME = "_native"
 PACKAGE = Path(__file__).parents[1]

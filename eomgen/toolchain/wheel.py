@@ -13,10 +13,10 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from ..base.files import as_path, open_plain, write_whole
-from ..base.targets import TARGETS
 from ..errors import MissingDependencyError, UsageError, at_odds, bad_data, cannot
 from .compiler import Options, allowed, find_compiler, machine_flags, run
 from .native import find_python_headers
+from .targets import TARGETS
 
 SETUPTOOLS = 77  #: first version that knows ``license-files`` of the project table
 #: Time of the files in a wheel (s since 1970), unless SOURCE_DATE_EPOCH says otherwise: the first that zip knows.

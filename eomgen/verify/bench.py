@@ -11,7 +11,6 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED
-from ..base.limits.analyses import NUDGE
 from ..base.limits.constraints import EXACT
 from ..base.limits.numbers import TINY
 from ..codegen.kernels import EXPRESSIONS
@@ -19,6 +18,7 @@ from ..codegen.terms import SystemTerms
 from ..expr.core import Expr
 from .cases import Case
 from .digits import FOLDED, UNIT, bounded
+from .limits import NUDGE
 from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.kernel_table import TIMED
-from ..base.limits.analyses import BUILDS, CLOSED, REGULAR, SPREAD_OF_ROUNDING, ZERO
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
+from .limits import BUILDS, CLOSED, REGULAR, SPREAD_OF_ROUNDING, ZERO
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -191,8 +191,8 @@ CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
 def record_calls(name: str, module: BoundModel | None) -> str:
     """The text of ``tests/recorded.json``: calls, their arguments, results, and the most by which a result may differ.
 
-    The bound is :data:`~..base.limits.analyses.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
-    changes, :data:`~..base.limits.analyses.BUILDS` of the largest number, and :data:`~..base.limits.analyses.ZERO`.
+    The bound is :data:`~.limits.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
+    changes, :data:`~.limits.BUILDS` of the largest number, and :data:`~.limits.ZERO`.
 
     Parameters
     ----------

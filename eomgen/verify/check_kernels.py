@@ -9,13 +9,13 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import FIRST_DIFFERENCE, NO_FORCE, OFF_CONSTRAINTS, SECOND_DIFFERENCE
 from ..base.limits.numbers import EPS, TINY
 from ..errors import EomgenError
 from .bench import Bench, numbers
 from .cases import Case
 from .digits import FOLDED, UNIT, Number, Numbers, bounded, solve
 from .finding import FIRST_STEP, SHORTER, Comparison, Finding, extrapolate, pairs, size_of, terms_size
+from .limits import FIRST_DIFFERENCE, NO_FORCE, OFF_CONSTRAINTS, SECOND_DIFFERENCE
 from .truth import Truth, Values
 
 # -- kernels -----------------------------------------------------------------------------------------------------------

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.analyses import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 from ..base.limits.constraints import ACCEPTED
 from ..base.operations import operations_with
 from ..errors import EomgenError, SimulationError
@@ -29,6 +28,7 @@ from ..runtime.runs.simulate import simulate
 from .bench import Bench
 from .cases import Case
 from .finding import RIGID, Comparison, Finding, size_of
+from .limits import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

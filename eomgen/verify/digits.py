@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.limits.analyses import NUDGE, PAIR_ROUNDING
 from ..base.limits.numbers import EPS
 from ..base.operations import OPERATIONS, Operation
 from ..errors import MissingDependencyError
 from ..expr.core import Expr, common_graph, reachable
 from ..expr.pairs import PairCall
+from .limits import NUDGE, PAIR_ROUNDING
 
 # -- values by mpmath --------------------------------------------------------------------------------------------------
 
@@ -125,7 +125,7 @@ class _Local:
         return total
 
     def _expand(self, centre: list[float]) -> None:
-        from ..base.numeric.user_functions import up_to
+        from ..expr.user_functions import up_to
 
         self.centre, self.terms = centre, []
         for total in range(3):

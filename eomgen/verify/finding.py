@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.algebra import Array
-from ..base.limits.analyses import ROUNDED
 from ..base.texts import fold, terminal_width
+from .limits import ROUNDED
 
 # -- findings ----------------------------------------------------------------------------------------------------------
 

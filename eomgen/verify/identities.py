@@ -9,13 +9,13 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, correlated
-from ..base.limits.analyses import CLOSED
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
 from ..runtime.inputs import moving_inputs
 from ..runtime.minimal import Minimal
 from .cases import Case
 from .finding import FIRST_STEP, SHORTER, Comparison, Finding, extrapolate, failed, pairs, size_of
+from .limits import CLOSED
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import pipeline
-from ..base.algebra import from_quaternion
 from ..elements.frames import GROUND, Frame, Marker
+from ..elements.matrices import from_quaternion
 from ..errors import EomgenError, ToolchainError
 from ..expr import vectors as vec
 from ..expr.core import copied

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.base.records import dataclass
 from eomgen.base.value_rules import POSITIVE
 from eomgen.elements.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
 from eomgen.elements.dimensions import LENGTH, STIFFNESS
@@ -23,6 +22,7 @@ from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
 from eomgen.expr import vectors as vec
 from eomgen.expr.core import Expr, Graph
+from eomgen.expr.records import dataclass
 from eomgen.expr.vectors import Mat3, Vec3
 from eomgen.model import model_schema
 

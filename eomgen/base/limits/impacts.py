@@ -1,4 +1,4 @@
-"""Limits: impacts and sensitivities through events."""
+"""Limits: impacts, sensitivities through events, rigid contacts."""
 
 from __future__ import annotations
 
@@ -55,3 +55,12 @@ REACHED = 1e-13
 GIVES = 1e-9
 #: Part of the energy that impulses with friction move by which their sum may grow by rounding.
 GAINS = 1e-12
+
+# -- rigid contacts, as runs are told of them --------------------------------------------------------------------------
+
+#: Residual of the contact laws, relative to the largest velocity of the contacts without impulses: rounding of W P and
+#: of the free velocities, 1e-16 times a condition of 1e6 that chains and redundant contacts bring about, is below.
+SOLVED = 1e-9
+ITERATIONS = 600  #: of one step: rounded laws take up to 200 in each of their rounds
+#: Halvings of one step until no shapes pass each other in its halves: speeds of 65,000 times what the step suits.
+HALVINGS = 16

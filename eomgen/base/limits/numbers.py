@@ -1,4 +1,4 @@
-"""Limits: rounding, what a user wrote, the size of files, inertia."""
+"""Limits: rounding, what a user wrote, inertia."""
 
 from __future__ import annotations
 
@@ -84,36 +84,13 @@ SHOWN_COMPLEX = 1e-12
 POWERS = 1e-9
 #: Part of a body's size below which a radius of curvature counts as 0: second derivatives lose half of the digits.
 SHARP = 1e-8
-
-
-# -- what a robot file may be made of, and what reading it may cost ----------------------------------------------------
-
-
-# -- XML -------------------------------------------------------------------------------------------------------------
-SIZE = 20_000_000  #: bytes of one XML file
-ELEMENTS = 100_000  #: of one file
-DEPTH = 200  #: nesting
-LONGEST = 200_000  #: characters of one attribute
-
-# -- numbers ---------------------------------------------------------------------------------------------------------
-#: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
-#: mass times distance squared, stay within double precision.
-LARGEST = 1e100
-#: Least impedance of a constraint in MuJoCo, and what the greatest is less than 1.
-IMPEDANCE = 1e-4
-
-# -- what a robot becomes ---------------------------------------------------------------------------------------------
-FREEDOMS = 800  #: coordinates of its joints; checking a model of so many takes 10 s
-TIES = 800  #: joints that close loops, couplings, drives
-LAWS = 10_000_000  #: characters of the laws of all drives, which tendons of many joints multiply
-
-# -- meshes of solids ------------------------------------------------------------------------------------------------
 MESH = 100_000_000  #: bytes of an STL file: two million triangles, which take 15 s and 1e9 bytes to measure
-
-# -- MuJoCo's compiler, in a process of its own ------------------------------------------------------------------------
-SECONDS = 10  #: of processor time; the largest models that packages ship (fruit fly, dog) take 2
-WAIT = 16  #: seconds until it is ended whatever it does
-MEMORY = 2_000_000_000  #: bytes of address space; those models take 0.4e9
+#: Part of the transition velocity that tanh(4 v / transition) / v is shifted by: its square, 1e-16, is lost beside 1 in
+#: the value, and the slope, whose cancelling terms have errors of 1e-16 / v^2, stays finite at rest.
+AT_REST = 1e-8
+#: Slip of a tyre that counts as none, and part of the velocity below which a wheel counts as locked: a brush adheres up
+#: to slips of 3 mu F_z / C, hundredths, beside which it is nothing, and its square, 1e-18, is a number.
+NO_SLIP = 1e-9
 
 
 # -- when a mass matrix counts as positive definite, and a tensor as that of a body ------------------------------------

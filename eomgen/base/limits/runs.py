@@ -75,3 +75,4 @@ CONTRADICTS = 1e-2  #: part of what an input changes in a run, by which a rate g
 CONTRADICTS_TABLE = 1e-1  #: the same where one of them is a table, which is coarse between its points
 DIFFERENCE = 1e-6  #: part of a variable over which a function of it is differenced
 LOCATED = 1e-12  #: part of an interval to which the jump of a text is located: beside it lie 4,000 numbers
+SPECTRUM = 1e-9  #: amplitudes that a spectrum shows at least, of the greatest

@@ -12,11 +12,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ...base.targets import CUDA_REQUIREMENTS, DEVICE_KERNELS, TIMED_ON_DEVICE
 from ...errors import cannot
-from ...runtime.device.device_module import DeviceModule
+from ...runtime.device.cuda_device import CUDA_REQUIREMENTS
+from ...runtime.device.device_module import TIMED_ON_DEVICE, DeviceModule
 from ...runtime.runs.events import GO_ON, RESET, crowd_of
 from ...toolchain.layer import read_layer, read_sources
+from ...toolchain.targets import DEVICE_KERNELS
 from ..c import count_constants, emit_c
 from ..c_functions import used_calls
 from ..c_text import print_precompute
@@ -45,7 +46,7 @@ CARRIED = ("errors.py", "base", "runtime")
 
 
 def emit_device_text(program: Program) -> str:
-    """The text of ``<name>.cu``, with the kernels :data:`~eomgen.base.targets.DEVICE_KERNELS`.
+    """The text of ``<name>.cu``, with the kernels :data:`~eomgen.toolchain.targets.DEVICE_KERNELS`.
 
     Raises
     ------

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...base.without_gc import timed, without_gc
 from ...errors import ModelError, Problem, ToolchainError, no_such
 from ...expr.functions import Function
+from ...expr.without_gc import timed, without_gc
 from ...toolchain.build import compile_sources, key_of_program
 from ...toolchain.cache import Cache, cache_directory
 from ...toolchain.compiler import Options

@@ -23,17 +23,17 @@ from ... import __version__
 from ...base.algebra import Array
 from ...base.files import as_path, refuse_link, write_whole
 from ...base.limits import runs
-from ...base.limits.in_c import definitions
-from ...base.targets import FMI_VERSIONS
 from ...base.texts import html_text, one_line
 from ...errors import ModelError, Problem, bad_file, no_choice
 from ...model.units import read_unit
+from ...native.limits import definitions
 from ...runtime.bound_model import BoundModel
 from ...runtime.inputs import Forcing
 from ...runtime.layout import ModelInfo, bounds_of
 from ...toolchain.build import compile_sources
 from ...toolchain.compiler import Options
 from ...toolchain.layer import read_layer
+from ...toolchain.targets import FMI_VERSIONS
 from ..c import emit_c
 from ..files import number_texts, own_file, read_template, render
 from ..program import Program
@@ -417,7 +417,7 @@ def write_fmu(
     Parameters
     ----------
     program : Program
-        With the kernels :data:`~eomgen.base.targets.FMU_KERNELS`.
+        With the kernels :data:`~eomgen.toolchain.targets.FMU_KERNELS`.
     module : BoundModel
         The model, for its initial state.
     path : str or Path, optional

@@ -12,13 +12,14 @@ from inspect import getsource, signature
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from ...base.files import find_module, load_source
+from ...base.files import find_module
 from ...base.kernel_table import NAMED
 from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
-from ...base.numeric.scales import Space
-from ...base.numeric.user_functions import Curve, Surface, bicubic, combined, cubic, hermite
-from ...base.targets import TRACED_KERNELS
+from ...base.scales import Space
 from ...errors import MissingDependencyError, cannot
+from ...expr.user_functions import Curve, Surface, bicubic, combined, cubic, hermite
+from ...toolchain.targets import TRACED_KERNELS
+from ...toolchain.trusted_files import load_source
 from ..c_functions import used_calls
 from ..files import example_state, render
 from ..pair_sums import refuse_sums
@@ -53,7 +54,7 @@ def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 
 def emit_traced(program: Program, library: str) -> str:
-    """The text of the module ``<name>`` for 'casadi' or 'jax', of the kernels :data:`~...base.targets.TRACED_KERNELS`.
+    """The text of the module ``<name>`` for 'casadi' or 'jax', of :data:`~...toolchain.targets.TRACED_KERNELS`.
 
     Raises
     ------

@@ -20,7 +20,6 @@ import numpy as np
 
 from ...base.algebra import Array
 from ...base.files import as_path, open_plain, write_whole
-from ...base.limits.in_c import definitions
 from ...base.operations import OPERATIONS
 from ...base.picture_data import read_picture
 from ...elements.frames import GROUND
@@ -34,6 +33,7 @@ from ...mechanics.mobility import Mobility
 from ...mechanics.motion import dot, force_and_moment
 from ...mechanics.wrenches import JointWrenches, carried_reactions
 from ...model.mechanism import Output
+from ...native.limits import definitions
 from ...runtime.bound_model import BoundModel
 from ...runtime.drawing import module_of
 from ...runtime.layout import bounds_of

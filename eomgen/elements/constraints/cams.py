@@ -8,10 +8,10 @@ from abc import abstractmethod
 import numpy as np
 
 from ...base.limits.numbers import ZERO
-from ...base.records import dataclass
 from ...expr.core import Expr, atan2, cos, sin, sqrt, substitute, symbols_of
 from ...expr.differentiate import jvp
 from ...expr.evaluate import evaluate
+from ...expr.records import dataclass
 from ..dimensions import LENGTH, NONE, REACH
 from ..element_type import ElementType, Entry, table
 from ..frames import Frame, Marker

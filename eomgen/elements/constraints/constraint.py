@@ -9,9 +9,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
-from ...base.records import dataclass
 from ...expr.core import Expr, is_comparison, symbols_of
 from ...expr.differentiate import gradient
+from ...expr.records import dataclass
 from ..element_type import ElementType, Entry, Meaning, table
 from ..frames import Frame, Marker, MotionView
 from ..kinds import OUTPUT, Factors, Scalar

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr, reachable, sqrt, symbols_of
+from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..dimensions import REACH
 from ..element_type import ElementType, Entry, table

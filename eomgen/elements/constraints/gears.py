@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...base.records import dataclass
 from ...base.value_rules import POSITIVE
 from ...base.value_rules import WHEELS as WHEELS_FIT
 from ...expr.core import Expr, sin
+from ...expr.records import dataclass
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, Found, table
 from ..kinds import Flag, JointPair, JointReference, Scalar, Two, Wheels

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from ...base.records import dataclass
 from ...base.value_rules import POSITIVE, SUPPORT
 from ...expr import vectors as vec
 from ...expr.core import Expr, cos, sin, sqrt, substitute
 from ...expr.differentiate import jvp
+from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, element, key, table

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr
+from ...expr.records import dataclass
 from ..dimensions import SPIN
 from ..element_type import ElementType, Entry, Types, table
 from ..frames import Marker, velocity_at

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any, ClassVar, NamedTuple, Protocol
 
-from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr
+from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..frames import Marker, MotionView
 from ..looks import Seen

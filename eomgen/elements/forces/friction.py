@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
-from ...base.limits.contacts import AT_REST
-from ...base.records import dataclass
+from ...base.limits.numbers import AT_REST
 from ...base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ...expr import vectors as vec
 from ...expr.core import Expr, Graph, sqrt
+from ...expr.records import dataclass
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
 from ..element_type import ElementType, Entry, table

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...base.records import dataclass
 from ...base.value_rules import Allowed
 from ...expr.core import Expr, sin, sqrt
+from ...expr.records import dataclass
 from ..dimensions import FORCE, LENGTH, NONE, SPEED, TIME
 from ..element_type import ElementType, Entry, table
 from ..kinds import LAW, Scalar

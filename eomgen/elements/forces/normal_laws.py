@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar
 
-from ...base.records import dataclass
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ...expr.core import Expr, sqrt
+from ...expr.records import dataclass
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH
 from ..element_type import ElementType, Entry, table
 from ..kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar

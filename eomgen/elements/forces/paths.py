@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...base.records import dataclass
 from ...expr import vectors as vec
 from ...expr.core import Expr, atan2, sqrt
+from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import combinations
 
-from ...base.records import dataclass
 from ...base.value_rules import Allowed
 from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt, substitute
 from ...expr.differentiate import gradient
+from ...expr.records import dataclass
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, ENERGY, FORCE, LENGTH, NONE, PUSH, RATE, REACH, SPIN, STIFFNESS, TIME, Dimension
 from ..element_type import ElementType, Entry, Where, element, key, keys_of, table

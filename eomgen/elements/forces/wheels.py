@@ -7,11 +7,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
-from ...base.limits.contacts import NO_SLIP
-from ...base.records import dataclass
+from ...base.limits.numbers import NO_SLIP
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE
 from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt
+from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
 from ..element_type import ElementType, Entry, Where, element, key, keys_of, table

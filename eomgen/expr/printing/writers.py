@@ -7,14 +7,14 @@ import unicodedata
 from collections.abc import Callable
 from functools import cache
 
-from ...base.latex import SUPERSCRIPTS, NotationError, mathml_form, read_latex, text_form
-from ...base.notation import Notation, literal
 from ...base.texts import html_text
+from ..latex import SUPERSCRIPTS, NotationError, mathml_form, read_latex, text_form
+from ..notation import Notation, literal
 from . import formula as tree
 
 # -- LaTeX of users ----------------------------------------------------------------------------------------------------
 
-# The pieces between spaces outside braces are symbols and signs of :mod:`eomgen.base.notation`.
+# The pieces between spaces outside braces are symbols and signs of :mod:`eomgen.expr.notation`.
 
 
 @cache

@@ -14,8 +14,8 @@ from dataclasses import field
 from typing import Any
 
 from ...base.operations import CONDITION, operations_with
-from ...base.records import dataclass
 from ..core import LEAVES, Expr, Graph, common_graph, operands, reachable
+from ..records import dataclass
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .expansion import Expansion
 from .factoring import Factoring, Literal, Mixed, Parts, with_signs, without_exact_quotients

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...base.records import dataclass
 from ...elements.frames import GROUND, Frame
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import hessian, jacobian, jvp
+from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
 from ...model.mechanism import JointSpec
 from .. import Kinematics

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ...base import algebra
-from ...base.algebra import correlated, safely_positive
+from ...base.algebra import Array, correlated
 from ...base.limits.constraints import UNMOVED
-from ...base.limits.numbers import EPS, LEAST, TINY, WORTH_A_WORD
-from ...base.numeric.ranks import partition
-from ...base.records import dataclass
+from ...base.limits.numbers import EPS, LEAST, NOTHING, SINGULAR, TINY, WORTH_A_WORD
+from ...base.ranks import partition
 from ...elements.frames import Frame, Marker
 from ...errors import EvaluationError, ModelError, PartitionError, Problem
 from ...expr.evaluate import Evaluator, evaluate
+from ...expr.records import dataclass
 from ...model.mechanism import Mechanism
 from .. import Kinematics
 from ..constraint_functions import ConstraintFunctions
@@ -270,3 +270,8 @@ def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquatio
         if best >= WORTH_A_WORD:
             break
     return best
+
+
+def safely_positive(pivots: Array, sizes: Array) -> bool:
+    """Whether each pivot (n,) of L D L^T exceeds 1e-13 of its size (n,) and 1e-22 of the largest; NaN does not."""
+    return bool((pivots > np.maximum(SINGULAR * sizes, NOTHING * sizes.max(initial=0.0))).all())

@@ -6,10 +6,10 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from ...base.records import dataclass
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr, Graph
+from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, dot, scaled
 from ...expr.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ...expr.vectors import Mat3

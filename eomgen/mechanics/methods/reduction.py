@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from typing import NamedTuple
 
-from ...base.algebra import diagonal_blocks
 from ...expr.core import Expr
 from ...expr.evaluate import evaluate
 from .. import Kinematics
+from ..diagonal_blocks import diagonal_blocks
 from ..mobility import Mobility
 from ..motion import dot
 

@@ -7,9 +7,9 @@ from copy import copy
 from functools import partial
 from types import FunctionType
 
-from ...base.records import dataclass
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import jacobian
+from ...expr.records import dataclass
 from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..link_frames import Turned

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...base.targets import CUDA_REQUIREMENTS
 from ...errors import MissingDependencyError, ToolchainError, UsageError, ill_typed
 
 # -- arrays ------------------------------------------------------------------------------------------------------------
@@ -86,6 +85,8 @@ class Device(Protocol):
 # -- compilation -------------------------------------------------------------------------------------------------------
 
 
+#: Packages of programs on a device, besides NumPy.
+CUDA_REQUIREMENTS = ("cuda-core>=1.0", "cuda-bindings>=13.0", "nvidia-cuda-nvrtc>=13.0")
 INSTALL = f"pip install {' '.join(repr(name) for name in CUDA_REQUIREMENTS)}"
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.targets import TIMED_ON_DEVICE
 from ...base.value_rules import read_count
 from ...errors import cannot, ill_shaped, ill_typed, incomplete, no_choice, no_such
 from ..ensembles.block import RunBlock
@@ -20,6 +19,9 @@ from .cuda_device import Array, Device, DeviceArray
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
+
+#: Kernels of a device that are called with the time first, as functions of a module; others take it by name.
+TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
 
 # -- functions ---------------------------------------------------------------------------------------------------------
 

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...base.algebra import Array
-from ...base.files import MANIFEST, read_entry
+from ...base.files import MANIFEST
 from ...base.value_rules import as_count
 from ...errors import MissingDependencyError, ToolchainError, UsageError, bad_file, cannot, ill_typed
 from ..argument_checks import require
 from ..kernels import eager
-from ..pickling import processor_features, restore
+from ..pickling import restore
 from .block import LOST, MEANING, Custom, Kept, Plan, Reduction, RunBlock, Runs, keep, run_block
 from .variations import Variations
 
@@ -67,32 +67,17 @@ def _digest(file: Path) -> str:
 
 
 def _recipe(file: Path) -> str:
-    if not (file.parent / MANIFEST).is_file():
-        return ""
-    try:
-        facts, files = read_entry(file.parent)
-    except (OSError, ValueError) as error:
-        raise ToolchainError(
-            f"the compiled code of the module is damaged: {error}; compile the model again", code="EG-FILE-DAMAGED"
-        ) from None
-    folder, recipe = "sources/", facts["recipe"]
-    sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
-    if not sources:
-        return ""
-    options = recipe.get("options", {})
-    needs = sorted(processor_features()) if options.get("native", False) else recipe.get("needs", [])
-    return json.dumps({"name": facts["name"], "sources": sources, "options": options, "needs": needs})
+    """What a build in the cache is made from; empty of the module of an installed package."""
+    return import_module("eomgen.toolchain.load").recipe_of(file) if (file.parent / MANIFEST).is_file() else ""
 
 
 @lru_cache(maxsize=8)
 def _open(name: str, file: str, digest: str, recipe: str) -> Any:
-    how: dict[str, Any] = json.loads(recipe) if recipe else {"needs": ()}
     path = Path(file)
-    if processor_features().issuperset(how["needs"]) and path.is_file() and _digest(path) == digest:
-        return restore(_core, name, file, None, None)  # type: ignore[arg-type]
+    same = path.is_file() and _digest(path) == digest
     try:
         if not recipe:
-            return import_module(name)
+            return restore(_core, name, file, None, None) if same else import_module(name)  # type: ignore[arg-type]
         build, load = (import_module(f"eomgen.toolchain.{part}") for part in ("build", "load"))
     except ImportError as error:
         if recipe:
@@ -102,6 +87,9 @@ def _open(name: str, file: str, digest: str, recipe: str) -> Any:
         raise ToolchainError(
             f"this worker has no module {name}: install its package there", code="EG-PACKAGE-MISSING"
         ) from error
+    how: dict[str, Any] = json.loads(recipe)
+    if same and load.processor_features().issuperset(how["needs"]):
+        return restore(_core, name, file, None, None)  # type: ignore[arg-type]
     options = build.Options(**how["options"])
     return load.load_core(build.compile_sources("model", how["sources"], how["name"], options))
 

@@ -10,15 +10,14 @@ import numpy as np
 
 from ...base.algebra import Array
 from ...base.files import whole_file
-from ...base.inline_pictures import picture_html, side_by_side
-from ...base.notation import TIME, Notation, label
-from ...base.results import Result, ResultTable
+from ...base.results import Result, ResultTable, picture_html, side_by_side
 from ...base.results import plain as plain_values
-from ...base.texts import html_table
+from ...base.texts import TIME, html_table, label
 from ...base.value_rules import read_count
 from ...errors import UsageError, cannot, off_range
 from ..argument_checks import require, unknown
 from ..identity import origin, plain, spell_input
+from ..plotting import printed_names
 from ..runs.simulate import simulate
 from ..storage import attributes, free, table_path
 from .block import EVENT, MEANING, Custom, Reduction, Runs, Statistics, summarise
@@ -351,7 +350,7 @@ class Ensemble(Result):
             plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
             ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
         assert ax is not None
-        printed = label(Notation.of(self._module.metadata).mathtext(name), self.unit(name))
+        printed = label(printed_names(self._module.metadata)(name), self.unit(name))
         if not self._statistics and values.ndim == 1:
             ax.hist(values[np.isfinite(values)], bins="auto")
             ax.set_xlabel(f"{printed} at $t$ = {self.t[0]:.6g} s")

@@ -44,7 +44,7 @@ from .variations import collect_variations, grid_axes, spread_grid
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
     from ..layout import Layout
-    from ..option_types import Number, StepOptions
+    from ..protocols import Number, StepOptions
 
 STORED = 64  #: blocks at least that a store keeps of a large ensemble
 WIDEST = 8  #: runs side by side in one thread, at most

@@ -22,8 +22,7 @@ import numpy as np
 from ...base.algebra import Array
 from ...base.limits.constraints import MEASURED
 from ...base.limits.runs import CROWD, EARLIEST, INSTANT, MOST_STEPS, WHOLE
-from ...base.syntax_trees import parse_module
-from ...base.texts import shown
+from ...base.texts import parse_python, shown
 from ...base.value_rules import as_count
 from ...errors import (
     SimulationError,
@@ -239,7 +238,7 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Ex
     event = RunEvent(None, name or text, options.get("terminal"), direction)
     formula = read_text(layout, text, f"event {name or text!r}")
     plain = _INSTANCE.sub("_", text.strip())
-    if isinstance(getattr(parse_module(plain).body[0], "value", None), (ast.Compare, ast.BoolOp)):
+    if isinstance(getattr(parse_python(plain).body[0], "value", None), (ast.Compare, ast.BoolOp)):
         remedy = "give the difference of its sides: a - b for a > b"
         raise UsageError(f"event {name or text!r} is a comparison, which has no zero; {remedy}", code="EG-EVENT")
     return event, formula

@@ -23,11 +23,8 @@ from numpy.polynomial import polynomial
 
 from ...base import algebra
 from ...base.algebra import Array
-from ...base.limits.analyses import ALIGNED, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
-from ...base.limits.analyses import ASTRAY as ASTRAY_ACROSS
-from ...base.limits.constraints import SETTLED
-from ...base.numeric.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
-from ...base.numeric.continuation import (
+from ...base.assembly import ClosureSystem, ConstraintSystem, WantedValues, close, closed
+from ...base.continuation import (
     ASTRAY,
     SECTIONS,
     Continuation,
@@ -38,8 +35,10 @@ from ...base.numeric.continuation import (
     find_root,
     interpolate,
 )
-from ...base.numeric.projection import largest
-from ...base.numeric.scales import Scales
+from ...base.limits.constraints import SETTLED
+from ...base.limits.positions import ALIGNED, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
+from ...base.limits.positions import ASTRAY as ASTRAY_ACROSS
+from ...base.scales import Scales, largest
 from ...errors import EomgenError
 from ..kernels import constraint_system
 
@@ -449,7 +448,7 @@ def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
 class FollowedPath:
     """A continuation from s = 0 to ``end``, or as far as it goes.
 
-    ``extent`` is that of :class:`~...base.numeric.continuation.Continuation`.
+    ``extent`` is that of :class:`~...base.continuation.Continuation`.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ from ...base.algebra import Array
 from ...base.limits.constraints import MEASURED
 from ...base.limits.impacts import COUPLED, ENDLESS, FREE, GAINS, GIVES, LEFT, PUSHES, REACHED, STILL, STRUCK
 from ...base.limits.numbers import EPS
-from ...base.numeric.ranks import rank
+from ...base.ranks import rank
 from ...errors import cannot, untrue
 
 if TYPE_CHECKING:

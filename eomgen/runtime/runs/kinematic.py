@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.algebra import Array
-from ...base.limits.analyses import SINGULAR, SLACK
+from ...base.assembly import close
 from ...base.limits.constraints import CONTRADICTION, UNMOVED
-from ...base.numeric.assembly import close
-from ...base.numeric.projection import largest
-from ...base.numeric.splines import curve_coefficients
+from ...base.limits.positions import SINGULAR, SLACK
+from ...base.scales import largest
+from ...base.splines import curve_coefficients
 from ...errors import (
     TO_BE_FINITE,
     AssemblyError,
@@ -33,6 +33,7 @@ from ...errors import (
 from ..argument_checks import read_number, read_numbers
 from ..columns import Columns, Residuals, describe
 from ..inputs import Forcing
+from ..refusals import not_driven
 from ..trajectory import Span, Start, Trajectory, last_state
 from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
@@ -371,9 +372,7 @@ def follow_drivers(
     """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other."""
     if not is_driven(module) or _led_by_inputs(module, inputs, method):
         if method is not None:
-            raise cannot(
-                f"method 'kinematic' is for mechanisms without degrees of freedom; {module.name} has {module.n_dof}"
-            )
+            raise not_driven(module.layout)
         return None
     bound, forcing, start, end = set_up(module, span, parameters, inputs)
     watched = Events(module.layout, events)

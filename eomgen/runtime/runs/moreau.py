@@ -38,9 +38,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.algebra import Array
-from ...base.limits.contacts import HALVINGS, ITERATIONS, SOLVED
+from ...base.kernel_table import RECORD
+from ...base.limits.impacts import HALVINGS, ITERATIONS, SOLVED
 from ...base.limits.runs import SAME
-from ...base.numeric.pair_sums import RECORD
 from ...base.texts import shown
 from ...base.value_rules import as_count
 from ...errors import (
@@ -305,11 +305,6 @@ class RigidSteps:
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
         known = module.info.rigid_contacts
-        if not known:
-            raise cannot(
-                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
-                "can be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
-            )
         self.module, self.taken = module, 0
         self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
         self.acting: list[Array] = []

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ...errors import EvaluationError, SimulationError, SimulationInterrupted, calls_within, cannot
 from ..argument_checks import check_names, read_flag, require_room, require_steps
 from ..inputs import Forcing
-from ..option_types import Number, SolverOptions
+from ..refusals import not_driven, require_rigid_contacts
 from ..trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
 from .compiled import can_run
@@ -44,6 +44,7 @@ from .run_arguments import (
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
+    from ..protocols import Number, SolverOptions
     from ..trajectory import Trajectory
 
 OPTIONS = (
@@ -220,6 +221,8 @@ def simulate(
         method, step = own_step(module, method, step)
         limits = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
+            if module.layout.n_dof:
+                raise not_driven(module.layout)
             from .kinematic import follow_drivers
 
             asked = {**limits, **others}
@@ -227,6 +230,7 @@ def simulate(
             if motion is not None:
                 return motion
         if (isinstance(method, str) and method == "moreau") or module.info.rigid_only:
+            require_rigid_contacts(module.layout)
             from .moreau import step_rigidly
 
             asked = {**limits, "dense_output": dense_output, "controllers": controllers, **others}

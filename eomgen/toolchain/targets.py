@@ -42,12 +42,6 @@ FMU_KERNELS = (
     *("outputs", "output_derivatives", "events", "resets"),
 )
 
-#: Kernels of a device that are called with the time first, as functions of a module; others take it by name.
-TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
-
-#: What they need besides NumPy.
-CUDA_REQUIREMENTS = ("cuda-core>=1.0", "cuda-bindings>=13.0", "nvidia-cuda-nvrtc>=13.0")
-
 
 class Target(NamedTuple):
     """One target.
@@ -68,7 +62,7 @@ class Target(NamedTuple):
     precisions : bool
         Whether its numbers may be of single precision.
     kernels : tuple of str
-        The functions it has, of :data:`~.kernel_table.KERNELS`; all if empty.
+        The functions it has, of :data:`~eomgen.base.kernel_table.KERNELS`; all if empty.
     whole : str
         "file.function" of (program, module, directory, version) that writes one file instead of a package.
     """

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple
 
-from .names import hint
-from .texts import html_text, visible
+from ..base.names import hint
+from ..base.texts import html_text, visible
 
 # -- letters and signs of LaTeX and their characters, accents, styles --------------------------------------------------
 

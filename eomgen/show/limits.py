@@ -6,8 +6,6 @@ SAME = 1e-9
 HELD = 1e-6
 #: Relative step of coordinates for the displacements of points in a mode: about the cube root of rounding.
 STEP = 1e-5
-#: Amplitudes that a spectrum shows at least, of the greatest.
-FAINT = 1e-9
 #: Relative difference of a coordinate between two branches that is printed in three digits.
 SEEN = 1e-3
 #: Relative size of rounding in numbers of order 1 that have gone through a few operations.

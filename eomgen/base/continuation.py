@@ -7,14 +7,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...errors import AssemblyError
-from .. import algebra
-from ..algebra import Array
-from ..limits.analyses import BLOCKED, DRIFTED, LEAPS, NULL, UNJUDGED
-from ..limits.numbers import EPS
+from ..errors import AssemblyError
+from . import algebra
+from .algebra import Array
 from .assembly import DAMPING, ClosureSystem, ConstraintSystem, close, closed
-from .projection import largest
-from .scales import Scales
+from .limits.numbers import EPS
+from .limits.positions import BLOCKED, DRIFTED, LEAPS, NULL, UNJUDGED
+from .scales import Scales, largest
 from .splines import cubic_piece
 
 # -- curves ------------------------------------------------------------------------------------------------------------

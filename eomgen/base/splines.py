@@ -1,4 +1,4 @@
-"""Points of a table -> slopes at the points, and from these the pieces of a cubic.
+"""Points of a table -> slopes at the points.
 
 C. de Boor, *A Practical Guide to Splines* (1978), chapter IV: the interpolating spline by its slopes, a tridiagonal
 system.  The monotone slopes are those of F. N. Fritsch and J. Butland, A method for constructing local monotone
@@ -10,17 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import algebra
+from . import algebra
 
 Array = np.ndarray
-
-#: Kind of a table -> what it is, for messages and documents.
-KINDS = {
-    "cubic": "a spline with continuous curvature, the ends not-a-knot",
-    "natural": "a spline with continuous curvature, none at the ends",
-    "periodic": "a spline with continuous curvature that repeats",
-    "monotone": "a cubic with continuous slope that never overshoots (PCHIP)",
-}
 
 
 def slopes(x: Array, y: Array, kind: str) -> Array:
@@ -32,7 +24,8 @@ def slopes(x: Array, y: Array, kind: str) -> Array:
         Strictly increasing.
     y : (n,) or (n, k) array
         Values; k tables at once, except for ``monotone``.
-    kind : one of :data:`KINDS`
+    kind : {'cubic', 'natural', 'periodic', 'monotone'}
+        Of a table; see :data:`~eomgen.model.fields.TABLES`.
 
     Returns
     -------
@@ -132,7 +125,7 @@ def cubic_piece(y0: Array, y1: Array, d0: Array, d1: Array, s: Array) -> Array:
 
 
 def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
-    """Coefficients (n + 1, 4) of :class:`~.user_functions.Curve` from values and slopes at the points."""
+    """Coefficients (n + 1, 4) of :class:`~eomgen.expr.user_functions.Curve` from values and slopes at the points."""
     h = np.diff(x)
     rise = np.diff(y) / h
     t = (s[:-1] + s[1:] - 2.0 * rise) / h
@@ -140,11 +133,3 @@ def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
     first = [0.0, 0.0, s[0] if linear else 0.0, y[0]]
     last = [0.0, 0.0, s[-1] if linear else 0.0, y[-1]]
     return np.concatenate([[first], inside, [last]])
-
-
-def surface_nodes(x: Array, y: Array, z: Array, kind: str) -> Array:
-    """Values and derivatives (n_x, n_y, 4) of a :class:`~.user_functions.Surface`: a tensor product spline."""
-    along_x = slopes(x, z, kind)
-    along_y = slopes(y, z.T, kind).T
-    both = slopes(y, along_x.T, kind).T
-    return np.stack([z, along_x, along_y, both], axis=-1)

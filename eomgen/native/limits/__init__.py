@@ -1,10 +1,14 @@
-"""Limits: the text of a C file -> definitions of the limits that it uses, as ``KIND_NAME``."""
+"""Limits that C alone takes, and those of the floor: the text of a C file -> definitions, as ``KIND_NAME``.
+
+``crossings`` of change points; ``systems``: linear systems of a method; ``contacts``: impulses of rigid ones.
+"""
 
 from __future__ import annotations
 
 import re
 
-from . import constraints, contacts, crossings, numbers, runs, systems
+from ...base.limits import constraints, numbers, runs
+from . import contacts, crossings, systems
 
 KINDS = {
     "ROUNDING": numbers,

@@ -1,13 +1,7 @@
-"""Limits: laws of contacts, and impulses of rigid ones."""
+"""Limits of laws of contacts: where they are written so that they stay finite, and how near to their law soil is."""
 
 from __future__ import annotations
 
-# -- contacts, where their laws are written so that they stay finite ---------------------------------------------------
-
-
-#: Part of the transition velocity that tanh(4 v / transition) / v is shifted by: its square, 1e-16, is lost beside 1 in
-#: the value, and the slope, whose cancelling terms have errors of 1e-16 / v^2, stays finite at rest.
-AT_REST = 1e-8
 #: Part of a profile's length over which neighbouring pieces share a circle: beside rounding, 1e-16 of the length, it is
 #: wide, so that their shares add up to 1 within 1e-8, and beside the lengths of pieces it is nothing.
 SHARED = 1e-8
@@ -17,9 +11,6 @@ CAUGHT_UP = 1e-5
 #: Squared sine of the angle of two rods below which they count as parallel: nearest points of skew rods lose
 #: 1e-16 / sine^2 of their place, which moves them along the rods, where the distance changes by the sine of that.
 PARALLEL = 1e-12
-#: Slip of a tyre that counts as none, and part of the velocity below which a wheel counts as locked: a brush adheres up
-#: to slips of 3 mu F_z / C, hundredths, beside which it is nothing, and its square, 1e-18, is a number.
-NO_SLIP = 1e-9
 #: Squared angle of two edges of a polygon below which a corner counts as flat: cosines near 1 have errors of 1e-16,
 #: so that the squares of smaller angles lose a thousandth.
 FLAT_CORNER = 1e-13
@@ -86,70 +77,3 @@ ASTRAY = 1e-2
 #: Least part of a distance straight down that the nearest ground of a height field is away: the cosine of its slope, of
 #: grounds of up to 60 degrees.
 STEEP = 0.5
-
-
-# -- rigid contacts, how well their impulses are found and what counts as resting --------------------------------------
-
-
-#: Residual of the contact laws, relative to the largest velocity of the contacts without impulses: rounding of W P and
-#: of the free velocities, 1e-16 times a condition of 1e6 that chains and redundant contacts bring about, is below.
-SOLVED = 1e-9
-ITERATIONS = 600  #: of one step: rounded laws take up to 200 in each of their rounds
-#: Parts of their own compliance by which contacts are softer in the rounds of Newton's method, by turns: errors shrink
-#: by about this part in a round, and rounding in impulses that nothing determines is 1e-16 over it.
-SOFTER = (1e-8, 1e-6)
-TRIED = 10  #: iterations of a round: states of contacts that change still are in a circle
-SWEEPS = 5  #: over all contacts, after a round that led nowhere
-#: From so many contacts up to WARM times as many sweeps come first: a sweep takes (m d)^2 operations, a step of
-#: Newton's method (m d)^3/3.
-MANY, WARM = 8, 20
-#: Part of its own compliance by which an edge of a cone is softer where edges are found one by one, as in SOFTER; edges
-#: whose part beside those that act is half of it depend on them.
-FIRM = 1e-8
-#: Friction below which the tolerance of an edge does not shrink with it: of a direction across that holds by so little,
-#: nothing is asked that rounding does not tell.
-SLIPPERY = 0.01
-PIVOTS = 3  #: times the edges: each comes and goes about once from a cold start, fewer from impulses of the last step
-#: Rounds in which what slides is renewed: errors shrink by the friction or so in each, to 1e-15 at 0.5. They grow first
-#: where another contact is about to slide, seldom over more than ten rounds, after which it leads nowhere.
-RENEWED, VAIN = 50, 12
-#: The same in Newton's method for rounded laws, whose impulses go on farther in each step; the part by which the
-#: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which
-#: laws count as sharp.
-SOFT, SHRINKS, SHARP = 1e-10, (0.2, 0.5, 0.8), 1e-14
-#: Roundings tried in vain, two iterations each, after which a smaller one is not reached: those that are reached take
-#: one or two.
-PATIENT = 8
-#: Approach below this multiple of what forces change in one step is rest, without a rebound: a body that rests
-#: approaches at once the change of a step.
-RESTING = 2.0
-#: Velocity, in those of the contacts, by which contacts are taken to part where they should not act at all: impulses of
-#: others move none so fast.
-APART = 4.0
-#: Part of a penetration that one step removes: an even part of it, so that pairs that share a body do not overshoot.
-REMOVED = 0.2
-#: Square of the compliance between two contacts, as a part of the product of their own, up to which it is rounding: the
-#: square of 1e-16 times a condition of 1e6, as above.
-LINKED = 1e-20
-YIELDING = 1e-3  #: part of its compliance by which a contact is softer where penetrations are removed: jams have an end
-GROWN = 1e-12  #: part of the energy that impacts move by which their sum may grow by rounding
-#: Halvings of one step until no shapes pass each other in its halves: speeds of 65,000 times what the step suits.
-HALVINGS = 16
-#: Halvings of the restitution of one instant until impacts with friction take energy and can be: below, it is 0.
-GENTLER = 4
-UNSOLVED = 1e-5  #: part of the velocities that a solution leaves where there is none
-#: A pivot of the inertia below this part of its own diagonal is no more than rounding, 1e-16 times a condition of 1e6
-#: as above: constraint rows then stand in for it.
-PIVOT = 1e-10
-#: A constraint row whose part beside the others is smaller than this holds nothing of its own: squares of it are the
-#: rounding, 1e-15, below which the pseudo-inverse of C M^-1 C^T leaves singular values out.
-DEPENDENT = 3e-8
-#: Times the tolerance to which impulses are found at first: they only say with which velocities forces act, and of an
-#: error in these no more than the change of forces within a step, a hundredth, comes back.
-ROUGH = 10.0
-#: Solutions of one step at most, until contacts do not feel the projection of velocities onto the constraints at its
-#: end: it shrinks by h times a speed of turning in each, 0.03 to 0.003, at an impact from the size of velocities on.
-#: Forces that change with velocities take two.
-ROUNDS = 12
-#: Newton steps at most that close loops at the end of a step, by the factors of its middle: errors shrink as above.
-CLOSINGS = 8

@@ -9,14 +9,13 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ...errors import AssemblyError
-from .. import algebra
-from ..algebra import Array, Indices
-from ..limits.analyses import BESIDE, NULL
-from ..limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, STATE, TIKHONOV
-from .projection import largest
+from ..errors import AssemblyError
+from . import algebra
+from .algebra import Array, Indices
+from .limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, STATE, TIKHONOV
+from .limits.positions import BESIDE, NULL
 from .ranks import rank
-from .scales import Position, Scales, settle
+from .scales import Position, Scales, largest, settle
 
 # -- starts ------------------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .numbers import SMALL_LOOP
+from ...base.limits.numbers import SMALL_LOOP
 
 #: A crossing is looked for where the weakest pivot is smaller; accelerations, known to V^2 EXACT / pivot^3, keep 1e-11
 #: there. NEAR_SQUARE: the same of squares of sines between columns.

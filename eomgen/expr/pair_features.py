@@ -1,7 +1,7 @@
-"""Two convex polygons in the plane -> the edges and corners that matter to their contact.
+"""Two polygons, or an outline and a point, in the plane -> the edges, corners and pieces that matter to their contact.
 
-The law of a pair of polygons reads these few numbers (:mod:`~eomgen.contact.polygons` says why these), so that
-its text is the same for any number of corners.  They are found here by loops, and in C by those of
+The law of a pair reads the few numbers of these (:mod:`~eomgen.contact.polygons` says why those of edges), so that its
+text is the same for any number of corners or pieces.  They are found here by loops, and in C by those of
 ``templates/c/pairs_shapes.c.j2``.
 """
 
@@ -23,7 +23,15 @@ OWN = FACING + 10
 #: The same of the second, without the last two, and how far its corners are from its marker.
 OTHER = FACING + 9
 
+#: Numbers of a piece: its origin and the direction of its x axis, half of its chord, its curvature.
+PIECE = 6
+#: Numbers that the law reads: those of a piece, whether its first corner is nearest, whether its law counts.
+CHOSEN = PIECE + 2
+
 Law = Callable[[Sequence[Any]], Sequence[Any]]
+
+
+# -- edges and corners of polygons -------------------------------------------------------------------------------------
 
 
 class _Choice(NamedTuple):
@@ -58,7 +66,7 @@ def facing(law: Law, corners: tuple[int, int], rates: bool = False) -> Law:
         for start in range(0, len(numbers), half):
             given = numbers[start : start + half]
             first, second = _array(given[:middle]), _array(given[middle:end])
-            choice = choice or _choose(first, second, corners)
+            choice = choice or _choose_edges(first, second, corners)
             found += [*_kept(first, choice, 0, start > 0), *_kept(second, choice, 1, start > 0), *given[end:]]
         return law(found)
 
@@ -83,7 +91,7 @@ def _overlaps(normals: np.ndarray, starts: np.ndarray, corners: np.ndarray) -> t
     return depths.max(axis=1), depths.argmax(axis=1)
 
 
-def _choose(first: np.ndarray, second: np.ndarray, corners: tuple[int, int]) -> _Choice:
+def _choose_edges(first: np.ndarray, second: np.ndarray, corners: tuple[int, int]) -> _Choice:
     """Which edges face each other, and which corners are deepest."""
     a, b = np.asarray(first[:POSE], dtype=float), np.asarray(second[:POSE], dtype=float)
     R, S = a[3:12].reshape(3, 3, *a.shape[1:]), b[3:12].reshape(3, 3, *b.shape[1:])
@@ -144,3 +152,65 @@ def _kept(shape: np.ndarray, choice: _Choice, which: int, rates: bool) -> list[A
         reach = sizes[:, 0] * sizes[:, 0] + sizes[:, 1] * sizes[:, 1]
         found.append(np.zeros(edge.shape) if rates else np.sqrt(np.asarray(reach, dtype=float).max(axis=0)))
     return [*shape[:POSE], *found]
+
+
+# -- pieces of outlines ------------------------------------------------------------------------------------------------
+
+
+def nearest(law: Law, count: int, rates: bool = False) -> Law:
+    """The law of an outline of so many pieces with another shape, from that of the numbers of its nearest piece.
+
+    It counts where the centre of the other shape is deeper inside than the last size of the outline.  So what is apart
+    does not meet there first: the function is marked as ``inner`` for those who look for that.
+
+    Parameters
+    ----------
+    law : callable
+        Of the numbers of the piece, of the second shape, and all else.
+    count : int
+    rates : bool, optional
+        Whether the rates of all these numbers follow them.
+    """
+    end = POSE + PIECE * count + 1
+
+    def chosen(numbers: Sequence[Any]) -> Sequence[Any]:
+        half = len(numbers) // 2 if rates else len(numbers)
+        found: list[Any] = []
+        choice: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        for start in range(0, len(numbers), half):
+            given = numbers[start : start + half]
+            shape = np.stack(np.broadcast_arrays(*given[:end], given[end])[:-1])
+            choice = choice or _nearest_piece(np.asarray(shape, dtype=float), given[end : end + 3], count)
+            piece, *flags = choice
+            kept = _at(shape[POSE:-1].reshape(count, PIECE, *shape.shape[1:]), piece)
+            found += [*shape[:POSE], *kept, *(np.where(flag, float(not start), 0.0) for flag in flags), *given[end:]]
+        return law(found)
+
+    chosen.inner = True  # type: ignore[attr-defined]
+    return chosen
+
+
+def _nearest_piece(shape: np.ndarray, place: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The piece that is nearest to a point, whether its first corner is, and whether the point is deep inside."""
+    R = shape[3:12].reshape(3, 3, *shape.shape[1:])
+    reach = np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in place), shape[0])[:3]) - shape[:3]
+    x, y = ((R[:, i] * reach).sum(axis=0) for i in range(2))
+    px, py, c, s, half, bend = shape[POSE:-1].reshape(count, PIECE, *shape.shape[1:]).swapaxes(0, 1)
+    sine = bend * half
+    cosine = np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
+    rise = half * sine / (1.0 + cosine)
+    u, v = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)
+    over = (v - rise) * sine
+    beside = np.minimum((half + u) * cosine, (half - u) * cosine) - over
+    gap = (2.0 * v - bend * (u * u + v * v)) / (1.0 + np.hypot(bend * u, 1.0 - bend * v))
+    feet = np.where(beside >= 0.0, np.abs(gap), np.inf)
+    wx, wy = c * (u + half) - s * (v - rise), s * (u + half) + c * (v - rise)  # from the first corner
+    corners = np.hypot(wx, wy)
+    nx, ny = c * sine - s * cosine, s * sine + c * cosine  # normals at both ends
+    mx, my = -c * sine - s * cosine, c * cosine - s * sine
+    side = wx * (nx + np.roll(mx, 1, axis=0)) + wy * (ny + np.roll(my, 1, axis=0))
+    foot, corner = feet.argmin(axis=0), corners.argmin(axis=0)
+    at_corner = _at(corners, corner) < _at(feet, foot)
+    outside = np.where(at_corner, _at(side, corner), _at(gap, foot))
+    distance = np.minimum(_at(corners, corner), _at(feet, foot))
+    return np.where(at_corner, corner, foot), at_corner, (outside < 0.0) & (distance > shape[-1])

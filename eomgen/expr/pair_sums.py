@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
+from ..base.kernel_table import RECORD, WITNESS
+from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 
 # -- vectors of many shapes --------------------------------------------------------------------------------------------
 
@@ -66,11 +67,6 @@ REST = 2
 MOTION = 6
 #: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
 MEETING = 5
-#: Numbers that say where two shapes are near each other: normal, penetration, point, direction out of the plane of
-#: shapes in the plane (0 in space), coefficient of friction, restitution.
-WITNESS = 12
-#: The same in a list, behind the numbers of both shapes.
-RECORD = 2 + WITNESS
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 COLUMNS = 2  #: distances count beside columns
 NEVER = 1e300  #: (s) where no shapes come towards each other

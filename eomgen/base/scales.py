@@ -1,4 +1,4 @@
-"""Units of coordinates and constraint rows -> scales without dimension, steps in v, unit Euler parameters."""
+"""Units of coordinates and constraint rows -> scales without dimension, steps in v, Euler parameters, projections."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import AssemblyError
-from ..algebra import Array, Indices
-from ..limits.numbers import ROUNDED, UNIT
+from ..errors import AssemblyError
+from . import algebra
+from .algebra import Array, Indices
+from .limits.constraints import TIKHONOV, UNMOVED
+from .limits.numbers import ROUNDED, UNIT
 
 # -- coordinates and velocities ----------------------------------------------------------------------------------------
 
@@ -160,8 +162,6 @@ def _relative(f: Array, e: Array) -> Array:
 # -- scales ------------------------------------------------------------------------------------------------------------
 
 
-__all__ = ["Position", "Scales", "Space"]
-
 #: q (n_q,) -> C (h,) of the holonomic rows, C_q (m, n) of all rows, the holonomic ones first
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
@@ -257,3 +257,43 @@ class Scales(NamedTuple):
         found = [int(space.plain_v[np.searchsorted(space.plain_q, k)]) for k in chosen if k in space.plain_q]
         found += [k for i, j in space.quaternion_slots if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
         return np.array(found, dtype=np.intp)
+
+
+# -- the least changes that give constraint rows what they ask for -----------------------------------------------------
+
+
+def largest(values: Array) -> float:
+    """The largest magnitude, 0.0 of nothing, NaN if one is NaN."""
+    return float(np.abs(values).max()) if values.size else 0.0
+
+
+def least(J: Array, y: Array) -> Array:
+    """The least x, (n,) or (n, k), with J x = y.
+
+    Parameters
+    ----------
+    J : (m, n) array
+        Scaled Jacobian; redundant rows allowed, with y to match.  Rows that are all zero to rounding, as where
+        parameters alone decide whether a loop closes, ask for nothing.
+    y : (m,) or (m, k) array
+
+    Raises
+    ------
+    NonFiniteError
+    """
+    if not largest(J) > UNMOVED and np.isfinite(J).all():
+        return np.zeros((J.shape[1], *y.shape[1:]))
+    return algebra.lstsq(J, y, rcond=TIKHONOV**0.5)
+
+
+def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
+    """The smallest scaled x (n, k) with C_q x = y (m, k); y must be consistent, as rates of redundant rows are."""
+    return np.asarray(scales.q[:, None] * least(scales.jacobian(C_q), y / scales.c[: len(y), None]))
+
+
+def tangent_projector(C_q: Array, scales: Scales) -> Array:
+    """``P = I - S^2 C_q^T (C_q S^2 C_q^T)^+ C_q`` (n, n).
+
+    The derivative, at a point of the manifold, of the projected q by q and of the projected v by v.
+    """
+    return np.asarray(np.eye(len(scales.q)) - minimum_norm(C_q, C_q, scales))

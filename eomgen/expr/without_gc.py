@@ -43,7 +43,9 @@ def without_gc() -> Iterator[None]:
 
 @contextmanager
 def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Note how long a stage takes (s)."""
+    """Note how long a stage takes (s), whatever it leads to."""
     start = perf_counter()
-    yield
-    seconds[stage] = perf_counter() - start
+    try:
+        yield
+    finally:
+        seconds[stage] = perf_counter() - start

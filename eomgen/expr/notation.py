@@ -12,14 +12,12 @@ from copy import copy
 from functools import cache
 from typing import Any
 
+from ..base.texts import visible
 from .latex import (
     DOTS,
     GREEK,
     Accent,
-    Group,
     Node,
-    NotationError,
-    Scripts,
     head_of,
     html_form,
     mathml_form,
@@ -28,7 +26,6 @@ from .latex import (
     spaced,
     text_form,
 )
-from .texts import visible
 
 # -- from a name to LaTeX ----------------------------------------------------------------------------------------------
 
@@ -349,56 +346,6 @@ def raised(latex: str, exponent: str) -> str:
     return f"{{{latex}}}^{exponent}" if re.search("['^]", latex) else f"{latex}^{exponent}"
 
 
-def with_instance(latex: str, instance: str) -> str:
-    r"""LaTeX with the name of an instance as a further subscript: ``m_{c}`` -> ``m_{c,\mathrm{leg1}}``.
-
-    What is not the LaTeX of a symbol stays as it is.
-    """
-    latex = spaced(latex)
-    try:
-        tree = read_latex(latex)
-    except NotationError:  # told when the model is checked
-        return latex
-    while isinstance(tree, Group) and len(tree.parts) > 1:
-        head = head_of(tree) or tree.parts[0]
-        tree = next(part for part in tree.parts if part.end >= head.end)
-    word = literal(instance)
-    if not isinstance(tree, Scripts):
-        return f"{latex[: tree.end]}_{{{word}}}{latex[tree.end :]}"
-    if tree.sub is None:
-        return f"{latex[: tree.base.end]}_{{{word}}}{latex[tree.base.end :]}"
-    start, end = tree.sub.start, tree.sub.end
-    sub = f"{latex[start:end]},{word}"
-    braced = latex[start - 1] == "{"
-    return f"{latex[:start]}{sub if braced else f'{{{sub}}}'}{latex[end:]}"
-
-
 @cache
 def _printed(form: str, latex: str) -> str:
     return latex if form == "latex" else _FORMS[form](read_latex(latex))
-
-
-# -- axes of plots -----------------------------------------------------------------------------------------------------
-
-
-TIME = "$t$ (s)"
-
-
-def label(printed: str, unit: str) -> str:
-    """A name as it is printed with its unit, or either alone; no dollar of the unit begins a formula."""
-    unit = visible(unit, lines=False).replace("$", r"\$")
-    return f"{printed} ({unit})" if printed and unit else printed or unit
-
-
-def chains(names: Iterable[str]) -> dict[str, list[str]]:
-    """The rates that are inputs too, by the name of each input that has some, in order: first, second, ..."""
-    known = list(names)
-    orders: dict[str, dict[int, str]] = {}
-    for name in known:
-        stem, order = split_rate(name)
-        orders.setdefault(stem, {})[order] = name
-    return {
-        by_order[k]: [by_order[j] for j in sorted(by_order) if j > k]
-        for by_order in orders.values()
-        for k in sorted(by_order)[:-1]
-    }
