@@ -64,7 +64,7 @@ precision highp float; uniform vec4 color; out vec4 seen; void main() { seen = c
 
 class Picture {
   constructor(data, numbers, canvas, over) {
-    const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
     Object.assign(this, { data, numbers, canvas, gl, pen: over.getContext("2d"), low: data.low, high: data.high });
     if (!gl) return;
     this.programs = [MESH, LINE].map((texts) => this.program(texts));
