@@ -9,7 +9,7 @@ from itertools import pairwise
 from ..base.operations import CONDITION, operations_with
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import jacobian
-from ..mechanics.motion import Matrix, combined, eliminate, total
+from ..expr.tensors import Matrix, combined, eliminate, total
 from ..native.limits.systems import FIXED
 
 #: Most pieces of one law: what is written out grows with them.

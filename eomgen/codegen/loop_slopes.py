@@ -18,8 +18,8 @@ from ..base.limits.constraints import TIKHONOV
 from ..expr.core import Expr, reachable, substitute
 from ..expr.differentiate import jacobian, jvp
 from ..expr.pairs import list_operands
+from ..expr.tensors import dot, total
 from ..mechanics.methods.recursions import ConstraintRow
-from ..mechanics.motion import dot, total
 from .linear_algebra import times
 from .loop_systems import BodyLoops
 from .program import Block, Port

@@ -21,13 +21,14 @@ from ..expr.core import Expr, common_graph, operands, reachable, substitute, sym
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
+from ..expr.tensors import Matrix, combined, dot, eliminate, total
 from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import ConstraintFunctions
 from ..mechanics.kinematics import ForceTerms
 from ..mechanics.methods import METHODS
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
-from ..mechanics.motion import Matrix, combined, dot, eliminate, entries_of, force_and_moment, total, with_entries
+from ..mechanics.motion import entries_of, force_and_moment, with_entries
 from ..mechanics.sparse_rows import SparseRows
 from ..mechanics.switched import SwitchedRow, switched_rows
 from ..mechanics.wrenches import JointWrenches, Row6, carried_reactions

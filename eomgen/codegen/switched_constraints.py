@@ -13,8 +13,8 @@ from ..base.limits.constraints import MEASURED
 from ..base.limits.numbers import SINGULAR
 from ..elements.forces.force import where
 from ..expr.core import Expr, substitute
+from ..expr.tensors import Matrix, combined, dot, total
 from ..mechanics import Kinematics
-from ..mechanics.motion import Matrix, combined, dot, total
 from ..mechanics.switched import SwitchedRow
 from ..model.mechanism import Event
 

@@ -8,7 +8,46 @@ from . import vectors as vec
 from .core import Expr
 from .vectors import Mat3, Vec3
 
-# -- symmetric systems -------------------------------------------------------------------------------------------------
+# -- rows and systems ---------------------------------------------------------------------------------------------------
+
+
+Matrix = list[list[Expr]]
+
+
+def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    """The product of two rows that are not empty."""
+    return combined(a[0].graph.zero, a, b)
+
+
+def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:
+    """A value with multiples of others."""
+    for k, x in zip(factors, values, strict=True):
+        base = base + k * x
+    return base
+
+
+def total(terms: Sequence[Expr]) -> Expr:
+    """The sum of terms, of which there is one at least."""
+    found = terms[0]
+    for term in terms[1:]:
+        found = found + term
+    return found
+
+
+def eliminate(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
+    """x with A x = right, without exchange of rows: A is positive definite, or I less a contraction."""
+    A, x, n = [list(row) for row in matrix], list(right), len(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            if A[i][k].is_zero:
+                continue
+            ratio = A[i][k] / A[k][k]
+            for j in range(k + 1, n):
+                A[i][j] = A[i][j] - ratio * A[k][j]
+            x[i] = x[i] - ratio * x[k]
+    for k in reversed(range(n)):
+        x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))]) / A[k][k]
+    return x
 
 
 def solve_symmetric(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:

@@ -8,6 +8,7 @@ from .core import Expr, Graph
 
 Vec3 = tuple[Expr, Expr, Expr]
 Mat3 = tuple[Vec3, Vec3, Vec3]  # rows
+Rows = tuple[tuple[Expr, ...], ...]  # of a matrix of any size
 
 
 def vector(graph: Graph, values: Sequence[Expr | float]) -> Vec3:

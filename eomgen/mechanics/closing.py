@@ -11,12 +11,12 @@ from ..expr.core import Expr, Graph, substitute
 from ..expr.differentiate import jacobian, jvp
 from ..expr.records import dataclass
 from ..expr.schedule import count
+from ..expr.spatial import add
 from ..expr.tensors import skew
 from ..expr.vectors import Mat3, Vec3
 from ..model.mechanism import JointSpec
-from .kinematics import Kinematics
-from .link_frames import JointRates, joint_rates
-from .tree import Turns
+from .kinematics import Kinematics, joint_rates
+from .tree import JointRates, Turns
 
 # -- rows of C_q -------------------------------------------------------------------------------------------------------
 
@@ -126,16 +126,8 @@ def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
         tuple(zero if x.is_zero else other for x, other in zip(row, found.get(label, row), strict=True))
         for label, row in zip(c.labels, c.jacobian, strict=True)
     )
-    shorter = _operations([*c.values, *_flat(rows)]) < SHORTER * _operations([*c.values, *_flat(c.jacobian)])
-    return rows if shorter else c.jacobian
-
-
-def _flat(rows: Sequence[Sequence[Expr]]) -> list[Expr]:
-    return [x for row in rows for x in row]
-
-
-def _operations(outputs: Sequence[Expr]) -> int:
-    return count(outputs).total
+    new, old = (count([*c.values, *(x for row in some for x in row)]).total for some in (rows, c.jacobian))
+    return rows if new < SHORTER * old else c.jacobian
 
 
 def twist_rows(kinematics: Kinematics, cut: int) -> dict[str, tuple[Expr, ...]]:
@@ -238,15 +230,9 @@ def _end(kinematics: Kinematics, rates: Sequence[JointRates], marker: Marker, sp
     base = poses.common(spec.predecessor, spec.successor)
     chain = poses.ancestors(poses.link_of[marker.body])
     spin = velocity = spin_rate = acceleration = vec.zero(graph)
-    two = graph.constant(2.0)
     for k in graph.marked(reversed(chain[: chain.index(base)])):
         link, rate = poses.links[k], rates[k]
-        # as the equations of motion have it: below is omega_p x r + 2 r'
-        below = vec.add(vec.cross(spin, link.position), vec.scale(two, rate.slide))
-        product = link.down(vec.add(vec.cross(spin, below), rate.slide_rate))
-        turned = vec.add(rate.spin_rate, vec.cross(link.down(spin), rate.spin))
-        carried = link.down_twist((spin_rate, acceleration))
-        spin_rate, acceleration = vec.add(carried[0], turned), vec.add(carried[1], product)
+        spin_rate, acceleration = add(link.down_twist((spin_rate, acceleration)), rate.product(link, spin))
         spin, velocity = link.down_twist((spin, velocity))
         for c, (angular, linear) in enumerate(link.columns):
             speed = kinematics.v[link.first + c]

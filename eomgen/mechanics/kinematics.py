@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
@@ -11,12 +11,15 @@ from ..elements.forces import CoordinateLoad, Force, JointCoordinate, Load, Mark
 from ..elements.frames import Marker
 from ..elements.joints import QuaternionSlot
 from ..errors import ModelError
+from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jvp
 from ..expr.records import dataclass
 from ..expr.spatial import Twist
+from ..expr.vectors import Vec3
 from ..model.equations import clock
 from ..model.mechanism import Mechanism
+from .link_frames import AxisTurns
 from .loops import (
     Constraints,
     close_loop,
@@ -29,7 +32,7 @@ from .loops import (
 )
 from .motion import MarkerMotion, entries_of, with_entries
 from .topology import MotionSymbols, Topology, find_topology, lay_out, length_scale
-from .tree import Link, Poses, build_links, link_twists
+from .tree import JointRates, Link, Poses, build_links, link_twists
 
 
 @dataclass(frozen=True)
@@ -191,7 +194,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     t = graph.symbol("t")
     rates = layout.rates(graph, q, v)
     state = MotionSymbols(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
-    links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
+    symbols = dict(zip(names, q, strict=True))
+    links = build_links(mechanism, topology, symbols, AxisTurns(mechanism, topology, symbols).turned)
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
     rows = own_rows(mechanism)
@@ -308,49 +312,83 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
     ------
     ModelError
     """
-    problems = find_undefined(mechanism, motion)
+    found: list[tuple[str, str, str]] = []  # place, message, remedy
+    between = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+    until = "turn the markers (rpy) until z is the axis of the joint between them, or"
+
+    def find_wrapping(place: str, names: Collection[str]) -> None:
+        remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+        for name in names:
+            message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+            found.append((place, message, remedy))
+
     for force in mechanism.forces:
-        used = symbols_of(_expressions(force))
+        place, used = f"forces.{force.name}", _names_in(force)
         path = getattr(force, "path", None)
         if isinstance(path, Turn) and not path.is_exact(motion):
-            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
-            remedy = "turn the markers (rpy) until z is the axis of the joint between them, or give joint="
-            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+            found.append((place, between, f"{until} give joint="))
         for name in sorted(used & mechanism.quantities.keys()):
             if motion.may_wrap(mechanism.quantities[name]):
                 message = f"the z axes of the two markers of {name} do not stay in line, so the angle is not defined"
-                remedy = "turn the markers (rpy) until z is the axis of the joint between them, or use a coordinate"
-                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+                found.append((place, message, f"{until} use a coordinate"))
         if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)
-        for name in wrapping:
-            if name in used:
-                message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
-                remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
-                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNDEFINED"))
+        find_wrapping(place, [name for name in wrapping if name in used])
     for constraint in mechanism.constraints:
+        place = f"constraints.{constraint.name}"
         if not constraint.is_defined(motion):
-            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
             remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
-            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
-        for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
-            message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
-            remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
-            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy, "EG-UNDEFINED"))
+            found.append((place, between, remedy))
+        find_wrapping(place, sorted(set(wrapping) & _names_in(constraint)))
+    problems = [*find_undefined(mechanism, motion), *(mechanism.problem(*one, "EG-UNDEFINED") for one in found)]
     if problems:
         raise ModelError(problems)
 
 
-def _expressions(value: object) -> list[Expr]:
-    """All expressions in a force element."""
-    if isinstance(value, Expr):
-        return [value]
-    if isinstance(value, tuple):
-        return [e for item in value for e in _expressions(item)]
-    if is_dataclass(value):
-        return [e for item in fields(value) for e in _expressions(getattr(value, item.name))]
-    return []
+def parts_of(element: object) -> Iterator[Expr | Marker]:
+    """All expressions and markers in an element."""
+    if isinstance(element, Expr | Marker):
+        yield element
+    elif isinstance(element, tuple) or is_dataclass(element):
+        inner = element if isinstance(element, tuple) else [getattr(element, item.name) for item in fields(element)]
+        for part in inner:
+            yield from parts_of(part)
+
+
+def _names_in(element: object) -> set[str]:
+    return symbols_of([part for part in parts_of(element) if isinstance(part, Expr)])
 
 
 def _coordinate_symbols(motion: MarkerMotion) -> list[tuple[str, Expr]]:
     return [(name, triple[0]) for name, triple in motion.coordinates.items()]
+
+
+# -- joint rates -------------------------------------------------------------------------------------------------------
+
+
+def joint_rates(kinematics: Kinematics) -> list[JointRates]:
+    """The rates of every link, in tree order."""
+    graph, links, v = kinematics.graph, kinematics.links, kinematics.v
+    along: Mapping[Expr, Expr] = kinematics.flow | kinematics.clock
+    columns = [x for link in links for angular, _ in link.columns for x in angular]
+    flows = jvp([*columns, *(x for link in links for x in link.position)], along)
+    slides = flows[len(columns) :]
+    slide_rates = jvp(slides, along)
+    result = []
+    at = 0
+    for k, link in graph.marked(enumerate(links)):
+        spin = spin_rate = vec.zero(graph)
+        for c, (angular, _) in enumerate(link.columns):
+            rate = v[link.first + c]
+            spin = vec.add(spin, vec.scale(rate, angular))
+            spin_rate = vec.add(spin_rate, vec.scale(rate, vec.three(flows, at)))
+            at += 3
+        result.append(JointRates(spin, spin_rate, vec.three(slides, 3 * k), vec.three(slide_rates, 3 * k)))
+    return result
+
+
+def slide_accelerations(kinematics: Kinematics, rates: Sequence[JointRates], a: Sequence[Expr]) -> list[Vec3]:
+    """What accelerations ``a`` add to ``slide_rate``: the slide is linear in the velocities."""
+    slides = [x for r in rates for x in r.slide]
+    pushes = jvp(slides, dict(zip(kinematics.v, a, strict=True)))
+    return [vec.three(pushes, 3 * k) for k in range(len(rates))]

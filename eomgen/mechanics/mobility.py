@@ -14,7 +14,7 @@ from ..base.names import hint, joined
 from ..base.ranks import rank
 from ..elements.constraints import Driver, RollingDisc
 from ..elements.constraints.rolling import LYING
-from ..errors import TO_BE_FINITE, AssemblyError, ModelError
+from ..errors import TO_BE_FINITE, AssemblyError, ModelError, Problem
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
@@ -409,9 +409,7 @@ class Mobility:
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
     n_positions: int = 0
     instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
-    candidates: tuple[
-        tuple[str, float], ...
-    ] = ()  #: coordinates that can be independent there, with their conditioning
+    candidates: tuple[tuple[str, float], ...] = ()  #: coordinates that can be independent there; conditioning
     driven: bool = False  #: whether a constraint depends on time
     places: tuple[str, ...] = ()  #: coordinates named as independent, where their rates are given
 
@@ -485,32 +483,25 @@ def _check_places(functions: ConstraintFunctions, q: Array, places: Sequence[str
     """Refuse coordinates of given rates that cannot be independent of each other."""
     if not places:
         return
-    mechanism, names, J = functions.kinematics.mechanism, functions.kinematics.names, functions.place_jacobian(q)
+    kinematics, names, J = functions.kinematics, functions.kinematics.names, functions.place_jacobian(q)
     rank, held = SparseRows(J).rank, np.eye(len(names))[[names.index(name) for name in places]]
     if len(places) > (n := len(names) - rank) or len({*places}) < len(places):
         message = f"{', '.join(places)}: the positions have {n} degree{'s' * (n != 1)} of freedom"
-        raise ModelError(
-            [
-                mechanism.problem(
-                    "independent", message, f"choose {n} different ones of {', '.join(names)}", "EG-PARTITION"
-                )
-            ]
-        )
+        raise ModelError([_choice(kinematics, message, f"choose {n} different ones of {', '.join(names)}")])
     if SparseRows(np.vstack([J, held])).rank < rank + len(places):
         message = f"{', '.join(places)} cannot vary independently of each other at the initial configuration"
-        raise ModelError(
-            [mechanism.problem("independent", message, f"choose others of {', '.join(names)}", "EG-PARTITION")]
-        )
+        raise ModelError([_choice(kinematics, message, f"choose others of {', '.join(names)}")])
+
+
+def _choice(kinematics: Kinematics, message: str, remedy: str, code: str = "EG-PARTITION") -> Problem:
+    """The fault of a choice of independent coordinates."""
+    return kinematics.mechanism.problem("independent", message, remedy, code)
 
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
     if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
-        problems.append(
-            kinematics.mechanism.problem(
-                "independent", f"{', '.join(twice)}: named twice", "name it once", "EG-PARTITION"
-            )
-        )
+        problems.append(_choice(kinematics, f"{', '.join(twice)}: named twice", "name it once"))
     coordinates = kinematics.names if kinematics.given_rates else kinematics.loop_coordinates.names
     known = (*dict.fromkeys((*kinematics.velocity_labels, *coordinates)),)
     for name in wanted:
@@ -519,18 +510,13 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
-            problems.append(kinematics.mechanism.problem("independent", message, remedy, "EG-PARTITION"))
-            continue
-        if name in known:
+            problems.append(_choice(kinematics, message, remedy))
+        elif name in known:
             message = f"{name!r} follows from the other chosen coordinates, which belong to the same loop"
-            problems.append(
-                kinematics.mechanism.problem(
-                    "independent", message, "choose fewer coordinates of one loop", "EG-PARTITION"
-                )
-            )
+            problems.append(_choice(kinematics, message, "choose fewer coordinates of one loop"))
         else:
             what, remedy = f"no coordinate {name!r}", joined(hint(name, known), f"allowed: {', '.join(known)}", by=" ")
-            problems.append(kinematics.mechanism.problem("independent", what, remedy, "EG-NAME-UNKNOWN"))
+            problems.append(_choice(kinematics, what, remedy, "EG-NAME-UNKNOWN"))
     if problems:
         raise ModelError(problems)
 
@@ -596,13 +582,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
         message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
-        raise ModelError(
-            [
-                kinematics.mechanism.problem(
-                    "independent", message, f"choose {n_dof} of {', '.join(names)}", "EG-PARTITION"
-                )
-            ]
-        )
+        raise ModelError([_choice(kinematics, message, f"choose {n_dof} of {', '.join(names)}")])
     chosen = _choose(kinematics, judged, r, wanted)
     quality = judged[0].conditioning(chosen)
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
@@ -611,9 +591,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         means = "move the mechanism on their own" if len(wanted) == n_dof else "vary independently of each other"
         message = f"{', '.join(wanted)} cannot {means} at the initial configuration"
         better = [names[j] for j in choose_independent(judged, r)]
-        raise ModelError(
-            [kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can", "EG-PARTITION")]
-        )
+        raise ModelError([_choice(kinematics, message, f"{', '.join(better)} can")])
     rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
     kept = tuple(int(i) for i in rows)
     return Mobility(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ from ..expr.core import Expr, reachable, symbols_of
 from ..expr.identity import vanishes
 from ..expr.records import dataclass
 from .constraint_functions import Array, ConstraintFunctions
-from .kinematics import Kinematics
+from .kinematics import Kinematics, parts_of
 from .mobility import Mobility, initial_values
 
 if TYPE_CHECKING:
@@ -500,24 +500,16 @@ def _touched(kinematics: Kinematics, element: object) -> list[int]:
     found: set[int] = set()
     moves = {n: (j.predecessor.body, j.successor.body) for j in m.joints for n in (*j.coordinates, *j.velocities)}
 
-    def visit(value: object) -> None:
-        if isinstance(value, Marker):
-            found.add(value.body)
-        elif isinstance(value, Expr):
-            for name in symbols_of([value]):
-                if name in moves:
-                    found.update(moves[name][1:])
-                elif name in m.quantities:
-                    seen = m.quantities[name]
-                    found.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
-        elif isinstance(value, tuple):
-            for item in value:
-                visit(item)
-        elif is_dataclass(value):
-            for item in fields(value):
-                visit(getattr(value, item.name))
-
-    visit(element)
+    for part in parts_of(element):
+        if isinstance(part, Marker):
+            found.add(part.body)
+            continue
+        for name in symbols_of([part]):
+            if name in moves:
+                found.update(moves[name][1:])
+            elif name in m.quantities:
+                seen = m.quantities[name]
+                found.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
     return sorted(found)
 
 

@@ -16,9 +16,8 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
-from ..expr.tensors import solve_symmetric
+from ..expr.tensors import dot, solve_symmetric
 from ..mechanics.methods.reduction import eliminate
-from ..mechanics.motion import dot
 from .methods import put_in
 from .quantities import Quantities, Row, Rows
 

@@ -115,21 +115,19 @@ class Graph:
         tree = {branch["joint"] for branch in self.report.tree}
         for joint in sorted(self.report.joints, key=lambda joint: joint["name"] not in tree):
             in_tree, there = joint["name"] in tree, np.vstack(self.drawn)
-            ways = list(self._ways(*joint["bodies"], (0.0,) if in_tree else BENDS))
+            ways = list(self._ways(joint["bodies"], (0.0,) if in_tree else BENDS))
             line = min(ways, key=partial(self._covered, there)) if ways[1:] else ways[0]
             color = TREE if in_tree else CUT
             self.ax.plot(*line.T, color=color, linewidth=1.6, linestyle="-" if in_tree else (0, (4, 3)), zorder=1)
             self.drawn.append(dots(self.typed(line)))
             self.named.append((line[len(line) // 2], f"{joint['name']}\n{joint['type']}", color))
 
-    def _ways(self, start: str, end: str, bends: Sequence[float]) -> Iterator[Array]:
+    def _ways(self, ends: Sequence[str], bends: Sequence[float]) -> Iterator[Array]:
         """Lines (n, 2) between two bodies, each a parabola that is bent by a part of its length."""
         s = np.linspace(0.0, 1.0, 21)[:, None]
         for bend in bends:
-            one, other = (
-                np.array(self.bodies.get(body, self._below(next_, bend)))
-                for body, next_ in ((start, end), (end, start))
-            )
+            pairs = (ends, ends[::-1])
+            one, other = (np.array(self.bodies.get(body, self._below(beside, bend))) for body, beside in pairs)
             run = other - one
             control = (one + other) / 2 + bend * np.array([run[1], -run[0]])
             yield (1 - s) ** 2 * one + 2 * s * (1 - s) * control + s**2 * other
@@ -149,7 +147,7 @@ class Graph:
         for element in self.report.elements:
             ends = np.array([self.bodies[body] for body in element["bodies"] if body in self.bodies] or self.ends)
             middle = self.typed(ends.mean(axis=0))
-            (offset,) = places(middle, ["  "], self.font, np.vstack(self.drawn), *self.typed(self.corners))
+            (offset,) = places([*middle], ["  "], self.font, np.vstack(self.drawn), *self.typed(self.corners))
             at = self.ax.transData.inverted().transform((middle[0] + offset) * self.ax.figure.dpi / 72.0)
             for end in ends:
                 self.ax.plot(*zip(at, end, strict=True), color=ELEMENT, linestyle=":", linewidth=1.3, zorder=1)

@@ -21,18 +21,16 @@ from ...expr.differentiate import jacobian, jvp
 from ...expr.schedule import count
 from ...expr.spatial import Twist, Wrench, add, dot
 from ...expr.tensors import add_matrices, rotate
-from ...expr.vectors import Mat3, Vec3
+from ...expr.vectors import Mat3, Rows, Vec3
 from .. import Kinematics, Link
+from ..kinematics import joint_rates, slide_accelerations
 from ..link_frames import (
     Resolved,
-    Rows,
     SlidingTriple,
     Turned,
     falling,
-    joint_rates,
     regroup,
     resolve_parallel,
-    slide_accelerations,
     turn_forces,
     turn_links,
 )
@@ -62,8 +60,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         if _cost(*other) < _cost(mass, bias):
             chosen, inertias, (mass, bias) = common, turned_inertias, other
             inverse = _sweep(kinematics, chosen, inertias, a)
-    own_axes, blocks = turn_links(kinematics)
-    resolved = chosen.with_columns(own_axes.links)
+    own_axes, blocks = turn_links(kinematics.links, kinematics.mechanism.gravity)
+    resolved = chosen.with_columns(own_axes)
     turned = partial(_turned_system, kinematics, resolved, inertias, rest, blocks)
     return TreeEquations(
         method="embedding",

@@ -14,15 +14,15 @@ from ...expr.core import Expr, substitute
 from ...expr.differentiate import hessian, jacobian, jvp
 from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
+from ...expr.tensors import combined
+from ...expr.vectors import Rows
 from ...model.mechanism import JointSpec
 from .. import Kinematics
+from ..closing import pose_symbols, put_pose
 from ..constraint_functions import Units
-from ..motion import combined
 from ..wrenches import applied_wrenches, coordinate_forces, drive_inertias, kinetic_energy, potential_energy
 from .recursions import along_joints
 from .tree_equations import LinearSystem, TreeEquations, linear_system
-
-Rows = tuple[tuple[Expr, ...], ...]
 
 
 def seen_from(frame: Frame, twist: Twist) -> Twist:
@@ -214,22 +214,16 @@ def _differentiate(
     R' = R [omega] and p' = R v for a twist (omega, v) in S axes.
     """
     graph = bodies.graph
-    R = tuple(tuple(graph.symbol(f"R[{i},{j}]") for j in range(3)) for i in range(3))
-    p = tuple(graph.symbol(f"p[{i}]") for i in range(3))
+    R, p = pose_symbols(graph, "")
     twist = [graph.symbol(f"V[{i}]") for i in range(6)]
-    x, y, z = twist[:3]
-    cross = ((graph.zero, -z, y), (z, graph.zero, -x), (-y, x, graph.zero))
-    flow: dict[Expr, Expr] = {}
-    turned, moved = vec.product(R, cross), vec.times(R, (twist[3], twist[4], twist[5]))  # type: ignore[arg-type]
-    for i in range(3):
-        flow |= dict(zip(R[i], turned[i], strict=True)) | {p[i]: moved[i]}
-    closure = spec.joint.closure(graph, R, p)  # type: ignore[arg-type]
-    values = [c.expression for c in closure] + (spec.joint.measure(graph, R, p) if measured else [])  # type: ignore[arg-type]
+    cross = skew((twist[0], twist[1], twist[2]))
+    flow = put_pose(R, p, vec.product(R, cross), vec.times(R, (twist[3], twist[4], twist[5])))
+    closure = spec.joint.closure(graph, R, p)
+    values = [c.expression for c in closure] + (spec.joint.measure(graph, R, p) if measured else [])
     rates = jvp(values, flow)
     entries = jacobian(rates, twist)
     flat = [entries.get((i, j), graph.zero) for i in range(len(values)) for j in range(6)]
-    here = dict(zip((x for row in R for x in row), (x for row in pose.rotation for x in row), strict=True))
-    here |= dict(zip(p, pose.position, strict=True)) | dict(zip(twist, (*relative[0], *relative[1]), strict=True))
+    here = put_pose(R, p, pose.rotation, pose.position) | dict(zip(twist, (*relative[0], *relative[1]), strict=True))
     found = substitute([*flat, *jvp(rates, flow)], here)
     rows = tuple(tuple(found[6 * i : 6 * i + 6]) for i in range(len(values)))
     return tuple(c.kind for c in closure), rows, tuple(found[6 * len(values) :])

@@ -13,7 +13,7 @@ from __future__ import annotations
 from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..wrenches import cut_drives, drive_inertias
-from .analytical import form_energies, momentum_equations
+from .lagrange import form_energies, momentum_equations
 from .tree_equations import TreeEquations, take_given
 
 

@@ -9,8 +9,15 @@ d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Ana
 
 from __future__ import annotations
 
+from ...elements.forces import CoordinateLoad, MarkerLoad
+from ...elements.frames import GROUND
+from ...expr import vectors as vec
+from ...expr.core import Expr
+from ...expr.differentiate import gradient, hessian, jvp, vjp
+from ...expr.schedule import count
+from ...expr.vectors import Vec3
 from .. import Kinematics
-from .analytical import form_energies, momentum_equations
+from ..wrenches import virtual_power
 from .tree_equations import TreeEquations, take_given
 
 
@@ -21,3 +28,72 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     tree = momentum_equations(kinematics, "lagrange", *form_energies(kinematics))
     tree.canonical = ()
     return tree
+
+
+def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
+    """T and V.
+
+    ``differentiated``: without the potentials of elements whose forces enter by virtual power instead.
+    """
+    graph = kinematics.graph
+    kinetic, potential = graph.zero, graph.zero
+    # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
+    heights: list[tuple[Expr, Vec3]] = []
+    for k, (link, (angular, linear)) in enumerate(zip(kinematics.links, kinematics.twists, strict=True)):
+        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
+        height = height + vec.dot(pull, link.position)
+        pull = link.down(pull)
+        heights.append((height, pull))
+        center = vec.add(linear, vec.cross(angular, link.com))
+        if link.parent == GROUND:
+            center = min(center, _velocity(kinematics, k), key=lambda v: count([vec.dot(v, v)]).total)
+        spin = vec.dot(angular, vec.times(link.inertia, angular))
+        kinetic = kinetic + (link.mass * vec.dot(center, center) + spin)
+        potential = potential - link.mass * (height + vec.dot(pull, link.com))
+    for force in kinematics.forces:
+        if force.potential is not None and not (differentiated and force.force.by_power):
+            potential = potential + force.potential
+    return 0.5 * kinetic, potential
+
+
+def _velocity(kinematics: Kinematics, k: int) -> Vec3:
+    """Velocity of a link's centre of mass in ground axes, in which that of a free body is the rate of its place."""
+    pose, link = kinematics.poses.link(k), kinematics.links[k]
+    x, y, z = kinematics.total_derivative(pose.position)
+    turned = vec.times(pose.rotation, vec.cross(kinematics.twists[k][0], link.com))
+    return vec.add((x, y, z), turned)
+
+
+def generalized_forces(kinematics: Kinematics) -> list[Expr]:
+    """Q of everything whose potential is not differentiated, by virtual power: Q = sum F . d(velocity)/dv."""
+    loads: list[MarkerLoad | CoordinateLoad] = []
+    for terms in kinematics.forces:
+        loads += terms.marker_loads if terms.force.by_power else terms.marker_remainder
+        loads += terms.coordinate_remainder
+    return virtual_power(kinematics, loads)
+
+
+def momentum_equations(kinematics: Kinematics, method: str, kinetic: Expr, potential: Expr) -> TreeEquations:
+    """dp/dt = p' with p = dL/dv and p' = dL/dq + Q, which are its canonical part, as M v' + h = 0.
+
+    Where q' = N v, for Euler parameters: p' = N^T dL/dq - w x p + Q of angular velocities w in turned axes.
+    """
+    q, v = kinematics.q, kinematics.v
+    L = kinetic - form_energies(kinematics, differentiated=True)[1]
+    momenta, slopes = gradient(L, v), gradient(L, q)
+    if kinematics.quaternion_slots:
+        slopes = vjp(kinematics.rates, slopes, v)
+    for _, j in kinematics.quaternion_slots:
+        w, p, slope = (vec.three(x, j) for x in (v, momenta, slopes))
+        slopes[j : j + 3] = vec.sub(slope, vec.cross(w, p))
+    rates = [s + f for s, f in zip(slopes, generalized_forces(kinematics), strict=True)]
+    drift, total = jvp(momenta, kinematics.flow | kinematics.clock), kinematics.total_derivative(momenta)
+    return TreeEquations(
+        method=method,
+        mass_matrix=hessian(momenta, v),
+        bias=tuple(d - r for d, r in zip(drift, rates, strict=True)),
+        inverse_dynamics=tuple(d - r for d, r in zip(total, rates, strict=True)),
+        kinetic_energy=kinetic,
+        potential_energy=potential,
+        canonical=(*momenta, *rates),
+    )

@@ -12,7 +12,7 @@ from ...expr.core import Expr, Graph
 from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, dot, scaled
 from ...expr.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
-from ...expr.vectors import Mat3
+from ...expr.vectors import Mat3, Rows
 from ..tree import Link, SpatialInertia
 
 # -- sweeps ------------------------------------------------------------------------------------------------------------
@@ -33,9 +33,6 @@ def along_joints(
 
 
 # -- composite bodies --------------------------------------------------------------------------------------------------
-
-
-Rows = tuple[tuple[Expr, ...], ...]
 
 
 def composite_mass_matrix(links: Sequence[Link], inertias: Sequence[SpatialInertia]) -> Rows:

@@ -16,13 +16,12 @@ from ...expr.core import Expr
 from ...expr.schedule import count
 from ...expr.spatial import Twist, Wrench, add, scaled
 from .. import Kinematics
-from ..link_frames import JointRates, SlidingTriple, falling, joint_rates, regroup, turn_back, turn_forces, turn_links
-from ..tree import SpatialInertia
+from ..kinematics import joint_rates
+from ..link_frames import SlidingTriple, falling, regroup, turn_back, turn_forces, turn_links
+from ..tree import JointRates, SpatialInertia
 from ..wrenches import applied_wrenches, coordinate_forces, cut_drives, drive_inertias, kinetic_energy, potential_energy
 from .recursions import ArticulatedBodies, ConstraintRow, TreeMotion, along_joints, composite_mass_matrix
 from .tree_equations import TreeEquations
-
-Rows = tuple[tuple[Expr, ...], ...]
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -59,10 +58,7 @@ def _velocity_products(kinematics: Kinematics, rates: list[JointRates]) -> list[
     products: list[Twist] = []
     for link, rate in graph.marked(zip(kinematics.links, rates, strict=True)):
         above = kinematics.twists[link.parent][0] if link.parent != GROUND else vec.zero(graph)
-        # below is omega_p x r + 2 r', so that omega_p x below + r'' is what turning axes add
-        below = vec.add(vec.cross(above, link.position), vec.scale(graph.constant(2.0), rate.slide))
-        linear = link.down(vec.add(vec.cross(above, below), rate.slide_rate))
-        products.append((vec.add(rate.spin_rate, vec.cross(link.down(above), rate.spin)), linear))
+        products.append(rate.product(link, above))
     return products
 
 
@@ -120,7 +116,7 @@ def solve_tree(
     Without ``loaded`` there are no forces, gravity and velocities but the forces given: what these and the constraints
     make of their rests.
     """
-    turned, blocks = turn_links(kinematics)
+    links, blocks = turn_links(kinematics.links, kinematics.mechanism.gravity)
     still = vec.zero(kinematics.graph)
     if loaded:
         forces = coordinate_forces(kinematics)
@@ -130,14 +126,14 @@ def solve_tree(
         forces = forces or [kinematics.graph.zero] * len(kinematics.v)
     afloat = falling(blocks)
     bodies = ArticulatedBodies(
-        turned.graph,
-        turned.links,
+        kinematics.graph,
+        links,
         inertias,
         products,
         loads,
         turn_forces(blocks, forces),
         drive_inertias(kinematics),
-        [(still, still) if k in afloat or not loaded else _base(kinematics) for k in range(len(turned.links))],
+        [(still, still) if k in afloat or not loaded else _base(kinematics) for k in range(len(links))],
         [_turn_row(blocks, row) for row in rows],
         term,
     )

@@ -12,12 +12,11 @@ from typing import NamedTuple
 
 from ...expr.core import Expr
 from ...expr.evaluate import evaluate
+from ...expr.tensors import dot
+from ...expr.vectors import Rows
 from .. import Kinematics
 from ..diagonal_blocks import diagonal_blocks
 from ..mobility import Mobility
-from ..motion import dot
-
-Rows = tuple[tuple[Expr, ...], ...]
 
 
 class VelocityTransformation(NamedTuple):

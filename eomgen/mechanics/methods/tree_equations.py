@@ -10,16 +10,14 @@ from types import FunctionType
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import jacobian
 from ...expr.records import dataclass
+from ...expr.tensors import combined
+from ...expr.vectors import Rows
 from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..link_frames import Turned
-from ..motion import combined
 from .recursions import TreeMotion
 
 # -- what a method delivers --------------------------------------------------------------------------------------------
-
-
-Rows = tuple[tuple[Expr, ...], ...]
 
 
 @dataclass(frozen=True)
