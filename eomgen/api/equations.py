@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
-from ..base.results import picture_html, side_by_side
 from ..module import Module
 from ..reading.derivation import Derivation
 from ..runtime.argument_checks import find_lacking
@@ -20,9 +18,6 @@ if TYPE_CHECKING:
     from ..runtime.device.cuda_device import Device
     from ..runtime.device.device_module import DeviceModule
     from ..toolchain.compiler import BuildOptions
-
-
-DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its equations
 
 
 class Equations(Derivation):
@@ -210,20 +205,6 @@ class Equations(Derivation):
 
         program = pipeline.build(self, "fmu")
         return write_fmu(program, BoundModel(pipeline.compile_core(self, "numpy")), path, version)
-
-    def _picture_and_facts(self, facts: str) -> str:
-        return side_by_side(self._picture, facts)
-
-    @cached_property
-    def _picture(self) -> str:
-        """The mechanism at its declared initial position; none of one without bodies, or where nothing can draw it."""
-        bodies = len(self.kinematics.mechanism.bodies)
-        if not 0 < bodies <= DRAWN:
-            return ""
-        from ..show.draw import small_figure
-
-        found = picture_html(lambda: small_figure(self.compile("numpy")))
-        return found if found.startswith("<img") else ""
 
 
 def derive(

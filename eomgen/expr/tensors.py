@@ -8,7 +8,7 @@ from . import vectors as vec
 from .core import Expr
 from .vectors import Mat3, Vec3
 
-# -- rows and systems ---------------------------------------------------------------------------------------------------
+# -- rows and systems --------------------------------------------------------------------------------------------------
 
 
 Matrix = list[list[Expr]]

@@ -319,17 +319,16 @@ def find_undefined(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
         path = getattr(force, "path", None)
         place = f"forces.{force.name}"
         if isinstance(path, Line) and _meet(motion, path.start, path.end):
-            what, remedy = (
-                "both ends are always at the same point",
-                "a line needs two different points; move one of them",
-            )
-            problems.append(mechanism.problem(place, what, remedy, "EG-UNDEFINED"))
+            remedy = "a line needs two different points; move one of them"
+            problems.append(mechanism.problem(place, "both ends are always at the same point", remedy, "EG-UNDEFINED"))
         if isinstance(path, Route):
             problems += _undefined_on_route(mechanism, motion, place, path)
     for constraint in mechanism.constraints:
         if isinstance(constraint, RollingDisc) and constraint.lies_flat(motion):
             what = f"{constraint.wheel.label} always lies flat: its axle (z) is along the plane's normal"
-            remedy = "turn the marker of the wheel or of the plane (rpy), or use a joint that lets the disc stand up"
+            remedy = (
+                "turn the marker of the wheel or of the plane (rpy), or use a joint that lets the disc stand upright"
+            )
             problems.append(mechanism.problem(f"constraints.{constraint.name}", what, remedy, "EG-UNDEFINED"))
     return problems
 

@@ -22,7 +22,9 @@ class Displayed(Readable):
         return self._shown_text
 
     def _repr_html_(self) -> str:
-        return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
+        from .writers import facts_html
+
+        return facts_html(self) + self._equations_html
 
     def _repr_latex_(self) -> str:
         from .writers import equations_latex
@@ -34,16 +36,6 @@ class Displayed(Readable):
         from .writers import equations_text
 
         return equations_text(self)
-
-    def _picture_and_facts(self, facts: str) -> str:
-        """What stands above the formulas; equations that can be compiled add a picture."""
-        return facts
-
-    @cached_property
-    def _facts_html(self) -> str:
-        from .writers import facts_html
-
-        return facts_html(self)
 
     @cached_property
     def _equations_html(self) -> str:
@@ -177,9 +169,6 @@ class ReadingView(Displayed):
                 "that the compiled module cannot be compared with it; put in numbers or parameters of the model"
             )
         return self.source.explained(self.in_plain_symbols(), level)  # type: ignore[attr-defined]
-
-    def _picture_and_facts(self, facts: str) -> str:
-        return facts if self._put_in else self.source._picture_and_facts(facts)
 
     def in_plain_symbols(self) -> Readable:
         plain = self.source._symbol

@@ -175,7 +175,7 @@ def test_every_display_is_well_formed_and_fits(name: str) -> None:
     assert free == bool(re.search("^ .* = ", shown, re.M)) or not free
     page = equations._repr_html_()
     assert "<math" in page or not free
-    ElementTree.fromstring(f"<div>{re.sub('<img[^>]*>', '', page)}</div>")
+    ElementTree.fromstring(f"<div>{page}</div>")
     latex = equations._repr_latex_()
     assert latex.startswith("$")
     assert latex.count("{") == latex.count("}")
@@ -262,7 +262,7 @@ def test_large_equations_are_shown_by_their_parts() -> None:
     assert "eqs.tree_system" in shown
     assert shown.index("In groups:") < shown.index("velocity terms of the constraints") < shown.index("c_tilt = ")
     page = equations._repr_html_()
-    assert page.index("<img") < page.index("<table>") < page.index("<math displaystyle")
+    assert page.index("<table>") < page.index("<math displaystyle")
     assert page.count("<details><summary>") > 5  # groups of one meaning
     assert "sym." in page  # symmetric halves once
     whole = written("bicycle", "text")

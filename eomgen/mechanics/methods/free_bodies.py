@@ -14,7 +14,7 @@ from ...expr.core import Expr, substitute
 from ...expr.differentiate import hessian, jacobian, jvp
 from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
-from ...expr.tensors import combined
+from ...expr.tensors import combined, skew
 from ...expr.vectors import Rows
 from ...model.mechanism import JointSpec
 from .. import Kinematics
