@@ -17,7 +17,7 @@ from ..errors import EomgenError
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate as of_graph
 from ..expr.identity import with_bounds
-from ..verify.cases import Case, random_cases
+from ..verify.cases import Case, called, random_cases
 from ..verify.finding import Comparison
 from .author import Author
 
@@ -63,7 +63,7 @@ def value_of(expression: Any, known: dict[Any, Any]) -> Any:
 
 def state_values(module: Any, case: Case) -> dict[str, float]:
     """Numbers of all symbols at a state: coordinates, velocities, accelerations, parameters, inputs, time."""
-    rates = module.rhs(case.t, case.x, p=case.p, u=case.u)[module.n_q :]
+    rates = called(module, "rhs", case)[module.n_q :]
     names = (*module.x_names, *map(acceleration_name, module.layout.v), *module.p_names, *module.u_names, "t")
     flat = (*case.x, *rates, *case.p, *case.u, case.t)
     return dict(zip(names, map(float, flat), strict=True))
@@ -185,20 +185,18 @@ class Wanted(NamedTuple):
     module: Any
     case: Case
 
-    def of(self, name: str, *arguments: Any) -> Any:
-        """The result of a call, of the coordinates by default."""
-        call = getattr(self.module, name)
-        return call(*(arguments or (self.case.q,)), p=self.case.p, u=self.case.u, t=self.case.t)
+    def of(self, name: str) -> Any:
+        """The result of a call."""
+        return called(self.module, name, self.case)
 
     @property
     def a(self) -> Any:
         """Accelerations."""
-        case, n = self.case, self.module.n_q
-        return self.module.rhs(case.t, case.x, p=case.p, u=case.u)[n : n + self.module.n_v]
+        return self.of("rhs")[self.module.n_q :][: self.module.n_v]
 
     def energy(self, k: int) -> tuple[Any, float]:
         """T or V."""
-        energies = self.of("energy", self.case.x)
+        energies = self.of("energy")
         return np.array([energies[k]]), float(np.abs(energies).sum())
 
     def product(self, matrix: str, rates: Any, sign: float = 1.0) -> tuple[Any, float]:
@@ -215,7 +213,7 @@ COMPARED: dict[str, Callable[[Wanted], tuple[Any, float]]] = {
     "force": lambda s: s.product("embedded_mass_matrix", s.a[s.module.layout.independent_moving]),
     "constraints": lambda s: (s.of("constraints"), 1.0),
     "velocity_constraints": lambda s: (
-        s.of("velocity_constraints", s.case.x),
+        s.of("velocity_constraints"),
         s.product("constraint_jacobian", s.case.v[: s.module.n_v])[1],
     ),
     "constraint_jacobian": lambda s: (s.of("constraint_jacobian").ravel(), 0.0),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import sympy
@@ -133,11 +133,6 @@ class _Code:
     def _lines(self, one: Callable[[str, str], str]) -> list[str]:
         return [one(str(symbol), self.language.print(x)) for symbol, x in self.named]
 
-    def _cells(self, start: int) -> Iterable[tuple[int, int, str]]:
-        for i in range(self.mass.rows):
-            for j in range(self.mass.cols):
-                yield i + start, j + start, self.language.print(self.mass[i, j])
-
     def _sympy(self) -> list[str]:
         """Statements that define the symbols, M and f."""
         names = ", ".join(self.arguments)
@@ -151,50 +146,39 @@ class _Code:
             *([f"state_rates = sympy.Matrix({self.states})"] if self.states else []),
         ]
 
+    def _body(
+        self, line: str, place: Callable[[tuple[int, ...]], str], start: int, zeros: str = "", named: str = ""
+    ) -> Iterator[str]:
+        """Lines of named parts, then of the entries of M, f and the rates of states; ``zeros`` makes these arrays."""
+        n, write = self.mass.rows, self.language.print
+        yield from self._lines((named or line).format)
+        for name, entries, sizes in (
+            ("M", {(i, j): self.mass[i, j] for i in range(n) for j in range(n)}, (n, n)),
+            ("f", {(i,): x for i, x in enumerate(self.force)}, (n,)),
+            ("state_rates", {(i,): x for i, x in enumerate(self.states)}, (len(self.states),)),
+        ):
+            if zeros and entries:
+                both = (*sizes, 1)[:2] if self.form != "julia" else sizes
+                yield line.format(name, zeros.format(", ".join(map(str, both))))
+            for where, x in entries.items():
+                yield line.format(name + place(tuple(k + start for k in where)), write(x))
+
     def _matlab(self) -> list[str]:
-        n = self.mass.rows
-        more = ", state_rates" if self.states else ""
-        return [
-            f"function [M, f{more}] = {self.function}({', '.join(self.arguments)})",
-            *self._lines(lambda name, x: f"  {name} = {x};"),
-            f"  M = zeros({n}, {n});",
-            *(f"  M({i}, {j}) = {x};" for i, j, x in self._cells(1)),
-            f"  f = zeros({n}, 1);",
-            *(f"  f({i}) = {self.language.print(x)};" for i, x in enumerate(self.force, 1)),
-            *([f"  state_rates = zeros({len(self.states)}, 1);"] if self.states else []),
-            *(f"  state_rates({i}) = {self.language.print(x)};" for i, x in enumerate(self.states, 1)),
-            "end",
-        ]
+        head = f"function [M, f{', state_rates' * bool(self.states)}] = {self.function}({', '.join(self.arguments)})"
+        return [head, *self._body("  {} = {};", lambda at: f"({', '.join(map(str, at))})", 1, "zeros({})"), "end"]
 
     def _julia(self) -> list[str]:
-        n = self.mass.rows
-        return [
-            f"function {self.function}({', '.join(self.arguments)})",
-            *self._lines(lambda name, x: f"    {name} = {x}"),
-            f"    M = zeros({n}, {n})",
-            *(f"    M[{i}, {j}] = {x}" for i, j, x in self._cells(1)),
-            f"    f = zeros({n})",
-            *(f"    f[{i}] = {self.language.print(x)}" for i, x in enumerate(self.force, 1)),
-            *([f"    state_rates = zeros({len(self.states)})"] if self.states else []),
-            *(f"    state_rates[{i}] = {self.language.print(x)}" for i, x in enumerate(self.states, 1)),
-            f"    return M, f{', state_rates' if self.states else ''}",
-            "end",
-        ]
+        body = self._body("    {} = {}", lambda at: f"[{', '.join(map(str, at))}]", 1, "zeros({})")
+        end = f"    return M, f{', state_rates' * bool(self.states)}"
+        return [f"function {self.function}({', '.join(self.arguments)})", *body, end, "end"]
 
     def _c(self) -> list[str]:
         n = self.mass.rows
         given = "".join(f"double {name}, " for name in self.arguments)
         more = f", double state_rates[{len(self.states)}]" if self.states else ""
-        return [
-            "#include <math.h>",
-            f"void {self.function}({given}double M[{n}][{n}], double f[{n}]{more})",
-            "{",
-            *self._lines(lambda name, x: f"  const double {name} = {x};"),
-            *(f"  M[{i}][{j}] = {x};" for i, j, x in self._cells(0)),
-            *(f"  f[{i}] = {self.language.print(x)};" for i, x in enumerate(self.force)),
-            *(f"  state_rates[{i}] = {self.language.print(x)};" for i, x in enumerate(self.states)),
-            "}",
-        ]
+        head = f"void {self.function}({given}double M[{n}][{n}], double f[{n}]{more})"
+        body = self._body("  {} = {};", lambda at: "".join(f"[{k}]" for k in at), 0, named="  const double {} = {};")
+        return ["#include <math.h>", head, "{", *body, "}"]
 
     def _mathematica(self) -> list[str]:
         rows = (", ".join(self.language.print(x) for x in row) for row in self.mass.tolist())

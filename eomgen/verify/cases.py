@@ -188,6 +188,13 @@ CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
 }
 
 
+def called(module: BoundModel, call: str, case: Case) -> Array:
+    """What a call of a module gives at a state; of one that is not in the table at its position."""
+    arguments = CALLS[call](case) if call in CALLS else (case.q,)
+    given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
+    return np.asarray(getattr(module, call)(*arguments, **given), dtype=float)
+
+
 def record_calls(name: str, module: BoundModel | None) -> str:
     """The text of ``tests/recorded.json``: calls, their arguments, results, and the most by which a result may differ.
 
@@ -221,10 +228,10 @@ def _record(module: BoundModel, call: str, case: Case, number: int) -> dict[str,
     given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
     rng = np.random.default_rng(SEED)
     try:
-        values = [np.asarray(getattr(module, call)(*CALLS[call](case), **given), dtype=float)]
+        values = [called(module, call, case)]
         for _ in range(NUDGES):
             nudged = Case(0, case.t, _nudge(case.x, rng), _nudge(case.a, rng), case.p, case.u, case.n_q)
-            values.append(np.asarray(getattr(module, call)(*CALLS[call](nudged), **given), dtype=float))
+            values.append(called(module, call, nudged))
     except EomgenError:
         return None
     if not values[0].size or not all(np.isfinite(value).all() for value in values):
