@@ -25,7 +25,7 @@ from .comparison import Difference, is_rounding, known_values, value_of
 
 _AXIS = re.compile(r"\{([xyz])\}")  #: stands in sentences and formulas of joints for an axis of the joint
 _UNIT = re.compile(r"\\mathbf\{e\}_\{(\\mathbf\{n\}_[xyz])\}")  #: e along an axis n, which is n itself
-MANY = 2  #: bodies from which their masses are folded
+MANY = 2  #: bodies beyond which their masses are folded, and parameters beyond which their values are
 
 
 def mechanism(author: Author, module: Any | None) -> Section:
@@ -84,7 +84,7 @@ def _picture(module: Any | None) -> Piece:
     except EomgenError as error:
         return Sentence(f"No picture: {_plain(str(error).partition(chr(10))[0])}.")
     data, width = trimmed_png(figure)
-    return DrawnPicture(data, round(1.25 * width), "the mechanism in its initial position")
+    return DrawnPicture(data, round(1.1 * width), "the mechanism in its initial position")
 
 
 def bodies(author: Author) -> Section | None:
@@ -128,7 +128,8 @@ def bodies(author: Author) -> Section | None:
             )
             for p, kind in given
         )
-        pieces.append(Table(("symbol", "name", "value", "unit", "meaning"), rows))
+        table = Table(("symbol", "name", "value", "unit", "meaning"), rows)
+        pieces.append(Folded(f"Values of {len(rows)} parameters", (table,)) if m.bodies and len(rows) > MANY else table)
     return Section("Bodies and parameters" if m.bodies else "Parameters", tuple(pieces)) if pieces else None
 
 
@@ -561,12 +562,13 @@ def counts(author: Author) -> Section:
 
 
 def difference(found: Difference | None, reason: str) -> Section:
-    """How far the shown formulas are from the compiled module."""
+    """How far the shown formulas are from the compiled module, folded where they agree."""
     title = "Shown and compiled"
     if found is None:
         return Section(title, (Sentence(f"Not compared: {reason}"),))
     if not found.each:
         return Section(title, (Sentence("There is no formula here that the compiled module has too."),))
+    title += f": largest difference {found.largest:.1e}"
     rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in found.each.items())
     text = (
         f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and compared "
@@ -574,6 +576,4 @@ def difference(found: Difference | None, reason: str) -> Section:
         f"expressions of the derivation. The largest difference, as a share of the largest entry or term, is "
         f"{found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
     )
-    return Section(
-        title, (Sentence(text), Folded(f"{len(rows)} formulas", (Table(("formula", "largest difference"), rows),)))
-    )
+    return Section(title, (Sentence(text), Table(("formula", "largest difference"), rows)), folded=True)

@@ -234,7 +234,8 @@ details{margin:.6em 0;border-left:3px solid #8885;padding-left:.8em}
 summary{cursor:pointer;color:LinkText}
 .section{margin:0;border:0;padding:0}
 .section>summary>h2{display:inline-block;margin:.3em 0;font-size:1.15em}
-nav{columns:2;font-size:.95em}
+nav{font-size:.95em}
+nav ol{columns:2}
 @media print{details{display:block}}
 """
 
@@ -257,7 +258,7 @@ def write_html(title: str, sections: Sequence[Section], names: Notation) -> str:
     body = [f"<h1>{_html_text(title, names, look)}</h1>"]
     heads = [_html_text(section.title, names, look) for section in sections]
     links = (f"<li><a href='#s{k}'>{heads[k - 1]}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1)
-    body.append(f"<nav><ol>{''.join(links)}</ol></nav>")
+    body.append(f"<nav><details><summary>Contents</summary><ol>{''.join(links)}</ol></details></nav>")
     opened = False
     for k, section in enumerate(sections, 1):
         tag = f"h{section.level + 1}"

@@ -26,11 +26,12 @@ from ...elements.frames import GROUND
 from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot, ill_typed
 from ...expr import vectors as vec
 from ...expr.core import Expr
+from ...expr.tensors import dot
 from ...expr.vectors import Vec3
 from ...mechanics import Kinematics
 from ...mechanics.methods import TreeEquations
 from ...mechanics.mobility import Mobility
-from ...mechanics.motion import dot, force_and_moment
+from ...mechanics.motion import force_and_moment
 from ...mechanics.wrenches import JointWrenches, carried_reactions
 from ...model.mechanism import Output
 from ...native.limits import definitions
