@@ -110,7 +110,7 @@ def find_function(file: str, name: str) -> Any:
         raise UnavailableError(f"{__package__} was generated without {name}: {remedy}") from None
 
 
-class LateMethod:
+class LazyMethod:
     """A function of another part of the package as a method, which is loaded when it is asked for."""
 
     def __init__(self, name: str) -> None:
@@ -273,7 +273,7 @@ class Module(BoundModel):
 
                 return find_solver(self, name)
             if name in CALLS:  # an analysis of a user's own
-                return LateMethod(name).__get__(self, type(self))
+                return LazyMethod(name).__get__(self, type(self))
             if name in FORMS:
                 form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
                 return form
@@ -294,4 +294,4 @@ class Module(BoundModel):
 
 
 for _name in CALLS:
-    setattr(Module, _name, LateMethod(_name))
+    setattr(Module, _name, LazyMethod(_name))

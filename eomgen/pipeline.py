@@ -102,7 +102,7 @@ def compile_core(
 ) -> Core:
     """Stages 4 and 5, Derivation -> Core; see :meth:`eomgen.api.equations.Equations.compile`."""
     from .base.kernel_table import KERNELS
-    from .runtime.kernels import LateCore
+    from .runtime.kernels import LazyCore
 
     row = find_target(target)
     if not row.load:
@@ -114,7 +114,7 @@ def compile_core(
         functions = equations.kinematics.graph.functions
         return cast("Core", find_function(row.load)(program, options, seconds, functions))
 
-    def load_late(group: str) -> Core:
+    def load_lazy(group: str) -> Core:
         return load(build(equations, target, [name for name, of in late.items() if of == group]), {})
 
     if kernels is not None:
@@ -123,7 +123,7 @@ def compile_core(
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = load(program, equations.seconds)
     late = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
-    return LateCore(core, list(late), load_late)
+    return LazyCore(core, list(late), load_lazy)
 
 
 def make_functions(equations: Derivation, target: str, **options: Any) -> Any:

@@ -406,7 +406,7 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     count = ROWS * len(standard) // max(1, module.n_dof) + SPARE
     W = _observe(module, np.random.default_rng(seed), count)
     sizes = np.linalg.norm(W, axis=0)
-    seen = sizes > least * _usual(sizes)
+    seen = sizes > least * _typical(sizes)
     chosen, weakest = _independent(W, np.where(seen, sizes, np.inf), least)
     combination = np.zeros((len(chosen), len(standard)))
     combination[range(len(chosen)), chosen] = 1.0
@@ -416,7 +416,7 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
         found = algebra.lstsq(A, B)
         found[np.abs(found) < ROUNDED_COEFFICIENT] = 0.0
         found *= sizes[others] / sizes[chosen][:, None]
-        combination[:, others] = _settled(found)
+        combination[:, others] = _rounded(found)
     return BaseParameters(
         module,
         tuple(standard[k] for k in chosen),
@@ -428,14 +428,14 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     )
 
 
-def _usual(sizes: Array) -> Array:
+def _typical(sizes: Array) -> Array:
     """The largest effect of comparable parameters of all bodies: of masses, of first moments, of moments of inertia."""
     bodies = sizes.reshape(-1, len(STANDARD))
     parts = [np.full(end - start, bodies[:, start:end].max()) for start, end in ((0, 1), (1, 4), (4, len(STANDARD)))]
     return np.tile(np.concatenate(parts), len(bodies))
 
 
-def _settled(found: Array) -> Array:
+def _rounded(found: Array) -> Array:
     """Whole numbers where only rounding parts an entry from one."""
     whole = np.round(found)
     return np.where((np.abs(found - whole) < ROUNDED_COEFFICIENT) & (whole != 0.0), whole, found)

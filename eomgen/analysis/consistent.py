@@ -85,7 +85,7 @@ def consistent(
     state = np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
         raise ill_shaped(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
-    if layout.given_rates:
+    if layout.general_rates:
         raise cannot(
             "consistent() works for models with q' = v only, and the rates of this model's coordinates are given; "
             "use project(x)"

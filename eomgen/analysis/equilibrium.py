@@ -125,9 +125,9 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     else:
         free = balance_forces(module, t, q, s)
         pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
-        rows = search.held_rows(module, q)
+        rows = search.rows_to_hold(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
-        A, second = _held_motion(search, module, here, t)
+        A, second = _motion_with_holds(search, module, here, t)
         if second is None:
             stability = stability_of_matrix(A, error=DIFFERENCES)
         else:
@@ -136,7 +136,7 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     return Equilibrium(module, t, here.x, found)
 
 
-def _held_motion(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
+def _motion_with_holds(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
     """A of the motion with the held coordinates held, and its equations of second order where it has such."""
     n_q, s = module.n_q, module.layout.scales.q
     tree = module.kernels.mass_matrix(here.x[:n_q], t=t)

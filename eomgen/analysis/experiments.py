@@ -130,7 +130,7 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     found = {}
     for name, values in given.items():
         try:
-            found[name] = _numbers(values) * _in_own_unit(units.get(name), module.layout.unit(name))
+            found[name] = _numbers(values) * _unit_factor(units.get(name), module.layout.unit(name))
         except (TypeError, ValueError) as error:
             problems.append(f"{where}: {name} {error}")
     return found
@@ -149,7 +149,7 @@ def _numbers(values: Any) -> Array:
         raise ValueError("is not a list of numbers") from None
 
 
-def _in_own_unit(given: Any, own: str) -> float:
+def _unit_factor(given: Any, own: str) -> float:
     """What values in the unit that a table tells are multiplied by; 1 where it tells none."""
     if not given or given == own:
         return 1.0

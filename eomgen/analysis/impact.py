@@ -66,7 +66,7 @@ def check_gaps(
         raise ill_typed(f"{other} must be a list of coordinates, not {lock!r}")
     if not gaps and not locked:
         raise incomplete("an impact needs gaps={name: restitution} or lock=[coordinates]")
-    if layout.given_rates:
+    if layout.general_rates:
         raise cannot("impacts need a model with q' = v, and the rates of this model's coordinates are given")
     gaps, locked = without_dots(gaps or {}, layout.instances), [layout.plain(name) for name in locked]
     coordinates = [*layout.velocity_labels, *layout.loops]

@@ -24,7 +24,7 @@ from ..errors import (
     off_range,
     too_large,
 )
-from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_room, unknown
+from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_size, unknown
 from ..runtime.refusals import require_support
 from ..runtime.runs.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 from ..runtime.runs.kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
@@ -71,7 +71,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     if len(set(sizes.values())) > 1:
         raise ill_shaped(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
     n = next(iter(sizes.values()))
-    require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
+    require_size(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
 
     def stack(suffix: str) -> Array:
         rows = [np.broadcast_to(arrays.get(name + suffix, np.zeros(())), n) for name in names]
@@ -87,7 +87,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
 
 def _column(name: str, value: Any) -> Array:
     array = read_numbers(name, value)
-    require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
+    require_size(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
         raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
     return array
@@ -159,8 +159,8 @@ def analyse(module: BoundModel, requested: Range, initial: Start, partial: bool)
         start_t, q = start_from(module, dict(zip(requested.names, y0.tolist(), strict=True)), t0)
         names = complete(module, q, start_t, requested.names)
     driven = DrivenCoordinates(module, names)
-    further = driven.led_values(q, start_t)[len(requested.names) :]
-    start_y = driven.led_values(q, start_t)
+    further = driven.prescribed_values(q, start_t)[len(requested.names) :]
+    start_y = driven.prescribed_values(q, start_t)
     led = len(requested.names)
     for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as requested
         start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
@@ -378,7 +378,7 @@ def _follow_both_ways(
         q = start_from(module, q, t)[1]
     names = complete(module, q, t, () if name == "t" else (name,))
     driven = DrivenCoordinates(module, names)
-    y = driven.led_values(q, t)
+    y = driven.prescribed_values(q, t)
     k = names.index(name) if name in names else -1
     here = t if name == "t" else float(y[k])
     kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))

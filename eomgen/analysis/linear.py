@@ -22,7 +22,7 @@ from .balance import (
     null_basis,
     projected_directions,
 )
-from .linearization import Linearization, own_accelerations
+from .linearization import Linearization, residual_accelerations
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # multibody systems, Multibody System Dynamics 33 (2015), 143-161, section 3).
 
 
-def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequence[str] | None) -> TangentSpace:
+def find_directions(module: BoundModel, t: float, x: Array, independent: Sequence[str] | None) -> TangentSpace:
     """The independent directions at a state on the constraints.
 
     Parameters
@@ -144,7 +144,7 @@ def linearize(
     -----
     All matrices are exact derivatives of the complete right-hand side (implicit differentiation; no differences).
     """
-    if module.layout.given_rates:
+    if module.layout.general_rates:
         refuse_inputs(module.layout)
     if not isinstance(form, str) or form not in FORMS:
         raise no_choice(f"form must be one of {', '.join(FORMS)}, not {form!r}")
@@ -160,7 +160,7 @@ def linearize(
     if form == "full":
         if independent is not None:
             raise cannot("independent= chooses the states of the minimal form; the full form has all of x")
-        if layout.given_rates:
+        if layout.general_rates:
             raise cannot(
                 "the rates of this model's coordinates are given, and the full form of such models is not derived; use "
                 "jacobian(t, x), which is its A"
@@ -169,8 +169,8 @@ def linearize(
         A, B, drift, states = J, U, rates, layout.x
         C, D = _outputs(module, time, state, rates, P, J, U)
         return Linearization(layout, time, state, module.u, (A, B, C, D), states, drift)
-    if layout.given_rates:
-        tangent = find_given_tangent(module, time, state, independent)
+    if layout.general_rates:
+        tangent = find_directions(module, time, state, independent)
         moved = J @ tangent.T
         chosen = np.concatenate([tangent.positions, layout.n_q + tangent.velocities])
         C, D = _outputs(module, time, state, rates, tangent.T, moved, U)
@@ -194,7 +194,7 @@ def linearize(
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
     mass = tangent.B.T @ module.kernels.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
-    own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
+    own = residual_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearization(
         layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )

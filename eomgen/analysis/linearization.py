@@ -131,7 +131,7 @@ def _balance(A: Array, own: Array | None) -> Array:
     return d
 
 
-def own_accelerations(module: BoundModel, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
+def residual_accelerations(module: BoundModel, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
     """Accelerations that the forces of the model would make if they did not balance, scaled (1/s^2), (n_dof,).
 
     Parameters
@@ -506,7 +506,7 @@ class Linearization(Result):
             integrals of the velocities (nonholonomic constraints).
         """
         if self.mass is None or self.damping is None or self.stiffness is None:
-            if self.layout.given_rates:
+            if self.layout.general_rates:
                 raise cannot("no second-order form: the rates of the coordinates are given as functions; use A")
             raise cannot("the full form has no second-order form; linearize with form='minimal'")
         chosen = names or self.position_names

@@ -713,7 +713,7 @@ class Saltation(Events):
         ``x`` and ``d`` are states and their derivatives (n_x, k) before and after it.
         """
         module, layout = self.module, self.module.layout
-        rows = module.info.held_rows
+        rows = module.info.rows_to_hold
         closed = [k for k, (_, state, _) in enumerate(rows) if x[0][layout.x.index(state)] > 0.5]
         if not closed or "held_errors" not in module.kernels.core.names:
             return

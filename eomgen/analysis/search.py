@@ -17,7 +17,7 @@ from ..runtime.argument_checks import unknown
 from ..runtime.initial import Initial
 from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes
 from .limits import ARRIVED, CLOSE, DIFFERENCES, LEAST_UNKNOWN, MOVING, SHORTEST
-from .linearization import BALANCED, own_accelerations
+from .linearization import BALANCED, residual_accelerations
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -122,7 +122,7 @@ class Search:
         """What is bound now."""
         return np.concatenate([self.module.p[self.parameters], self.module.u[self.inputs]])
 
-    def held_rows(self, module: BoundModel, q: Array) -> list[Held]:
+    def rows_to_hold(self, module: BoundModel, q: Array) -> list[Held]:
         """The held coordinates, three rows for a rotation."""
         initial, layout, found = Initial(module.kernels, self.t), self.layout, []
         for name in self.held:
@@ -137,7 +137,7 @@ class Search:
 
     def gradients(self, module: BoundModel, q: Array) -> Array:
         """Gradients (k, n_v) of the held coordinates by displacements, in their scales."""
-        rows = [held.gradient for held in self.held_rows(module, q)]
+        rows = [held.gradient for held in self.rows_to_hold(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
 
     def start(self, q: Array) -> SearchPoint:
@@ -191,7 +191,7 @@ class Search:
                 J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow
             )
         held = self.gradients(point.module, point.q)
-        held_by = self._held_by_parameters(point.module, here.x)
+        held_by = self._hold_slopes(point.module, here.x)
         found = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
         basis, inverse = _orthonormal(found.Z / s[:, None])
         if len(held):  # only displacements that leave the held coordinates alone
@@ -218,14 +218,14 @@ class Search:
         mass = self.mass(point)
         spread = np.abs(algebra.inv(mass)) @ np.abs(mass)
         s = self.scale[here.velocities]
-        own = own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
+        own = residual_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
         rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
         return np.concatenate([rows + own, np.abs(J[n:]).sum(axis=1)])
 
-    def _held_by_parameters(self, module: BoundModel, x: Array) -> Array:
+    def _hold_slopes(self, module: BoundModel, x: Array) -> Array:
         """Derivatives (k, n_p) of the held coordinates by the parameters, scaled; only cut joints have some."""
         layout = self.layout
-        held = self.held_rows(module, x[: layout.n_q])
+        held = self.rows_to_hold(module, x[: layout.n_q])
         rows = np.zeros((len(held), layout.n_p))
         if layout.n_loop_coordinates and self.parameters:
             every = module.kernels.assembly_jacobian(x, t=self.t)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]

@@ -40,7 +40,7 @@ from ..runtime.layout import Layout, start_slopes
 from ..runtime.protocols import BoundValues
 from ..runtime.refusals import require_support
 from ..runtime.runs.bound_run import Crawling, Run
-from ..runtime.runs.events import told_by_the_caller
+from ..runtime.runs.events import inner_run
 from ..runtime.runs.integrate import Solution, choose_solver, integrate, record, require_end
 from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
 from ..runtime.runs.simulate import simulate
@@ -215,7 +215,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     return Differentiated(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
-def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
+def names_to_hold(module: BoundModel, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
     """Coordinates and rates that an assembly at x holds: given ones, declared ones and independent ones, while they
     leave each other room."""
     layout = module.layout
@@ -373,7 +373,7 @@ TIGHTER = 0.1
 def serves(module: BoundModel, forcing: Forcing) -> bool:
     """Whether derivatives can be had along the steps of a run: no constraints, and inputs of time alone, smooth."""
     layout, formulas = module.layout, forcing.formulas
-    if layout.n_c or layout.quaternion_slots or layout.given_rates:
+    if layout.n_c or layout.quaternion_slots or layout.general_rates:
         return False
     if any(f.branches or any(op in ("x", "p") for op, *_ in f.tape[0]) for f in formulas.values()):
         return False
@@ -480,7 +480,7 @@ def sensitivities(
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
     given = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
-    held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
+    held = names_to_hold(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
@@ -489,7 +489,7 @@ def sensitivities(
     salts = Saltation(run, events, (start, stop), (settings["rtol"], settings["atol"]), corners)
     alone = None
     if salts:
-        with told_by_the_caller():
+        with inner_run():
             alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
@@ -500,7 +500,7 @@ def sensitivities(
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     if not salts and stop > start and serves(bound, forcing):
         simulated = partial(simulate, bound, (start, stop), x0, None, inputs, events=events, method=method)
-        with told_by_the_caller():
+        with inner_run():
             trajectory = simulated(**settings, t_eval=times)
             S = find_along(run, simulated, corners, S0, trajectory.t, settings)
         if S is not None:

@@ -29,7 +29,7 @@ def _failed(what: str, *matrices: Any) -> EvaluationError:
     return UnsolvedError(f"{what}: the matrix is singular, or its entries differ too much in size")
 
 
-class _Told:
+class _NamedFailure:
     """NumPy's LinAlgError within the block -> an error that says what failed, and why."""
 
     def __init__(self, what: str, *matrices: Any) -> None:
@@ -45,7 +45,7 @@ class _Told:
 
 def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
     """U, singular values, V^T."""
-    with _Told("singular values cannot be found", A):
+    with _NamedFailure("singular values cannot be found", A):
         U, sizes, Vt = np.linalg.svd(A, full_matrices=full_matrices)
     if not np.isfinite(sizes).all():
         raise _failed("singular values cannot be found", A)
@@ -54,14 +54,14 @@ def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
 
 def qr(A: Any, complete: bool = False) -> tuple[Array, Array]:
     """Q of orthonormal columns and the triangle R; ``complete``: Q is square."""
-    with _Told("a matrix has no orthonormal basis", A):
+    with _NamedFailure("a matrix has no orthonormal basis", A):
         Q, R = np.linalg.qr(A, mode="complete" if complete else "reduced")
     return Q, R
 
 
 def singular_values(A: Any) -> Array:
     """Singular values, the largest first."""
-    with _Told("singular values cannot be found", A):
+    with _NamedFailure("singular values cannot be found", A):
         sizes = np.asarray(np.linalg.svd(A, compute_uv=False))
     if not np.isfinite(sizes).all():
         raise _failed("singular values cannot be found", A)
@@ -70,63 +70,63 @@ def singular_values(A: Any) -> Array:
 
 def eigh(A: Any) -> tuple[Array, Array]:
     """Eigenvalues and eigenvectors of a symmetric matrix."""
-    with _Told("eigenvalues cannot be found", A):
+    with _NamedFailure("eigenvalues cannot be found", A):
         values, vectors = np.linalg.eigh(A)
     return values, vectors
 
 
 def eigvalsh(A: Any) -> Array:
     """Eigenvalues of a symmetric matrix, the smallest first."""
-    with _Told("eigenvalues cannot be found", A):
+    with _NamedFailure("eigenvalues cannot be found", A):
         return np.asarray(np.linalg.eigvalsh(A))
 
 
 def eig(A: Any) -> tuple[Any, Any]:
     """Eigenvalues and eigenvectors, complex where they are."""
-    with _Told("eigenvalues cannot be found", A):
+    with _NamedFailure("eigenvalues cannot be found", A):
         values, vectors = np.linalg.eig(A)
     return values, vectors
 
 
 def eigvals(A: Any) -> Any:
     """Eigenvalues, complex where they are."""
-    with _Told("eigenvalues cannot be found", A):
+    with _NamedFailure("eigenvalues cannot be found", A):
         return np.linalg.eigvals(A)
 
 
 def solve(A: Any, b: Any) -> Array:
     """x with A x = b."""
-    with _Told("linear equations have no solution", A, b):
+    with _NamedFailure("linear equations have no solution", A, b):
         return np.asarray(np.linalg.solve(A, b))
 
 
 def inv(A: Any) -> Any:
     """A^-1."""
-    with _Told("a matrix has no inverse", A):
+    with _NamedFailure("a matrix has no inverse", A):
         return np.linalg.inv(A)
 
 
 def pinv(A: Any, rcond: float | None = None) -> Array:
     """A^+; entries of A below ``rcond`` of the largest singular value count as zero."""
-    with _Told("a matrix has no pseudo-inverse", A):
+    with _NamedFailure("a matrix has no pseudo-inverse", A):
         return np.asarray(np.linalg.pinv(A) if rcond is None else np.linalg.pinv(A, rcond=rcond))
 
 
 def lstsq(A: Any, b: Any, rcond: float | None = None) -> Array:
     """The x of least norm with least |A x - b|."""
-    with _Told("linear equations have no solution", A, b):
+    with _NamedFailure("linear equations have no solution", A, b):
         return np.asarray(np.linalg.lstsq(A, b, rcond=rcond)[0])
 
 
 def cholesky(A: Any) -> Array:
     """L with L L^T = A."""
-    with _Told("a matrix is not positive definite", A):
+    with _NamedFailure("a matrix is not positive definite", A):
         return np.asarray(np.linalg.cholesky(A))
 
 
 def cond(A: Any) -> float:
     """The largest singular value over the smallest."""
-    with _Told("a condition number cannot be found", A):
+    with _NamedFailure("a condition number cannot be found", A):
         return float(np.linalg.cond(A))
 
 

@@ -156,7 +156,7 @@ class Continuation:
                 self.step = 0.5 * h
                 if self.step > BLOCKED * max(1.0, abs(here.s)):
                     continue
-                found = self._leap()
+                found = self._extrapolate()
                 if found is None:
                     self.blocked = True
                     return False
@@ -197,7 +197,7 @@ class Continuation:
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
         return found
 
-    def _leap(self) -> Point | None:
+    def _extrapolate(self) -> Point | None:
         """A point behind a singular position, as far from it as one before it, that continues the motion smoothly."""
         here = self.points[-1]
         for size in LEAPS:

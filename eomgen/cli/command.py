@@ -100,7 +100,7 @@ def eomgen() -> None:
     """Equations of motion of mechanisms: derived, compiled, simulated."""
 
 
-def _check_words(words: Sequence[str]) -> None:
+def _check_file_name(words: Sequence[str]) -> None:
     """Refuse what cannot be part of a file's name; no file system takes it."""
     for word in words:
         try:
@@ -123,7 +123,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        _check_words(words)
+        _check_file_name(words)
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)

@@ -78,7 +78,7 @@ def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64]
     power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in held.items()})[0]
     if power.is_zero:
         return np.zeros(len(trajectory.t))
-    if _without_twin(power):
+    if _without_fallback(power):
         return None
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
     start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
@@ -100,21 +100,21 @@ def counts_work(equations: Equations) -> bool:
     if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
         return False
     power = _power(kinematics)
-    return not power.is_zero and not _without_twin(power)
+    return not power.is_zero and not _without_fallback(power)
 
 
 def uncounted_functions(equations: Equations) -> list[str]:
     """Functions that the power depends on and that NumPy cannot evaluate: the work of such a run is not known."""
-    return _without_twin(_power(equations.kinematics))
+    return _without_fallback(_power(equations.kinematics))
 
 
-def _without_twin(power: Expr) -> list[str]:
+def _without_fallback(power: Expr) -> list[str]:
     graph = power.graph
     called = {graph.nodes[i][0] for i in reachable(graph, [power.id])} & graph.calls.keys()
-    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if _lacks_twin(function)})
+    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if _lacks_fallback(function)})
 
 
-def _lacks_twin(function: object) -> bool:
+def _lacks_fallback(function: object) -> bool:
     """Whether NumPy cannot evaluate a function, as it can sums over pairs of shapes."""
     return not isinstance(function, PairCall) and getattr(function, "evaluator", None) is None
 

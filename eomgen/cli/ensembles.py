@@ -12,7 +12,7 @@ import click
 
 from ..base.files import open_plain, save_figure, write_whole
 from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
-from ..runtime.argument_checks import require, require_room
+from ..runtime.argument_checks import require, require_size
 from ..runtime.storage import split_head, write_netcdf
 from .options import (
     Prepared,
@@ -82,8 +82,8 @@ def ensemble(
     if cases is not None and count is not None:
         raise at_odds("--count is for values drawn by --vary; --cases has as many runs as rows")
     module = work.module
-    require_room(f"--count {count}", float(count or 0) * max(len(vary) + 2 * module.n_x, 1), "draw fewer runs")
-    require_room(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
+    require_size(f"--count {count}", float(count or 0) * max(len(vary) + 2 * module.n_x, 1), "draw fewer runs")
+    require_size(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
     if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
         raise off_range(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     if grid and (cases is not None or vary or count is not None):

@@ -178,7 +178,7 @@ def _check_cache() -> Check:
 
     try:
         cache = Cache(cache_directory())
-        cache.require_own()
+        cache.require_owner()
     except EomgenError as error:
         return Check("cache", False, "not safe to use, or missing", str(error))
     entries = cache.entries()

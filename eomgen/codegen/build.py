@@ -118,7 +118,7 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
         preferred=terms.preferred,
         parent=terms.parent,
         quaternion_slots=terms.quaternion_slots,
-        given_rates=terms.given_rates,
+        general_rates=terms.general_rates,
         coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
@@ -141,9 +141,9 @@ def _select(terms: SystemTerms, has_energy: bool, kernels: Sequence[str] | None)
     wanted -= set() if terms.has_minimal_form else {"kinematics"}
     wanted -= set() if has_energy else {"energy"}
     wanted -= set() if terms.meeting_times else {"meeting_time"}
-    if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
+    if terms.general_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         wanted -= SHIFTS.keys()
-    if terms.given_rates:
+    if terms.general_rates:
         wanted -= {"dae_residual", "dae_jacobian"}
     return [k for k in KERNELS if k.name in wanted and not (k.optional and 0 in k.shape(terms.sizes))]
 

@@ -226,7 +226,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "starts": {name: start for name, start, _ in areas},
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,
-        "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
+        "rates_are_velocities": not (program.quaternion_slots or program.general_rates or program.n_states),
         "has_loops": program.has_loops and program.projects,
         "held": contact_tables(program),
         "system": program.system if "system" in program.block_names else None,

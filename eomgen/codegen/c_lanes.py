@@ -40,7 +40,7 @@ CLOSED = (*BY_SYSTEM, *BY_MOTIONS)
 def loops_in_lanes(program: Program) -> bool:
     """Whether there are loops whose right-hand side has lanes."""
     driven = {name for d in program.drivers if d.name == "rhs" for name in d.blocks}
-    return driven.issuperset(BY_SYSTEM) and not program.given_rates
+    return driven.issuperset(BY_SYSTEM) and not program.general_rates
 
 
 def rhs_blocks(program: Program) -> list[str]:

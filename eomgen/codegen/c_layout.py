@@ -20,7 +20,7 @@ def is_straight(program: Program) -> bool:
 
 def crosses_singular(program: Program) -> bool:
     """Whether the right-hand side is taken from both sides of a singular position where it is next to one."""
-    return program.has_loops and program.projects and not program.given_rates
+    return program.has_loops and program.projects and not program.general_rates
 
 
 def describe_equations(
@@ -166,7 +166,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     if "mass_times" in names:
         lengths.append(("UNIT", n_q + 2 * n))
     if program.has_loops:
-        if program.given_rates:
+        if program.general_rates:
             lengths += [("GRADIENT", h * n_q), ("NORMAL", m * m), ("MENDED", n_q + m + n)]
         lengths += [
             ("POSITION", h + m * n),

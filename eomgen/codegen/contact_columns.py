@@ -53,7 +53,7 @@ class ContactColumns(NamedTuple):
 def contact_columns(terms: SystemTerms) -> ContactColumns | None:
     """The columns of states of contacts, or None where they are few, or where the states act in other ways too."""
     graph, n, begun = terms.graph, terms.n_v, terms.n_v - terms.n_states
-    if terms.n_c or terms.n_states < LEAST or terms.by_columns or terms.system or terms.given_rates:
+    if terms.n_c or terms.n_states < LEAST or terms.by_columns or terms.system or terms.general_rates:
         return None
     index = {graph.symbol(name).id: k for k, name in enumerate(terms.v) if k >= begun}
     residual = list(terms.inverse_dynamics)

@@ -153,7 +153,7 @@ def _solve(terms: SystemTerms, mass: Sequence[Sequence[Expr]], bias: Sequence[Ex
 def _fits(terms: SystemTerms, limits: Limits, columns: int) -> bool:
     """Whether so many solutions with the factor are not too long for straight-line code."""
     substitutions = sum(1 + 4 * len(path(terms.parent, k)) for k in range(terms.n_v))
-    return not (terms.given_rates or terms.by_columns) and columns * substitutions <= limits.jacobian_nodes
+    return not (terms.general_rates or terms.by_columns) and columns * substitutions <= limits.jacobian_nodes
 
 
 def _rows(terms: SystemTerms, rates: Entries, forces: Entries, solved: Solved, width: int) -> list[Expr]:

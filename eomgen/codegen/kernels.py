@@ -321,7 +321,7 @@ class BlockMaker:
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
         given = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
-        return (*self._behind(name), *(given if self.terms.given_rates else ()))
+        return (*self._behind(name), *(given if self.terms.general_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
         if name in ALONG:

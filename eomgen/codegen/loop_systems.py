@@ -545,7 +545,7 @@ def straight_loops(terms: SystemTerms, longest: int) -> LoopBlocks | None:
     """The form that takes no pivots, if there is one whose factors take at most so many multiplications."""
     if not terms.n_c or not terms.n_dof or not (terms.mass_matrix or terms.by_columns):
         return None
-    if terms.given_rates or terms.system is not None or not terms.projects:
+    if terms.general_rates or terms.system is not None or not terms.projects:
         return None
     bodies = BodyLoops(terms)
     if bodies.motion is not None or terms.by_columns:

@@ -238,7 +238,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "not_finite_where": {x.name: x.not_finite_where for x in forces if x.not_finite_where},
         "reaction_laws": list(kinematics.reaction_laws),
         "switched": {s.constraint.name: s.state for s in m.switched if s.constraint is not None},
-        "held_rows": [list(row) for row in kinematics.held_rows],
+        "rows_to_hold": [list(row) for row in kinematics.rows_to_hold],
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
         "units": units,

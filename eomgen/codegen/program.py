@@ -180,7 +180,7 @@ class Program:
     parent: tuple[int, ...]
     counts: Mapping[str, Operations]  #: per block, hoisted work apart under ``precompute``
     quaternion_slots: tuple[tuple[int, int], ...] = ()
-    given_rates: bool = False
+    general_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     n_states: int = 0  #: first-order states, the last of the velocities
     limits: Limits = field(default_factory=Limits)

@@ -15,7 +15,7 @@ from ..base.limits.constraints import STRUCTURE
 from ..base.limits.numbers import SINGULAR
 from ..base.operations import CONDITION, OPERATIONS
 from ..elements.forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
-from ..elements.forces.friction import is_carried, multiplier_of, reaction_of
+from ..elements.forces.friction import is_reaction, multiplier_of, reaction_of
 from ..errors import ModelError, Problem
 from ..expr.core import Expr, common_graph, operands, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
@@ -31,7 +31,7 @@ from ..mechanics.mobility import Mobility
 from ..mechanics.motion import entries_of, force_and_moment, with_entries
 from ..mechanics.sparse_rows import SparseRows
 from ..mechanics.switched import SwitchedRow, switched_rows
-from ..mechanics.wrenches import JointWrenches, Row6, carried_reactions
+from ..mechanics.wrenches import JointWrenches, Row6, joint_reactions
 from ..model.mechanism import Mechanism
 from ..native.limits.systems import UNTOUCHED
 from .factor import factorize, solve
@@ -314,14 +314,14 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
     laws, speaking = dict[Expr, None](), dict[str, list[Expr]]()
     for terms in kinematics.forces:
-        own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_carried)]
-        if any(pieces_of(law, is_carried) is None for law in own):
+        own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_reaction)]
+        if any(pieces_of(law, is_reaction) is None for law in own):
             raise ModelError([too_many_pieces(mechanism, terms.force.name)])
         laws |= dict.fromkeys(own)
         speaking |= {terms.force.name: own} if own else {}
     asked = [graph.symbol(name) for name in mechanism.reaction_quantities]
     seen = substitute(asked, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
-    names = sorted(name for name in symbols_of([*laws, *seen]) if is_carried(name))
+    names = sorted(name for name in symbols_of([*laws, *seen]) if is_reaction(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
     rows, held = switched_rows(kinematics)
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
@@ -353,7 +353,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
     solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), velocities_after=after)
     known_rows = tuple((row.label, row.state, row.kind) for row in rows)
-    return replace(solved, held_rows=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
+    return replace(solved, rows_to_hold=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
 
 
 def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
@@ -464,7 +464,7 @@ def _reactions(
     wrenches = JointWrenches(kinematics)
     rows = {label: graph.symbol(f"multiplier[{label}]") for label in kinematics.constraints.labels}
     idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in rows}
-    every = carried_reactions(wrenches, rows | idle)
+    every = joint_reactions(wrenches, rows | idle)
     known = rows | idle | {row.label: row.multiplier for row in held}
     where = [reaction_of(name) for name in names]
     reactions = []

@@ -90,10 +90,10 @@ class SystemTerms:
         self.centroidal = _centroidal(k)  #: (18 + 3n,) or none without mass
         self.quaternion_slots = k.quaternion_slots  #: where Euler parameters start in q, their angular velocity in v
         #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with each other
-        self.given_rates = k.given_rates
+        self.general_rates = k.general_rates
         #: q' where there are Euler parameters or states, or where it is given
-        self.rates: Row = k.rates if k.quaternion_slots or k.given_rates else ()
-        self.coordinate_slopes = c.slopes  #: with ``given_rates``: (m_h, n_q) dC/dq
+        self.rates: Row = k.rates if k.quaternion_slots or k.general_rates else ()
+        self.coordinate_slopes = c.slopes  #: with ``general_rates``: (m_h, n_q) dC/dq
         self.finite_forces: Row = tuple(flag for _, flag in flag_forces(k))
         #: how long a step may be that passes over no contact; penetration, thickness and numbers of the deepest shapes
         self.meeting_times = tuple(_meeting_times(k))
@@ -160,7 +160,7 @@ class SystemTerms:
     @cached_property
     def coordinate_of(self) -> tuple[int, ...]:
         """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints and states."""
-        if self.given_rates:
+        if self.general_rates:
             return self.kinematics.coordinate_of
         turning = {k for _, j in self.quaternion_slots for k in range(j, j + 3)}
         turning |= set(range(self.n_v - self.n_states, self.n_v))
@@ -178,7 +178,7 @@ class SystemTerms:
         """Whether positions follow from those of the independent velocities."""
         coordinates = self.coordinate_of
         return (
-            not self.given_rates
+            not self.general_rates
             and self.n_c == len(self.constraints)
             and all(coordinates[k] >= 0 for k in self.preferred if k < self.n_v - self.n_states)
         )
@@ -192,7 +192,7 @@ class SystemTerms:
     def sizes(self) -> Sizes:
         """The sizes that shapes of functions are made of."""
         impacts = any(e.restitution is not None for e in self.kinematics.mechanism.events)
-        ruled = not self.given_rates and (impacts or bool(self.resets and self.n_c))
+        ruled = not self.general_rates and (impacts or bool(self.resets and self.n_c))
         n_held = len(self.held_errors)
         return Sizes(
             n_q=len(self.q),

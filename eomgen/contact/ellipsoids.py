@@ -116,7 +116,7 @@ class EllipsoidRound(Contact):
         return out, depth, vec.add(reach, second), second
 
 
-def normal_across(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+def silhouette_normal(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
     """The unit vector n in a plane for which n r - sqrt(n B n) is greatest, and that root; B is xx, xy, yy."""
     graph, (bxx, bxy, byy) = view.graph, form
     square = r[0] * r[0] + r[1] * r[1]
@@ -172,7 +172,7 @@ class EllipsoidRod(EllipsoidRound):
 
         r = vec.dot(across[0], place), vec.dot(across[1], place)
         bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
-        nx, ny, h = normal_across(view, r, (bxx, bxy, byy))
+        nx, ny, h = silhouette_normal(view, r, (bxx, bxy, byy))
         n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
         s = graph.apply("max", -self.half, graph.apply("min", self.half, form(along, n) / h - vec.dot(along, place)))
         moved = vec.scale(s, along)
@@ -319,7 +319,7 @@ class BlockEllipsoid(Contact):
         zero = view.graph.zero
         found: list[Vec3] = [(signs[0], zero, zero), (zero, signs[1], zero), (zero, zero, signs[2])]
         for i, j in itertools.combinations(range(3), 2):
-            nx, ny, _ = normal_across(view, (-d[i], -d[j]), (form[i][i], form[i][j], form[j][j]))
+            nx, ny, _ = silhouette_normal(view, (-d[i], -d[j]), (form[i][i], form[i][j], form[j][j]))
             n = [zero, zero, zero]
             n[i], n[j] = -nx, -ny
             found.append((n[0], n[1], n[2]))

@@ -41,7 +41,7 @@ from .states import (
     alike,
     cells_of,
     class_of,
-    given_groups,
+    groups_of_entry,
     pair_states,
     part_of,
 )
@@ -376,7 +376,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     rigidly = e["friction"] if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
     axes = 0
     if soil or has_bristles(e.values):
-        groups = given_groups(e.values)
+        groups = groups_of_entry(e.values)
         pairs = pair_states(groups)[1]
         axes = len(_axes(e.values, groups, lateral)) if pairs else 0
         axes = len(STATES) - 1 if bed else axes
@@ -469,7 +469,7 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     soil = "soil" in values
     if not soil and not has_bristles(values):
         return {}
-    groups = given_groups(values)
+    groups = groups_of_entry(values)
     if cells := cells_of(groups):
         return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
     axes = _axes(values, groups, values.get("lateral", True) is not False)

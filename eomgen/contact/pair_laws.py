@@ -140,22 +140,22 @@ class _PairView:
     def __init__(self, graph: Graph, planar: bool) -> None:
         self.graph, self._planar = graph, planar
         self._poses = [self._pose(letter) for letter in "ab"]
-        self._settled: dict[Expr, Expr] = {}
+        self._rounded: dict[Expr, Expr] = {}
 
     def settled(self, x: Expr) -> Expr:
         """A symbol for a number to which iterations came; see :func:`~.rounds.settled`."""
         if x.value is not None:
             return x
-        found = next((symbol for symbol, known in self._settled.items() if known.id == x.id), None)
+        found = next((symbol for symbol, known in self._rounded.items() if known.id == x.id), None)
         if found is None:
-            found = self.graph.symbol(f"settled{len(self._settled)}")
-            self._settled[found] = x
+            found = self.graph.symbol(f"settled{len(self._rounded)}")
+            self._rounded[found] = x
         return found
 
     def unsettled(self, results: Sequence[Expr]) -> list[Expr]:
         """Expressions with the numbers themselves in the places of their symbols."""
         known: dict[Expr, Expr] = {}
-        for symbol, x in self._settled.items():  # later ones may hold earlier ones
+        for symbol, x in self._rounded.items():  # later ones may hold earlier ones
             known[symbol] = substitute([x], known)[0]
         return substitute(results, known)
 

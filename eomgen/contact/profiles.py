@@ -409,7 +409,7 @@ def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
     return found
 
 
-def told_by_arcs(pieces: Sequence[ProfilePart]) -> float:
+def clearance_of_arcs(pieces: Sequence[ProfilePart]) -> float:
     """How deep inside an outline of arcs every point has one nearest place, as far as numbers tell; else infinite.
 
     It is the least radius of circles that touch the outline from inside and hold none of its points, |w|^2 / (2 w n)

@@ -27,6 +27,7 @@ from .profiles import (
     ProfilePart,
     arc_points,
     bowls,
+    clearance_of_arcs,
     cross,
     length,
     minus,
@@ -39,7 +40,6 @@ from .profiles import (
     sprocket_ring,
     straight_pieces,
     straight_ring,
-    told_by_arcs,
 )
 from .rounds import cuboid_parts
 from .states import BED, BED_CELL, FIELD, GROUNDS, INSIDE, WHEEL, ShapeParts, parts_of
@@ -230,7 +230,7 @@ class ContactShape:
         depth = solid_depth(pieces, depth)
         surface = [one for one in pieces if one.kind in ("edge", "arc")]
         told = depth  # by each piece for itself
-        if self.kind == "smooth_outline" and math.isfinite(most := told_by_arcs(surface)):
+        if self.kind == "smooth_outline" and math.isfinite(most := clearance_of_arcs(surface)):
             told = zero.graph.apply("min", depth, most)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)

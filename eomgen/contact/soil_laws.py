@@ -19,7 +19,7 @@ from ..expr.core import Expr, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import CAUGHT_UP
-from .states import WHEEL, cells_of, given_groups
+from .states import WHEEL, cells_of, groups_of_entry
 
 # -- numbers of soils --------------------------------------------------------------------------------------------------
 
@@ -344,7 +344,7 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
         message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
         e.require("frictional_modulus", cohesive + frictional, POSITIVE, remedy, message)
     width = e.positive("contact_width") if "contact_width" in e.values else None
-    groups = given_groups(e.values)
+    groups = groups_of_entry(e.values)
     rolls = any(shape.kind == WHEEL for group in groups for shape in group) and not cells_of(groups)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
     e.require("recovery", recovery, POSITIVE, "must be greater than 0")

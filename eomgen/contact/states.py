@@ -202,9 +202,9 @@ def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
     return count if count is not None and count >= TEETH else None
 
 
-def given_groups(values: Mapping[str, Any]) -> list[list[ShapeParts]]:
+def groups_of_entry(values: Mapping[str, Any]) -> list[list[ShapeParts]]:
     """The shapes of an entry's groups, as far as they can be read."""
-    return [_given_shapes(values[key]) for key in ("first", "second") if key in values]
+    return [_shapes_of_entry(values[key]) for key in ("first", "second") if key in values]
 
 
 def _listed(value: Any) -> list[Any]:
@@ -213,7 +213,7 @@ def _listed(value: Any) -> list[Any]:
     return value.tolist() if hasattr(value, "tolist") else [value]
 
 
-def _given_shapes(value: Any) -> list[ShapeParts]:
+def _shapes_of_entry(value: Any) -> list[ShapeParts]:
     found: list[ShapeParts] = []
     for shape in _listed(value):
         if not isinstance(shape, Mapping):

@@ -66,7 +66,7 @@ class Author:
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
         self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
-        self.put_in: Mapping[str, float | None] = equations.numbers_put_in()
+        self.put_in: Mapping[str, float | None] = equations.numbers_substituted()
         self.mechanism = equations.kinematics.mechanism
         self.names: Notation = equations.notation
         self._formula = Formulas(order_of(equations), digits=ROUNDED)

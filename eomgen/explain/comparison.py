@@ -93,7 +93,7 @@ def moving_state(module: Any, velocities: Sequence[str]) -> tuple[np.ndarray, bo
     return (moving, True) if same else (x, False)
 
 
-def told_state(module: Any, x: np.ndarray) -> dict[str, float]:
+def state_numbers(module: Any, x: np.ndarray) -> dict[str, float]:
     """Numbers of all symbols at a state, in which 0 stands for what rounding left of it."""
     case = Case(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
     values, layout = state_values(module, case), module.layout

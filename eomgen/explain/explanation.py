@@ -140,7 +140,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     from . import about_methods
     from . import sections as about
     from .author import Author
-    from .comparison import compare, moving_state, told_state
+    from .comparison import compare, moving_state, state_numbers
 
     if level not in LEVELS:
         raise no_such(f"no level {level!r}; there are {', '.join(LEVELS)}")
@@ -158,7 +158,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
         state, moved = {}, False
         if module is not None:
             x, moved = moving_state(module, author.independent_velocities)
-            state = told_state(module, x)
+            state = state_numbers(module, x)
         numbers.append(about.calculation(author, state, reason, moved))
     found = None if module is None else compare(author, module)
     sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(found, reason)]

@@ -289,15 +289,15 @@ def _roots(graph: Graph, outputs: Sequence[Expr]) -> list[frozenset[int] | None]
     return [held[y.id] for y in outputs]
 
 
-def settled_vector(a: Vec3, size: float) -> Vec3:
+def rounded_vector(a: Vec3, size: float) -> Vec3:
     """A vector whose constant components are exactly 0 where they are rounding of terms of a size."""
     x, y, z = (c.graph.zero if c.value is not None and abs(c.value) <= ROUNDED * size else c for c in a)
     return (x, y, z)
 
 
-def settled_rotation(m: Mat3) -> Mat3:
+def rounded_rotation(m: Mat3) -> Mat3:
     """A rotation whose constant entries are exactly 0, 1 or -1 where rounding alone keeps them from it."""
-    rows = [list(settled_vector(row, 1.0)) for row in m]
+    rows = [list(rounded_vector(row, 1.0)) for row in m]
     graph = m[0][0].graph
     for i, row in enumerate(rows):
         found = [j for j, x in enumerate(row) if not x.is_zero]

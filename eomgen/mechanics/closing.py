@@ -116,7 +116,7 @@ def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradien
 def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
     """C_q (m, n), with the rows of cut joints by twists where that is shorter."""
     c = kinematics.constraints
-    if kinematics.given_rates or not c.values or not kinematics.topology.cut:
+    if kinematics.general_rates or not c.values or not kinematics.topology.cut:
         return c.jacobian
     found = {label: row for k in kinematics.topology.cut for label, row in twist_rows(kinematics, k).items()}
     if not found:
@@ -181,7 +181,7 @@ class EndMotion(NamedTuple):
 def shortest_gamma(kinematics: Kinematics) -> tuple[Expr, ...]:
     """Gamma (m,), of cut joints by the motion of their ends where that is shorter."""
     c = kinematics.constraints
-    if kinematics.given_rates or c.stabilised is not None or not c.values or not kinematics.topology.cut:
+    if kinematics.general_rates or c.stabilised is not None or not c.values or not kinematics.topology.cut:
         return c.gamma
     found = end_gammas(kinematics)
     if not found:

@@ -94,7 +94,7 @@ def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
         if group > 0:
             of_gaps.setdefault(group, set()).update(own)
     found = [of_gaps[group] if group > 0 else own for group, own in zip(groups, known, strict=True)]
-    if kinematics.given_rates or all(len(own) == n for own in found):
+    if kinematics.general_rates or all(len(own) == n for own in found):
         return ()
     return tuple(tuple(sorted(own)) for own in found)
 
@@ -268,7 +268,7 @@ class ConstraintFunctions:
         self.length_scale = float(length)
         self.scales = place = Scales.of_kinds(kinematics.velocity_kinds, sizes, self.length_scale, space)
         self._position = position = self._split(c.values, c.jacobian)
-        if kinematics.given_rates:  # positions do not move with velocities
+        if kinematics.general_rates:  # positions do not move with velocities
             place = Scales.of_kinds(kinematics.kinds, sizes[: self.h], self.length_scale)
             position = self._split(c.values, c.slopes, len(kinematics.names))
         sizes_of_loops = np.array([self.length_scale if kind == "length" else 1.0 for kind in loop.kinds])

@@ -25,8 +25,8 @@ from .loops import (
     close_loop,
     couple,
     differentiate_constraints,
+    equation_rows,
     find_undefined,
-    own_rows,
     refuse_rows_of_time,
     refuse_unusable,
 )
@@ -98,7 +98,7 @@ class Kinematics:
     coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
     #: by event, while constraints are closed
     velocities_after: Mapping[str, tuple[tuple[str, Expr], ...]] = field(default_factory=dict)
-    held_rows: tuple[tuple[str, str, str], ...] = ()  #: label, state, kind of constraints that close and open
+    rows_to_hold: tuple[tuple[str, str, str], ...] = ()  #: label, state, kind of constraints that close and open
     held_errors: tuple[Expr, ...] = ()  #: of each, its error and the rate of it, while it is closed
     reaction_laws: tuple[str, ...] = ()  #: force elements whose laws speak of reactions, which are solved for
     hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
@@ -163,7 +163,7 @@ class Kinematics:
         return tuple(n[:-4] if n.endswith("_dot") and n[:-4] in bases else n for n in self.velocity_names)
 
     @property
-    def given_rates(self) -> bool:
+    def general_rates(self) -> bool:
         """Whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v."""
         return self.mechanism.given is not None and self.rates != self.v
 
@@ -198,7 +198,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     links = build_links(mechanism, topology, symbols, AxisTurns(mechanism, topology, symbols).turned)
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
-    rows = own_rows(mechanism)
+    rows = equation_rows(mechanism)
     aligned: list[tuple[str, Expr]] = []
     loop_names: list[str] = []
     loop_kinds: list[str] = []

@@ -257,7 +257,7 @@ class Resolved:
     axes: tuple[Mat3 | None, ...]  #: link axes to the axes it is resolved in; None where they are the same
 
     @classmethod
-    def in_own_axes(
+    def in_link_axes(
         cls, links: Sequence[Link], twists: Sequence[Twist], rates: list[JointRates], applied: list[Wrench]
     ) -> Resolved:
         """As they are."""

@@ -179,7 +179,7 @@ def _is_closed(row: Row, size: float) -> bool:
     return value is not None and not row.written and abs(value) <= ROUNDED * size
 
 
-def own_rows(mechanism: Mechanism) -> list[Row]:
+def equation_rows(mechanism: Mechanism) -> list[Row]:
     """The constraint equations that accompany a bare Lagrangian or given equations."""
     bare = mechanism.given
     if bare is None:

@@ -111,7 +111,7 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
     problems = []
     for i, (label, row, written) in enumerate(zip(c.labels, c.jacobian, c.written, strict=True)):
         slopes = [x for x in row if not x.is_zero]
-        if kinematics.given_rates and i < len(c.slopes) and not all(vanishes(substitute(c.slopes[i], known))):
+        if kinematics.general_rates and i < len(c.slopes) and not all(vanishes(substitute(c.slopes[i], known))):
             continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
         if (written and slopes) or not all(vanishes(substitute(slopes, known))):
             used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
@@ -471,7 +471,7 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
 def _wanted(kinematics: Kinematics, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The labels of the velocities that are named, and the coordinates, where these do not move as velocities say."""
     labels = dict(zip(kinematics.velocity_names, kinematics.velocity_labels, strict=True))
-    if not kinematics.given_rates:
+    if not kinematics.general_rates:
         labels |= {f"{name}_dot": name for name in kinematics.loop_coordinates.names}
         return tuple(labels.get(name, name) for name in names), ()
     places = tuple(name for name in names if name in kinematics.names)
@@ -502,7 +502,7 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
     if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
         problems.append(_choice(kinematics, f"{', '.join(twice)}: named twice", "name it once"))
-    coordinates = kinematics.names if kinematics.given_rates else kinematics.loop_coordinates.names
+    coordinates = kinematics.names if kinematics.general_rates else kinematics.loop_coordinates.names
     known = (*dict.fromkeys((*kinematics.velocity_labels, *coordinates)),)
     for name in wanted:
         if name in kinematics.velocity_labels:
@@ -577,7 +577,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     if functions.m and not r:
         refuse_idle_rows(kinematics, functions.values)
     n_dof = n - r
-    if len(wanted) > n_dof and kinematics.given_rates and set(wanted) <= set(kinematics.names):
+    if len(wanted) > n_dof and kinematics.general_rates and set(wanted) <= set(kinematics.names):
         wanted = ()  # coordinates, of which there may be more than velocities
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"

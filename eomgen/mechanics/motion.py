@@ -24,8 +24,8 @@ from ..model.quantities import (
     MASS,
     MOMENTUM,
     TURNING,
-    CarriedQuantity,
     Quantity,
+    ReactionQuantity,
     WrenchQuantity,
 )
 from .topology import MotionSymbols
@@ -47,7 +47,7 @@ class Placed(Protocol):
     def coordinate(self, name: str) -> tuple[Expr, Expr]: ...
 
 
-def part_of_reaction(motion: Placed, spec: JointSpec, quantity: CarriedQuantity) -> Expr:
+def part_of_reaction(motion: Placed, spec: JointSpec, quantity: ReactionQuantity) -> Expr:
     """The part, in symbols of the joint's wrench along the axes of S."""
     wrench = [reaction_symbol(motion.graph, spec.name, k) for k in range(6)]
     force, moment = force_and_moment(motion, spec, wrench)
@@ -406,7 +406,7 @@ class MarkerMotion:
             mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
 
-    def _carried(self, mechanism: Mechanism, quantity: CarriedQuantity) -> Expr:
+    def _carried(self, mechanism: Mechanism, quantity: ReactionQuantity) -> Expr:
         """A part of a reaction in symbols of the joint's wrench, or a multiplier; their values once they are known."""
         if quantity.part:
             spec = next(spec for spec in mechanism.joints if spec.name == quantity.of)

@@ -115,7 +115,7 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             "if it should move, remove a constraint, or replace a joint by one with more freedom"
         )
     follow = f"{_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from"
-    if mobility.redundant and kinematics.given_rates and not mobility.assumed:
+    if mobility.redundant and kinematics.general_rates and not mobility.assumed:
         notes.append(
             f"{follow} the rates or from other constraints; the motion is not affected, and states are projected onto "
             "all of them"

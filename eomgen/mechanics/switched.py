@@ -43,7 +43,7 @@ class SwitchedRow(NamedTuple):
 
 
 @dataclass(frozen=True)
-class HeldBy(Force):
+class ClosingForce(Force):
     """What a constraint exerts while it is closed."""
 
     def loads(self, view: View) -> list[Load]:
@@ -91,7 +91,7 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
             if not part.is_zero:
                 along[name] = along.get(name, graph.zero) - _while_closed(switch, part) * multiplier
     loads = [CoordinateLoad(name, value) for name, value in along.items()]
-    force = HeldBy(switch.constraint.name)
+    force = ClosingForce(switch.constraint.name)
     return rows, ForceTerms(force, tuple(markers), tuple(loads), None, tuple(markers), tuple(loads))
 
 

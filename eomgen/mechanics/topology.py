@@ -24,7 +24,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import Evaluator
-from ..expr.identity import settled_vector, size_of
+from ..expr.identity import rounded_vector, size_of
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
@@ -375,5 +375,5 @@ def _radius_of_gyration(mechanism: Mechanism, size: Expr) -> float:
 
 def _square(a: Vec3, b: Vec3) -> Expr:
     """The square of a distance, exactly 0 where it is rounding of the places."""
-    apart = settled_vector(vec.sub(a, b), size_of(a, b))
+    apart = rounded_vector(vec.sub(a, b), size_of(a, b))
     return vec.dot(apart, apart)

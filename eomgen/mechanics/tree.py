@@ -12,7 +12,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
 from ..expr.differentiate import gradient
 from ..expr.evaluate import evaluate
-from ..expr.identity import DRAWS, random_point, settled_rotation, settled_vector, size_of, vanishes
+from ..expr.identity import DRAWS, random_point, rounded_rotation, rounded_vector, size_of, vanishes
 from ..expr.records import dataclass
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
@@ -120,20 +120,20 @@ def body_inertia(body: Body, frame: Frame) -> SpatialInertia:
     if body.moment is not None and body.inertia_origin is not None:
         about_body = SpatialInertia(body.mass, body.moment, symmetric(body.inertia_origin))
         return about_body.shifted(vec.neg(frame.position)).turned(back)
-    inertia = settled_matrix(rotate_symmetric(back, symmetric(body.inertia)), body.inertia)
+    inertia = rounded_matrix(rotate_symmetric(back, symmetric(body.inertia)), body.inertia)
     return SpatialInertia(body.mass, vec.zero(body.mass.graph), inertia).shifted(place_point(frame, body.com))
 
 
 def place_point(frame: Frame, point: Vec3) -> Vec3:
     """A point of a body, in the frame: numbers that cancel are exactly 0."""
     moved = vec.transpose_times(frame.rotation, vec.sub(point, frame.position))
-    return settled_vector(moved, size_of(point, frame.position))
+    return rounded_vector(moved, size_of(point, frame.position))
 
 
-def settled_matrix(turned: Mat3, before: Mat3) -> Mat3:
+def rounded_matrix(turned: Mat3, before: Mat3) -> Mat3:
     """A matrix that was turned, its constant entries exactly 0 where they are rounding of those before."""
     size = max(size_of(row) for row in before)
-    return (settled_vector(turned[0], size), settled_vector(turned[1], size), settled_vector(turned[2], size))
+    return (rounded_vector(turned[0], size), rounded_vector(turned[1], size), rounded_vector(turned[2], size))
 
 
 # -- the tree ----------------------------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ def place(frame: Frame, marker: Frame) -> Frame:
     mechanism do not depend on how its bodies are described.
     """
     turn = vec.transpose(frame.rotation)
-    return Frame(settled_rotation(vec.product(turn, marker.rotation)), place_point(frame, marker.position))
+    return Frame(rounded_rotation(vec.product(turn, marker.rotation)), place_point(frame, marker.position))
 
 
 def build_links(
@@ -245,7 +245,7 @@ def build_links(
                 columns=tuple(columns),
                 mass=body.mass,
                 com=place_point(frame, body.com),
-                inertia=settled_matrix(vec.product(back, vec.product(body.inertia, frame.rotation)), body.inertia),
+                inertia=rounded_matrix(vec.product(back, vec.product(body.inertia, frame.rotation)), body.inertia),
                 spatial=body_inertia(body, frame),
                 frame=frame,
             )

@@ -412,7 +412,7 @@ def find_wrenches(kinematics: Kinematics) -> JointWrenches | None:
 # (Featherstone, RBDA, sec. 5.3), as :mod:`~eomgen.analysis.reactions` does on numbers.
 
 
-def carried_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) -> dict[str, Row6]:
+def joint_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) -> dict[str, Row6]:
     """Wrench (force, moment) that P exerts on S at S, along the axes of S, of each joint.
 
     Components along the directions in which a joint is free contain what acts along its coordinates.

@@ -309,7 +309,7 @@ def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -
                 continue
 
 
-def own_states(
+def element_states(
     reader: Reader, entries: list[DescribedEntry]
 ) -> tuple[tuple[FirstOrderState, ...], dict[str, tuple[str, str]]]:
     """Take in the states of force elements, which begin at 0: the states, and what the symbols of their rates are."""

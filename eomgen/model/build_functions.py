@@ -78,7 +78,7 @@ SIZE = 1_000_000  #: bytes of one source file
 
 
 @dataclass(frozen=True)
-class PythonTwin:
+class FallbackSource:
     """Callables that stand for a C function, its first and its second derivatives, None where one is not given."""
 
     value: Callable[..., Any]
@@ -203,7 +203,7 @@ def _twin(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tup
     given, path = entry.values.get("python"), f"{entry.path}.python"
     if given is None:
         return None
-    if isinstance(given, PythonTwin):
+    if isinstance(given, FallbackSource):
         functions = {(0,) * arity: given.value}
         for key, total in (("derivatives", 1), ("second_derivatives", 2)):
             every = list(up_to(arity, total))

@@ -21,7 +21,7 @@ from .build_elements import (
     check_turns,
     declare_contacts,
     declare_coordinates,
-    own_states,
+    element_states,
     with_locks,
 )
 from .build_functions import build_functions
@@ -57,7 +57,7 @@ from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Mechanism, Simulation
 from .names import Namespace, fault_of_model_name
-from .quantities import SUMS, CarriedQuantity, WrenchQuantity
+from .quantities import SUMS, ReactionQuantity, WrenchQuantity
 from .read_shapes import read_shapes
 from .sympy_face import in_order, name_of
 from .values import Reader
@@ -113,7 +113,7 @@ def build(description: Description) -> Mechanism:
     declared, by_clock = declare_states(
         reader, sections["states"], given_values is not None or lagrangian_values is not None
     )
-    held, state_rates = own_states(reader, sections["forces"])
+    held, state_rates = element_states(reader, sections["forces"])
     switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
@@ -144,7 +144,7 @@ def build(description: Description) -> Mechanism:
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
-    limits_told = _limits_told(reader, values.get("limits"))
+    limits_told = _limit_notes(reader, values.get("limits"))
     check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
@@ -154,7 +154,7 @@ def build(description: Description) -> Mechanism:
     check_turns(constraints, reader.requirements)
     if lagrangian is None:
         check_energies(given, outputs, faults)
-    _check_asked(reader, forces)
+    _check_path_quantities(reader, forces)
     if not faults:
         check_dimensions(reader, joints)
     if len(joints) == len(sections["joints"]):
@@ -175,7 +175,7 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=(*states, *held, *(switch.held_state for switch in switched)),
+        states=(*states, *held, *(switch.discrete_state for switch in switched)),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
@@ -213,7 +213,7 @@ def build(description: Description) -> Mechanism:
     )
 
 
-def _limits_told(reader: Reader, given: Any) -> bool:
+def _limit_notes(reader: Reader, given: Any) -> bool:
     if given == "stop":
         remedy = "add a force of type stop for each joint; allowed here: note, off"
         reader.fault("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE")
@@ -266,19 +266,19 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         reader.fault("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
 
-def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, CarriedQuantity]]:
+def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, ReactionQuantity]]:
     """The parts of what force elements exert on bodies, and of reactions and multipliers, that expressions speak of."""
-    exerted, carried = dict[str, WrenchQuantity](), dict[str, CarriedQuantity]()
+    exerted, carried = dict[str, WrenchQuantity](), dict[str, ReactionQuantity]()
     for asked, path in reader.asked.items():
         axes = reader.moving(asked.axes) if asked.axes else None
         if asked.carried:
-            carried[str(asked)] = CarriedQuantity(asked.of, asked.part, axes, path)
+            carried[str(asked)] = ReactionQuantity(asked.of, asked.part, axes, path)
         elif asked.on:
             exerted[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
     return exerted, carried
 
 
-def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
+def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
     for asked, path in reader.asked.items():

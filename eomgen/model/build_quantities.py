@@ -21,7 +21,7 @@ from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, STATE
 from .mechanism import Clock, Event, FirstOrderState, Input, Output, Parameter, Switched
-from .names import late_names, nearest
+from .names import names_of_acceleration, nearest
 from .quantities import VELOCITIES, Named
 from .sympy_face import in_order
 from .units import Unit, UnitError, read_unit
@@ -282,7 +282,7 @@ def check_resets(
 def instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
-    for name, what in late_names(reader.names, symbols_of([expression])):
+    for name, what in names_of_acceleration(reader.names, symbols_of([expression])):
         remedy = (
             "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
         )
@@ -316,7 +316,7 @@ def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[li
     groups: dict[tuple[str, str], list[DescribedEntry]] = {}
     for entry in entries:
         if "sampled" in entry.values or ("period" in entry.values and "rate" not in entry.values):
-            written = (_shown_time(entry.values.get("period")), _shown_time(entry.values.get("offset", 0)))
+            written = (_time_text(entry.values.get("period")), _time_text(entry.values.get("offset", 0)))
             groups.setdefault(written, []).append(entry)
     for first, *_ in groups.values():
         reader.names.declare("state", f"{first.name}{COUNTER}", first.path)
@@ -366,7 +366,7 @@ def _sampling_times(reader: Reader, entries: Sequence[DescribedEntry]) -> tuple[
     return found[0]
 
 
-def _shown_time(given: Any) -> str:
+def _time_text(given: Any) -> str:
     """A number or expression as text, so that 0.010 and "0.01" are the same."""
     try:
         return repr(float(given))

@@ -19,12 +19,12 @@ from ..errors import Problem, UsageError
 from ..expr.core import Graph
 from ..expr.latex import Group, NotationError, Scripts, head_of, read_latex, spaced
 from ..expr.notation import literal
-from .build_elements import declare_contacts, declare_coordinates, own_states
+from .build_elements import declare_contacts, declare_coordinates, element_states
 from .build_quantities import declare_states, declare_switches
 from .checks import check_keys, unknown_key
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .fields import ADDED, COMPONENT
-from .names import ENERGIES, RATES, Namespace, fault_of_name, function_words, nearest
+from .names import ENERGIES, RATES, Namespace, callable_names, fault_of_name, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
 from .units import UnitError, read_unit
 from .values import Reader
@@ -34,16 +34,16 @@ from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started,
 Fault = Callable[[str, str, str, str], None]
 
 #: Words of expressions that no model declares.
-WORDS = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *function_words()))
+WORDS = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *callable_names()))
 
 
 def is_constant(value: Any) -> bool:
     """Whether a value is a number, or a text of numbers alone such as ``-pi/6``."""
-    return not isinstance(value, str) or names_of(value) <= {"pi", *function_words()}
+    return not isinstance(value, str) or names_of(value) <= {"pi", *callable_names()}
 
 
 # -- the names of a component ------------------------------------------------------------------------------------------
-class OwnNames:
+class DeclaredNames:
     """Names that a description declares: symbols of expressions, bodies, joints and constraints."""
 
     def __init__(self, description: Description) -> None:
@@ -60,7 +60,7 @@ class OwnNames:
         declare_coordinates(reader, sections["joints"])
         declare_contacts(reader, sections["constraints"])
         declare_states(reader, sections["states"], False)
-        own_states(reader, sections["forces"])
+        element_states(reader, sections["forces"])
         declare_switches(reader, [*sections["constraints"], *sections["joints"]])
         unknown = [entry for entry in sections["joints"] if str(entry.values.get("type")) not in JOINTS]
         self.symbols |= {str(entry.name) for entry in unknown} | {*reader.names.kinds} - {"t"}
@@ -83,7 +83,7 @@ class Renaming(Visitor):
 
     Parameters
     ----------
-    own : OwnNames
+    own : DeclaredNames
     prefix : str
         Put before every name of the component.
     values : mapping of str to str
@@ -98,7 +98,7 @@ class Renaming(Visitor):
 
     def __init__(
         self,
-        own: OwnNames,
+        own: DeclaredNames,
         prefix: str,
         values: Mapping[str, str],
         attached: Mapping[str, Attached],
@@ -198,7 +198,7 @@ class InstanceValue(NamedTuple):
     unit: str | None = None  #: None for that of the component
 
 
-def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
+def read_instance_value(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
     """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
 
     Parameters
@@ -268,7 +268,7 @@ class Component:
     closed: bool = True
 
     def __post_init__(self) -> None:
-        self.names = OwnNames(self.description)
+        self.names = DeclaredNames(self.description)
         self.size = size_of(self.description) + 1
         self.given = {e.name: e for s in ("parameters", "inputs") for e in self.description.sections[s]}
 
@@ -400,7 +400,7 @@ def _values(
             sound = False
     numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
     for name, entry in component.given.items():
-        read = read_given(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
+        read = read_instance_value(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
         if read is None:
             sound = False
             continue

@@ -185,9 +185,9 @@ class Faults:
 
     def sorted(self) -> list[Problem]:
         """All problems; those of a file in the order of its lines, one of several instances once."""
-        return list_names_once(sorted(self._told_once(), key=lambda p: (p.file, p.line)))
+        return list_names_once(sorted(self._merge_instances(), key=lambda p: (p.file, p.line)))
 
-    def _told_once(self) -> list[Problem]:
+    def _merge_instances(self) -> list[Problem]:
         """Problems of what instances brought, at the entry of the component, with the names of the instances."""
         found: dict[Any, tuple[Problem, list[str]]] = {}
         for problem in self.problems:

@@ -1,7 +1,7 @@
 """Text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
-:func:`~eomgen.model.names.function_words`, functions that the graph declares and, where markers can be resolved (in
+:func:`~eomgen.model.names.callable_names`, functions that the graph declares and, where markers can be resolved (in
 outputs), ``x``, ``vx``, ``wx`` and the like of a marker, ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
 Length, depth, size, numbers and exponents are bounded, so hostile text costs no more than honest text.
 """
@@ -18,7 +18,7 @@ from ..base.operations import OPERATIONS
 from ..base.texts import parse_python, shown
 from ..errors import ExpressionError, no_number
 from ..expr.core import Expr, Graph
-from .names import function_words, nearest
+from .names import callable_names, nearest
 from .quantities import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WORDS, WRENCH, Call, Named
 
 LENGTH = 4000  #: characters of one expression
@@ -74,7 +74,7 @@ _REFUSED: dict[type[ast.AST], str] = {
 def allowed() -> str:
     """What an expression may hold, for messages."""
     start = "allowed are numbers such as 1.5 (no units), names, + - * / ** between them, comparisons, and, or, not, "
-    return f"{start}'a if c else b' and the functions {' '.join(function_words())}"
+    return f"{start}'a if c else b' and the functions {' '.join(callable_names())}"
 
 
 def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
@@ -155,7 +155,7 @@ class _Walker:
     graph: Graph
     resolve: Resolve
     locate: Locate | None
-    words: Mapping[str, tuple[int, int]] = field(default_factory=function_words)
+    words: Mapping[str, tuple[int, int]] = field(default_factory=callable_names)
     size: int = 0
 
     def fault(self, node: ast.AST, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:

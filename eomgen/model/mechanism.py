@@ -25,7 +25,7 @@ from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .description import place_of
 from .placement import TURNS, Columns
-from .quantities import CarriedQuantity, Quantity, WrenchQuantity
+from .quantities import Quantity, ReactionQuantity, WrenchQuantity
 from .requirements import Requirement
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ class Switched(NamedTuple):
         return graph.apply("lt", 0.5, graph.symbol(self.state))
 
     @property
-    def held_state(self) -> FirstOrderState:
+    def discrete_state(self) -> FirstOrderState:
         """The state, which events alone change."""
         name = "" if self.constraint is None else self.constraint.name
         return FirstOrderState(self.state, self.stabilisation.graph.zero, doc=f"1 while {name} holds")
@@ -269,7 +269,7 @@ class Mechanism:
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
     wrench_quantities: Mapping[str, WrenchQuantity] = field(default_factory=dict)  #: by symbol
-    reaction_quantities: Mapping[str, CarriedQuantity] = field(default_factory=dict)  #: by symbol
+    reaction_quantities: Mapping[str, ReactionQuantity] = field(default_factory=dict)  #: by symbol
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts

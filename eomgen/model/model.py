@@ -13,7 +13,7 @@ from ..elements.constraints import CONSTRAINTS
 from ..elements.forces import FORCES
 from ..elements.joints import JOINTS
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
-from .build_functions import PythonTwin
+from .build_functions import FallbackSource
 from .build_mechanism import build
 from .components import Component, Instance, add_instance, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items, model_html
@@ -251,7 +251,7 @@ class Builder(ElementMethods):
         if None in further:
             raise ill_typed(f"native {name}: python_derivatives must be lists of functions")
         if twin is not None and not isinstance(twin, str):
-            twin = PythonTwin(twin, *further)
+            twin = FallbackSource(twin, *further)
         elif any(further):
             raise incomplete(
                 "python_derivatives need a callable python=; a Python file holds derivatives under their C names"

@@ -24,7 +24,7 @@ MOST = 64
 LISTED = 20  #: names that a message lists at most
 
 
-def function_words() -> dict[str, tuple[int, int]]:
+def callable_names() -> dict[str, tuple[int, int]]:
     """Functions an expression may call, with the least and the greatest number of arguments."""
     rows = [row for row in OPERATIONS.values() if row.word]
     found = {row.word: (row.arity, MOST if row.many else row.arity) for row in rows}
@@ -83,7 +83,7 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
             return "'t' is reserved for the time", "choose another name"
         if name == "pi":
             return "'pi' is reserved for the number pi", "choose another name"
-        if name in function_words():
+        if name in callable_names():
             return f"{name!r} is a built-in function", f"choose another name, e.g. {name}_"
     return None
 
@@ -164,7 +164,7 @@ _RATES_OF = {
 ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 
 
-def late_names(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
+def names_of_acceleration(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
     late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
     late["rate of a state"] = "rate of a state"
@@ -290,7 +290,7 @@ class Scope:
     def _read(self, output: str) -> Expr:
         """The expression of an output."""
         found = self.output(output)
-        for name, what in late_names(self.names, symbols_of([found])) if self.level < OUTPUT else ():
+        for name, what in names_of_acceleration(self.names, symbols_of([found])) if self.level < OUTPUT else ():
             message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([found])

@@ -127,7 +127,7 @@ class WrenchQuantity(NamedTuple):
     path: str  #: where an expression speaks of it first
 
 
-class CarriedQuantity(NamedTuple):
+class ReactionQuantity(NamedTuple):
     """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
 
     ``part`` is empty for a multiplier.

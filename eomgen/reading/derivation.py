@@ -19,7 +19,7 @@ from ..expr.records import dataclass
 from ..expr.schedule import Operations, count
 from ..expr.without_gc import timed, without_gc
 from ..mechanics import Kinematics, analyse
-from ..mechanics.methods import GIVEN, METHODS, TreeEquations, take_given
+from ..mechanics.methods import GIVEN, METHODS, TreeEquations, direct_equations
 from ..mechanics.mobility import Mobility, find_mobility
 from ..mechanics.report import MechanismReport, report
 from ..model.sympy_face import names_of
@@ -140,7 +140,7 @@ def derive_mechanism(
             kinematics = with_reactions(kinematics, mobility)
         choice: Choice | None = None
         if chosen == GIVEN:
-            tree = take_given(kinematics)
+            tree = direct_equations(kinematics)
         elif chosen != "auto":
             tree = METHODS[chosen](kinematics)
         else:

@@ -156,7 +156,7 @@ class ReadingView(Displayed):
         k = self.kinematics
         known = {*k.parameter_names, *k.input_names}
         moving = sorted({name for given in self._put_in for name in given}.difference(known))
-        strange = sorted({*self.names_put_in}.difference(known))
+        strange = sorted({*self.names_substituted}.difference(known))
         if moving:
             raise UnavailableError(
                 f"explain has no view with {self._told}: the steps of a solution differentiate by {', '.join(moving)}; "

@@ -148,7 +148,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     kinematics, graph = quantities.kinematics, quantities.graph
     if kinematics.state_names:
         raise UnavailableError("the model has first-order states; use linearize of the module")
-    if kinematics.given_rates:
+    if kinematics.general_rates:
         raise UnavailableError("rates of coordinates are given as functions of velocities; use linearize of the module")
     inputs = kinematics.input_names
     if not symbols_of([*kinematics.constraints.velocity, *kinematics.constraints.gamma]).isdisjoint(inputs):

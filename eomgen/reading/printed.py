@@ -92,7 +92,7 @@ def order_of(equations: Readable) -> Order:
             kinds[p.name] = INERTIA
         else:
             kinds[p.name] = GRAVITY if p.name in gravity else PARAMETER
-    kinds |= dict.fromkeys(equations.names_put_in, PARAMETER)
+    kinds |= dict.fromkeys(equations.names_substituted, PARAMETER)
     kinds |= dict.fromkeys(equations.kinematics.input_names, INPUT)
     kinds |= dict.fromkeys([*k.names, *k.loop_coordinates.names, "t"], COORDINATE)
     return Order(kinds | dict.fromkeys([*k.velocity_names, *equations.acceleration_names], RATE))
@@ -148,14 +148,14 @@ class PrintedEquations:
         return Letters(M, self.names.letter(*rates, *OTHERS.accelerations), f)
 
     @property
-    def letters_told(self) -> list[tuple[str, str]]:
+    def renamed_letters(self) -> list[tuple[str, str]]:
         """Letters that are not the usual ones, in LaTeX, and what they stand for."""
         told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
         return [(letter, what) for letter, usual, what in told if letter != usual]
 
-    def told_letters(self) -> Iterator[Sentence]:
+    def list_renamed_letters(self) -> Iterator[Sentence]:
         """A sentence of them."""
-        if told := ", ".join(f"${letter}$ is {what}" for letter, what in self.letters_told):
+        if told := ", ".join(f"${letter}$ is {what}" for letter, what in self.renamed_letters):
             yield Sentence(f"{told}; the usual letters are names of the model.")
 
     @cached_property
@@ -176,7 +176,7 @@ class PrintedEquations:
     @cached_property
     def accelerations(self) -> list[Formula]:
         """v' of M v' = f."""
-        return [self.formula(x) for x in self.equations.symbols_put_in(self.equations.acceleration_names)]
+        return [self.formula(x) for x in self.equations.symbols_substituted(self.equations.acceleration_names)]
 
     @cached_property
     def states(self) -> list[tuple[Formula, Formula]]:
@@ -185,7 +185,7 @@ class PrintedEquations:
         held = {name for clock in mechanism.clocks for name in (*clock.states, clock.counter)}
         if held.issuperset(names):
             return []
-        rates = self.equations.symbols_put_in([acceleration_name(name) for name in names])
+        rates = self.equations.symbols_substituted([acceleration_name(name) for name in names])
         named, column = self.equations.written("state_rates")
         pairs = [(rate, x) for name, rate, x in zip(names, rates, column, strict=True) if name not in held]
         return [(self.formula(left), self.formula(right)) for left, right in (*named, *pairs)]
@@ -197,7 +197,7 @@ class PrintedEquations:
         if not names:
             return []
         named, column = self.equations.written("sampled_values")
-        pairs = (*named, *zip(self.equations.symbols_put_in(names), column, strict=True))
+        pairs = (*named, *zip(self.equations.symbols_substituted(names), column, strict=True))
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
     @property
@@ -205,7 +205,7 @@ class PrintedEquations:
         """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
         return [
             Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
-            for given in self.equations.values_put_in()
+            for given in self.equations.values_substituted()
             for name, x in given
         ]
 
@@ -255,7 +255,7 @@ class PrintedEquations:
         else:
             mass, _, force = map(Letter, self.letters)
             yield FormulaLine((Product((mass, self.column)), force))
-            yield from self.told_letters()
+            yield from self.list_renamed_letters()
             several = len(self.accelerations) > 1
             whole = several and self.mass_matrix_fits
             if whole:
@@ -430,7 +430,7 @@ class PrintedParts:
         """All of it."""
         M, v, f = self.printed.letters
         yield _row((Product((Letter(M), self.printed.column)), Letter(f)))
-        yield from self.printed.told_letters()
+        yield from self.printed.list_renamed_letters()
         if self.printed.of_loops:
             yield from self._embedding(*map(Letter, (M, v, f)))
         large: list[_Matrix] = []
@@ -616,7 +616,7 @@ class PrintedParts:
         """Named parts by meaning."""
         k = self._kinematics
         outputs = {matrix.meaning: list(matrix.values) for matrix in self._matrices}
-        constants = {*k.parameter_names, *self.equations.names_put_in}
+        constants = {*k.parameter_names, *self.equations.names_substituted}
         return grouped(self.printed.named, outputs, constants, {*k.velocity_names, *k.input_names})
 
     @cached_property

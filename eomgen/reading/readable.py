@@ -238,7 +238,7 @@ class Readable(ABC):
     @cached_property
     def notation(self) -> Notation:
         """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
-        return model_notation(self.kinematics, self.names_put_in)
+        return model_notation(self.kinematics, self.names_substituted)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
     def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
@@ -690,7 +690,7 @@ class Readable(ABC):
             found = put_in(found, values)
         return found
 
-    def numbers_put_in(self) -> dict[str, float | None]:
+    def numbers_substituted(self) -> dict[str, float | None]:
         """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
         m, names = self.kinematics.mechanism, list(dict.fromkeys(name for given in self._put_in for name in given))
         quantities: list[Any] = [*m.parameters, *m.inputs]
@@ -788,16 +788,16 @@ class Readable(ABC):
     @property
     def _known(self) -> tuple[str, ...]:
         """Names for which values can be put in."""
-        return (*self._own, *momentum_names(self.kinematics), *self.names_put_in)
+        return (*self._own, *momentum_names(self.kinematics), *self.names_substituted)
 
     @property
-    def names_put_in(self) -> tuple[str, ...]:
+    def names_substituted(self) -> tuple[str, ...]:
         """Names that the model does not have and that values put in have brought."""
         graph = Graph()
         values = (read_value(graph, name, value) for given in self._put_in for name, value in given.items())
         return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
 
-    def values_put_in(self) -> list[list[tuple[str, Any]]]:
+    def values_substituted(self) -> list[list[tuple[str, Any]]]:
         """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
         return [[(name, self._as_given(value)) for name, value in given.items()] for given in self._put_in]
 
@@ -806,7 +806,7 @@ class Readable(ABC):
             return value
         return self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
 
-    def symbols_put_in(self, names: Sequence[str]) -> list[Any]:
+    def symbols_substituted(self, names: Sequence[str]) -> list[Any]:
         """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
         graph = Graph()
         return self.in_sympy(self.with_values([graph.symbol(name) for name in names])).expressions

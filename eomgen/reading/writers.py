@@ -120,7 +120,7 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
     short = f"{mass} {rates[0]} = {right}" if printed.is_one_equation else f"{mass} {v} = {right}"
     listed = f"{short} with {v} = ({', '.join(rates)})"
     yield short if printed.is_one_equation or len(listed) > columns else listed
-    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.letters_told):
+    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.renamed_letters):
         yield from fold(f"{told}; the usual letters are names of the model", columns, "  ", "  ")
     yield ""
     rows = [*_matrix(M, f"{mass} = ")]

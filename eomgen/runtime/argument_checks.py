@@ -40,7 +40,7 @@ PLAIN = frozenset((float, int, bool, np.float64))
 DEEPEST = 64  #: lists in lists, as in NumPy
 
 
-def require_room(what: str, numbers: float, remedy: str) -> None:
+def require_size(what: str, numbers: float, remedy: str) -> None:
     """Refuse what would keep more numbers than ``MOST_NUMBERS``, before any of them is made."""
     if numbers > MOST_NUMBERS:
         raise too_large(
@@ -108,7 +108,7 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
     """
     shape = np.shape(given) if isinstance(given, np.ndarray) else ()
     if len(shape) > 1:
-        require_room(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
+        require_size(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
     return _floats(what, given, f"{what} must hold real numbers")
 
 
@@ -147,7 +147,7 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
         length = len(given)
     except Exception:  # one number, or what is no list of times
         length = 0
-    require_room(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
+    require_size(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
     return np.array(_floats(what, given, f"{what} must be a list of times in seconds"))
 
 

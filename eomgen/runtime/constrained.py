@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 def closed_rows(module: BoundModel, x: Array) -> list[int]:
     """Places among the equations of constraints that close and open of those that are closed at a state (n_x,)."""
-    rows = module.info.held_rows
+    rows = module.info.rows_to_hold
     return [k for k, (_, state, _) in enumerate(rows) if x[module.layout.x.index(state)] > 0.5]
 
 
 def with_closed_rows(module: BoundModel, t: float, x: Array, C_q: Array) -> tuple[Array, Scales]:
     """The Jacobian (n_c, n_v) of the constraints with a row (by v) for each equation that is closed, and its scales."""
-    layout, rows, closed = module.layout, module.info.held_rows, closed_rows(module, x)
+    layout, rows, closed = module.layout, module.info.rows_to_hold, closed_rows(module, x)
     if not closed:
         return C_q, layout.scales
     moving = layout.n_v - len(layout.states)

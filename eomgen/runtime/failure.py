@@ -18,7 +18,7 @@ from .layout import Layout
 # -- causes ------------------------------------------------------------------------------------------------------------
 
 
-def find_culprit(kernels: Any, status: int, t: float, x: Array, p: Array | None, u: Array | None) -> str:
+def diagnose(kernels: Any, status: int, t: float, x: Array, p: Array | None, u: Array | None) -> str:
     """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
     layout, q = kernels.layout, x[: kernels.layout.n_q]
     if status == 1:
@@ -172,19 +172,19 @@ class Fail:
             what = "the constraints are singular here, and the mechanism has no degree of freedom"
             remedy = "start a little away from this position, or change the dimensions"
         elif names or not self.layout.n_x:
-            if status == 5 and (found := self._culprit(1, t, x, p, u)):
+            if status == 5 and (found := self._diagnose(1, t, x, p, u)):
                 status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
             else:
-                found = self._culprit(status, t, x, p, u)
+                found = self._diagnose(status, t, x, p, u)
             blame = f": {found}" if found else ""
         if status == 1 and name == "jacobian" and not blame:
             remedy += ", or a root of 0, which has no derivative"
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{at}: {what}{blame}; {remedy}", t, x)
 
-    def _culprit(self, status: int, t: float, x: Array, p: Own, u: Own) -> str:
+    def _diagnose(self, status: int, t: float, x: Array, p: Own, u: Own) -> str:
         try:
-            return find_culprit(self.kernels, status, t, x, p, u)
+            return diagnose(self.kernels, status, t, x, p, u)
         except UsageError:  # a kernel that would tell was not generated
             return ""
 

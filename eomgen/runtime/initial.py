@@ -618,7 +618,7 @@ class Initial:
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:
-        kinds = self.layout.coordinate_kinds if self.layout.given_rates else self.layout.velocity_kinds
+        kinds = self.layout.coordinate_kinds if self.layout.general_rates else self.layout.velocity_kinds
         gap = np.abs(self.place.distance(a, b))
         turns = np.array([kind != "length" for kind in kinds], dtype=bool)
         gap[turns] = np.abs((gap[turns] + np.pi) % (2 * np.pi) - np.pi)

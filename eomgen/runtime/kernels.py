@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # of one class (native/_kernel.pxi), whose arguments are named and ordered as ORDERS says.
 
 
-class LateCore:
+class LazyCore:
     """A core that offers further kernels, compiled or loaded at the first call of any of them.
 
     Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
@@ -73,7 +73,7 @@ class LateCore:
 
 def eager(core: Any) -> Any:
     """The core that was there from the beginning, which has the right-hand side and the steppers."""
-    return core.core if isinstance(core, LateCore) else core
+    return core.core if isinstance(core, LazyCore) else core
 
 
 # -- kernels -----------------------------------------------------------------------------------------------------------
@@ -193,7 +193,7 @@ class Kernels:
     def derivative(self, name: str) -> Call:
         """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
         if name not in self._derivatives:
-            refused = self.layout.given_rates or not self.layout.projects
+            refused = self.layout.general_rates or not self.layout.projects
             load = partial(require_support, self.layout, name)
             self._derivatives[name] = self.refused(name, "timed", load) if refused else self.kernel(name)
         return self._derivatives[name]
@@ -334,7 +334,7 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
     C = kernels.kernel("constraints", nan=True)
     slopes = "coordinate_slopes" if layout.sizes.n_coordinate_slopes else "constraint_jacobian"
     C_q, none = kernels.kernel(slopes, nan=True), np.zeros((0, layout.n_q))
-    places = layout.n_h or not layout.given_rates  # rows of given velocities alone say nothing of q
+    places = layout.n_h or not layout.general_rates  # rows of given velocities alone say nothing of q
     y, y_q = kernels.loop_coordinates, kernels.kernel("loop_coordinate_jacobian", nan=True)
     alignment, zero = kernels.kernel("alignment", nan=True), np.zeros(layout.n_v)
 

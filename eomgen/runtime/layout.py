@@ -100,7 +100,7 @@ class ModelInfo:
     not_finite_where: Mapping[str, str] = {}  #: force -> where its law has no number
     reaction_laws: Sequence[str] = ()  #: elements whose forces depend on reactions of joints
     switched: Mapping[str, str] = {}  #: constraint that closes and opens -> its state
-    held_rows: Sequence[Sequence[str]] = ()  #: label, state and kind of each of their equations
+    rows_to_hold: Sequence[Sequence[str]] = ()  #: label, state and kind of each of their equations
     latex: Mapping[str, str] = {}
     instances: Mapping[str, str] = {}  #: of components: name -> prefix of their names
     initial_outputs: Mapping[str, float] = {}
@@ -287,7 +287,7 @@ class Layout:
             self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, given, strict=True))
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
-        self.given_rates = given is not None and list(given) != list(range(self.n_q))
+        self.general_rates = given is not None and list(given) != list(range(self.n_q))
         self.energy_known = info.energy_known
         #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
         #: itself, or stands in the equations by its rates only.
@@ -315,7 +315,7 @@ class Layout:
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
         self.place_scales = (
-            Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
+            Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.general_rates else self.scales
         )
         self.units, self.instances, self.loop_kinds = info.units, info.instances, tuple(info.loop_kinds)
         self.loop_angles = np.array([kind == "angle" for kind in self.loop_kinds], dtype=bool)
@@ -344,7 +344,7 @@ class Layout:
             found.length = float(self.length * s_c[gap] / self.scales.c[gap])
         found.scales = self.scales._replace(q=s_q, c=s_c)
         found.place_scales = found.scales
-        if self.given_rates:
+        if self.general_rates:
             found.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), found.length)
         found.loop_scales = np.where(self.loop_lengths, found.length, 1.0)
         return found
@@ -352,7 +352,7 @@ class Layout:
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom."""
         turning = [self.v[i] for i in self.independent_moving if self.velocity_labels[i] == self.v[i]]
-        if self.given_rates:
+        if self.general_rates:
             reason = "the rates of its coordinates are given as functions of velocities"
         elif self.n_h < self.n_c:
             reason = "nonholonomic constraints restrict velocities but not positions"
@@ -361,7 +361,7 @@ class Layout:
         else:
             return
         remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
-        if turning and not self.given_rates:
+        if turning and not self.general_rates:
             remedy += "; or choose other independent coordinates, or rotation: euler_angles"
         raise cannot(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
 

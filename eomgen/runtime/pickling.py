@@ -15,7 +15,7 @@ from ..base.algebra import Array
 from ..base.files import find_module
 from ..base.kernel_table import NAMED
 from ..errors import cannot
-from .kernels import LateCore, eager
+from .kernels import LazyCore, eager
 
 #: Names of all kernels of a module that makes some of them late, and of those made the name and file of the code.
 Late = tuple[tuple[str, ...], dict[str, tuple[str, str]]]
@@ -31,7 +31,7 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
             "made by hand, or target numpy with native functions); use target cython"
         )
     late: Late | None = None
-    if isinstance(module.core, LateCore):
+    if isinstance(module.core, LazyCore):
         further: dict[str, Any] = module.core.further
         late = module.core.names, {group: (made.__name__, str(made.__file__)) for group, made in further.items()}
     return restore, (type(module), name, str(file), module.p, module.u, late)
@@ -50,7 +50,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
             raise cannot(f"the module was pickled without {rare}; call one of them before you pickle it")
         return _find_core(*made[group])
 
-    return kind(LateCore(core, names, load), p, u)
+    return kind(LazyCore(core, names, load), p, u)
 
 
 def _find_loaded(name: str) -> Any:

@@ -29,7 +29,7 @@ OTHERS = "rhs, jacobian, simulate, simulate_many, equilibrium, linearize, modes,
 KINDS = {
     "rates": Kind(
         "rates of coordinates given as functions of velocities",
-        lambda layout: layout.q if getattr(layout, "given_rates", False) else (),
+        lambda layout: layout.q if getattr(layout, "general_rates", False) else (),
         "model {model!r} gives the rates of its coordinates as functions of its velocities; this analysis "
         "is not available for such models, only rhs, jacobian, simulate and linearize are",
     ),

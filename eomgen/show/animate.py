@@ -17,7 +17,7 @@ from ..errors import EvaluationError, ill_typed, no_such, off_range
 from ..expr.notation import Notation
 from .build_scene import build_scene
 from .draw import matplotlib
-from .frames import DPI, MOST_DOTS, Frames, ShownColumn, ShownMotion, States, moving_scene, sample, with_fine_traces
+from .frames import DPI, MOST_DOTS, FrameColumn, Frames, MotionFrames, States, moving_scene, sample, with_fine_traces
 from .limits import NOTHING, SAME, STEP
 from .page import InlinePage, page_html
 from .scene import Item, Scene, attachments, placed
@@ -34,7 +34,7 @@ BEFORE = 3.0  #: distance of arrows in front of a planar mechanism, in sizes of 
 Pull = tuple[str, PlacedFrame, Array]
 
 
-def with_arrows(scene: Scene, module: Any, motion: ShownMotion, wanted: Sequence[str] | bool) -> Scene:
+def with_arrows(scene: Scene, module: Any, motion: MotionFrames, wanted: Sequence[str] | bool) -> Scene:
     """The scene with arrows over the frames, of all joints, springs and dampers or of those named.
 
     Of a joint it is the force that it exerts on its successor, of a spring or damper the force on each body at its
@@ -71,7 +71,7 @@ def with_arrows(scene: Scene, module: Any, motion: ShownMotion, wanted: Sequence
     return _drawn(scene, [(name, frame, np.where(np.isfinite(force), force, 0.0)) for name, frame, force in pulls])
 
 
-def _of_elements(elements: Sequence[dict[str, Any]], scene: Scene, module: Any, motion: ShownMotion) -> list[Pull]:
+def _of_elements(elements: Sequence[dict[str, Any]], scene: Scene, module: Any, motion: MotionFrames) -> list[Pull]:
     """Forces of springs and dampers on the bodies at their ends."""
     rates = module.rhs(motion.t, motion.x, u=motion.u)[: module.n_q]
     q, step = motion.x[: module.n_q], STEP / max(float(np.abs(rates).max(initial=0.0)), 1.0)
@@ -175,7 +175,7 @@ def animate(
     times, values = columns(plot) if plot else (trajectory.t, {})
     over = motion.over if still else times
     printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
-    curves = [ShownColumn(printed(n), units.get(n, ""), over, row, n) for n, row in values.items()]
+    curves = [FrameColumn(printed(n), units.get(n, ""), over, row, n) for n, row in values.items()]
     return write(module, file, scene, motion, curves, dpi, format)
 
 
@@ -183,8 +183,8 @@ def write(
     module: Any,
     file: Path | str | None,
     scene: Scene,
-    motion: ShownMotion,
-    curves: Sequence[ShownColumn] = (),
+    motion: MotionFrames,
+    curves: Sequence[FrameColumn] = (),
     dpi: float = DPI,
     format: str | None = None,
 ) -> Any:
@@ -253,13 +253,13 @@ def amplitude(module: Any, q: Array, direction: Array) -> float:
     return min(limits, default=1.0 / top)
 
 
-def mode_scene(module: Any, x: Array, shape: tuple[Array, str], count: int, **look: Any) -> tuple[Scene, ShownMotion]:
+def mode_scene(module: Any, x: Array, shape: tuple[Array, str], count: int, **look: Any) -> tuple[Scene, MotionFrames]:
     """The scene of a mode, a direction and what is written above it, over one period."""
     direction, title = shape
     states = swing(module, x, direction, count)
     t = PERIOD * np.arange(count) / count
     scene = build_scene(module, states[: module.n_q], 0.0, **look)
-    return scene, ShownMotion(t, states, None, 1.0, count / PERIOD, [title] * count, t)
+    return scene, MotionFrames(t, states, None, 1.0, count / PERIOD, [title] * count, t)
 
 
 def animate_mode(

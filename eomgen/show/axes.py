@@ -26,7 +26,7 @@ GOOD = 0.7  #: part of the best view's difference with which the usual view is k
 MOST_VIEWS = 3  #: coordinates in a title
 
 
-def usual_view(scene: Scene) -> tuple[float, float]:
+def default_view(scene: Scene) -> tuple[float, float]:
     """Elevation and azimuth of the eye (degrees) before a spatial mechanism."""
     vertical, right = page_axes(scene.up)
     # matplotlib counts azimuths from the axis after the vertical one
@@ -50,7 +50,7 @@ def telling_view(scenes: Sequence[Scene]) -> tuple[float, float]:
     Two branches differ by the mean distance between the same points of their drawings, seen from far away, as a part of
     that in space.  Those that differ in angles alone and have all bodies in one place look alike from everywhere.
     """
-    usual = usual_view(scenes[0])
+    usual = default_view(scenes[0])
     if len(scenes) < 2:
         return usual
     moving = [
@@ -542,7 +542,7 @@ class Axes3DPicture:
         self.pieces = ScenePieces(scene)
         self.drawn = piece_collection(self.pieces, ax)
         ax.add_collection(self.drawn, autolim=False)
-        elevation, azimuth = view or usual_view(scene)
+        elevation, azimuth = view or default_view(scene)
         ax.view_init(elevation, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
         ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)

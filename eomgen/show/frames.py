@@ -29,7 +29,7 @@ POINTS = 400  #: of the way of a marker, at least
 States = Callable[[Array], tuple[Array, Array | None]]
 
 
-class ShownMotion(NamedTuple):
+class MotionFrames(NamedTuple):
     """Frames of a motion.
 
     Attributes
@@ -69,7 +69,7 @@ class ShownMotion(NamedTuple):
         return np.arange(len(self.t)) / self.fps if self.t[0] == self.t[-1] else np.abs(self.t - self.t[0]) / self.speed
 
 
-def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> ShownMotion:
+def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> MotionFrames:
     """Frames of a trajectory at even times, of the states that the runtime gives there.
 
     Raises
@@ -88,7 +88,7 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
         said = [f"{led[0]} = {value:.3f} {unit}" for value in over]
         across = label(Notation.of(trajectory.metadata).mathtext(led[0]), unit)
-        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, across)
+        return MotionFrames(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, across)
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:
@@ -101,15 +101,15 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         )
     times = np.linspace(start, end, max(count, 2))
     digits = max(2, 2 - int(np.floor(np.log10(span))))
-    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s" for now in times], times)
+    return MotionFrames(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s" for now in times], times)
 
 
-def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
+def moving_scene(module: Any, motion: MotionFrames, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
     """The scene over all frames."""
     return build_scene(module, motion.x[: module.n_q], motion.t, motion.u, names, axes, trace)
 
 
-def with_fine_traces(scene: Scene, module: Any, motion: ShownMotion, states: States, trace: Sequence[str]) -> Scene:
+def with_fine_traces(scene: Scene, module: Any, motion: MotionFrames, states: States, trace: Sequence[str]) -> Scene:
     """The scene with the ways of markers through several points a frame, so that they look round at any rate."""
     finer = int(np.ceil(POINTS / (len(motion.t) - 1)))
     times = np.linspace(motion.t[0], motion.t[-1], finer * (len(motion.t) - 1) + 1)
@@ -124,7 +124,7 @@ def with_fine_traces(scene: Scene, module: Any, motion: ShownMotion, states: Sta
 # -- panels of columns -------------------------------------------------------------------------------------------------
 
 
-class ShownColumn(NamedTuple):
+class FrameColumn(NamedTuple):
     """A column of the run that is drawn along: its name as it is printed, its unit, its values over what goes on."""
 
     name: str
@@ -134,15 +134,15 @@ class ShownColumn(NamedTuple):
     plain: str = ""  #: its name as it is typed
 
 
-def by_unit(curves: Sequence[ShownColumn]) -> list[list[ShownColumn]]:
+def by_unit(curves: Sequence[FrameColumn]) -> list[list[FrameColumn]]:
     """Columns in groups of one unit, in the order in which they come."""
-    groups: dict[str, list[ShownColumn]] = {}
+    groups: dict[str, list[FrameColumn]] = {}
     for curve in curves:
         groups.setdefault(curve.unit, []).append(curve)
     return list(groups.values())
 
 
-def draw_curves(axes: Sequence[Any], panels: Sequence[Sequence[ShownColumn]], motion: ShownMotion) -> None:
+def draw_curves(axes: Sequence[Any], panels: Sequence[Sequence[FrameColumn]], motion: MotionFrames) -> None:
     """Columns over time, or over what is led; each panel on its own axes, one above the other."""
     for ax, panel in zip(axes, panels, strict=True):
         for curve in panel:
@@ -176,10 +176,10 @@ class Frames:
     Parameters
     ----------
     figure : matplotlib Figure
-    motion : ShownMotion
+    motion : MotionFrames
     """
 
-    def __init__(self, figure: Any, motion: ShownMotion) -> None:
+    def __init__(self, figure: Any, motion: MotionFrames) -> None:
         agg = matplotlib("backends.backend_agg", "an animation")
         self.figure, self.motion = figure, motion
         self.canvas = agg.FigureCanvasAgg(figure)
@@ -187,7 +187,7 @@ class Frames:
         self.titles: list[Any] = []
 
     @classmethod
-    def of(cls, scene: Scene, motion: ShownMotion, curves: Sequence[ShownColumn] = (), dpi: float = DPI) -> Frames:
+    def of(cls, scene: Scene, motion: MotionFrames, curves: Sequence[FrameColumn] = (), dpi: float = DPI) -> Frames:
         """One scene, and curves below it."""
         width, height = figure_size(scene) if scene.view is not None else SPACE
         panels = by_unit(curves)
@@ -218,7 +218,7 @@ class Frames:
         self.updates.append(update)
         self.titles.append(above)
 
-    def add_curves(self, axes: Sequence[Any], panels: Sequence[Sequence[ShownColumn]]) -> None:
+    def add_curves(self, axes: Sequence[Any], panels: Sequence[Sequence[FrameColumn]]) -> None:
         """Draw curves, one axes for each unit, with a line where the frame is."""
         draw_curves(axes, panels, self.motion)
         cursors = [ax.axvline(self.motion.over[0], color="0.3", linewidth=1.0) for ax in axes]

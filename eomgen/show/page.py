@@ -20,7 +20,7 @@ from ..base.picture_data import PlacedFrame, read_picture
 from ..base.texts import html_text
 from ..errors import EomgenError
 from .build_scene import build_scene
-from .frames import ShownColumn, ShownMotion
+from .frames import FrameColumn, MotionFrames
 from .limits import SAME
 from .scene import Item, Scene, color_of, style_of
 from .symbols import Rope, Shifted, Stretched
@@ -190,8 +190,8 @@ def scene_position(module: Any) -> Array:
 def page_html(
     module: Any,
     scene: Scene,
-    motion: ShownMotion | None = None,
-    curves: Sequence[ShownColumn] = (),
+    motion: MotionFrames | None = None,
+    curves: Sequence[FrameColumn] = (),
     model: Mapping[str, Any] | None = None,
     wasm: bytes = b"",
     equations: str = "",
@@ -202,9 +202,9 @@ def page_html(
     ----------
     module : Module
     scene : Scene
-    motion : ShownMotion, optional
+    motion : MotionFrames, optional
         A run that is shown; needed without a model.
-    curves : sequence of ShownColumn
+    curves : sequence of FrameColumn
         Of the run, where there is no model.
     model, wasm : mapping, bytes, optional
         What the script knows of the model, and its WebAssembly.

@@ -269,7 +269,7 @@ def symbol_size(data: PictureData, points: list[Array], poses: Array) -> tuple[f
         if shape["kind"] != "mesh":
             extent = max(extent, float(np.abs(shape["sizes"]).max()))
     if extent == 0.0:
-        extent = _own_size(data) or 1.0
+        extent = _inertia_size(data) or 1.0
     lengths = sorted(length for k, p in enumerate(points[:-1]) if (length := _length(data, k, p)) > NEAR * extent)
     middle = lengths[len(lengths) // 2] if lengths else extent
     return min(SYMBOL * extent, OF_LINK * middle), extent
@@ -280,7 +280,7 @@ def _length(data: PictureData, k: int, points: Array) -> float:
     return float(np.linalg.norm(np.ptp(every, axis=0)))
 
 
-def _own_size(data: PictureData) -> float:
+def _inertia_size(data: PictureData) -> float:
     """The largest edge of the boxes with the bodies' inertia (m)."""
     return max((float(equivalent_box(data, k).max()) for k in range(len(data.bodies))), default=0.0)
 

@@ -231,7 +231,7 @@ def compile_lanes(file: Path) -> CacheEntry | None:
     """
     cache, of = Cache(file.parents[2]), file.parent.name
     try:
-        cache.require_own()
+        cache.require_owner()
         manifest, texts = read_entry(file.parent)
     except (OSError, ValueError):
         raise bad_cache("its cache entry is gone or was changed; compile the model again") from None

@@ -109,7 +109,7 @@ class Cache:
         if not os.path.isdir(directory):
             return None
         try:
-            self.require_own()
+            self.require_owner()
             entry = _describe(directory, files.read_entry(directory)[0])
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
@@ -119,7 +119,7 @@ class Cache:
             os.utime(directory / MANIFEST)
         return entry
 
-    def require_own(self) -> None:
+    def require_owner(self) -> None:
         """Refuse a cache whose folders others own or can write.
 
         Raises
@@ -207,7 +207,7 @@ class Cache:
 
     def prune(self, older_than: float | None = None, max_size: int | None = None) -> list[CacheEntry]:
         """Remove and return what was not used for so many seconds, and the oldest until so many bytes are left."""
-        self.require_own()
+        self.require_owner()
         now, total, removed = time.time(), 0, []
         for entry in self.entries():
             total += entry.size
@@ -224,7 +224,7 @@ class Cache:
 
     def clear(self) -> int:
         """Remove every entry and abandoned attempt; returns the number of entries removed."""
-        self.require_own()
+        self.require_owner()
         directories = list(self._entries.iterdir()) if self._entries.is_dir() else []
         for directory in directories:
             self._remove(directory)
@@ -235,7 +235,7 @@ class Cache:
     def discard(self, key: str) -> None:
         """Remove the entry of a key that turned out to be of no use, if it can be removed."""
         with suppress(ToolchainError):
-            self.require_own()
+            self.require_owner()
             with files.locked(self.root / "lock"):
                 self._remove(self._entries / key)
 

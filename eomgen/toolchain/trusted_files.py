@@ -65,7 +65,7 @@ def require_trusted(path: str | os.PathLike[str]) -> None:
         return
     place, links = os.sep, 0
     ahead = os.path.abspath(path).split(os.sep)[::-1]
-    _require_own(place, os.lstat(place), above=True)
+    _require_owner(place, os.lstat(place), above=True)
     while ahead:
         part = ahead.pop()
         if part in ("", os.curdir):
@@ -75,7 +75,7 @@ def require_trusted(path: str | os.PathLike[str]) -> None:
             continue
         here = os.path.join(place, part)
         status = os.lstat(here)
-        _require_own(here, status, above=any(ahead))
+        _require_owner(here, status, above=any(ahead))
         if not stat.S_ISLNK(status.st_mode):
             place = here
             continue
@@ -103,7 +103,7 @@ def read_trusted(path: str | os.PathLike[str]) -> bytes:
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "not a regular file", os.fspath(path))
         if hasattr(os, "geteuid"):
-            _require_own(os.fspath(path), status, above=False)
+            _require_owner(os.fspath(path), status, above=False)
         return file.readall()
 
 
@@ -120,7 +120,7 @@ def make_private(folder: str | os.PathLike[str]) -> None:
             os.mkdir(name, 0o700)
 
 
-def _require_own(path: str, status: os.stat_result, *, above: bool) -> None:
+def _require_owner(path: str, status: os.stat_result, *, above: bool) -> None:
     """Refuse one part of a path; `above` says that more follows below it."""
     owner, me = status.st_uid, os.geteuid()
     if owner not in (me, 0) and not (above and _unmapped(owner)):

@@ -219,7 +219,7 @@ def check_derivatives(bench: Bench) -> list[Finding]:
     """By the state, by inputs and by parameters."""
     found = [_along(bench), _all_directions(bench)]
     for name, n in (("input_jacobian", bench.module.n_u), ("parameter_jacobian", bench.module.n_p)):
-        if n and name in bench.module.core.names and bench.layout.projects and not bench.layout.given_rates:
+        if n and name in bench.module.core.names and bench.layout.projects and not bench.layout.general_rates:
             found.append(_by(bench, name))
     return found
 
@@ -289,7 +289,7 @@ def _along(bench: Bench) -> Finding:
     check = "jacobian: along the constraints, 50 digits"
     if not bench.layout.projects or "jacobian" not in bench.module.core.names:
         return Finding.skipped(check, "derived with baumgarte=" if not bench.layout.projects else "there is no kernel")
-    if bench.terms.by_columns or bench.layout.given_rates:
+    if bench.terms.by_columns or bench.layout.general_rates:
         why = "the mass matrix is not written out" if bench.terms.by_columns else "rates of coordinates are given"
         return Finding.skipped(check, why)
     if not bench.module.layout.n_dof:

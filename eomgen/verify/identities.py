@@ -57,7 +57,7 @@ def _jacobian(module: BoundModel, c: Case) -> Array:
 def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
     check = "embedded_mass_matrix: symmetric, positive definite"
-    if not module.layout.n_dof or module.layout.given_rates:
+    if not module.layout.n_dof or module.layout.general_rates:
         return Finding.skipped(
             check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given"
         )
@@ -103,7 +103,7 @@ def _rates(module: BoundModel, q: Array, v: Array) -> Array:
 def _slopes(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """C_q N of each velocity; C of Euler parameters off their unit length is a function like any other."""
     check = "constraint_jacobian: extrapolated differences"
-    if not module.n_rows or module.layout.given_rates:
+    if not module.n_rows or module.layout.general_rates:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     found, n_h = Comparison(check), module.layout.n_h
     for c in cases:
@@ -251,7 +251,7 @@ def jacobians(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     found = []
     for name, by in NAMES.items():
         size = {"x": module.n_x, "u": module.n_u, "p": module.n_p}[by]
-        exact = by == "x" or (module.layout.projects and not module.layout.given_rates)
+        exact = by == "x" or (module.layout.projects and not module.layout.general_rates)
         if size and exact and name in module.core.names:
             check = f"{name}: extrapolated differences of rhs"
             try:

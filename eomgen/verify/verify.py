@@ -17,7 +17,7 @@ from ..base.limits.runs import MOST_STATES
 from ..base.texts import shown
 from ..base.value_rules import read_count
 from ..errors import EomgenError, off_range
-from ..runtime.runs.events import told_by_the_caller
+from ..runtime.runs.events import inner_run
 from .cases import random_cases
 from .finding import Finding, Verification, failed
 from .identities import identities, jacobians
@@ -75,7 +75,7 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     """
     states, seed = _read(states, seed, seconds)
     start = perf_counter()
-    with told_by_the_caller():
+    with inner_run():
         found = _of_module(module, states, seed, start + seconds)
     return Verification(module.name, tuple(found), perf_counter() - start)
 

@@ -54,7 +54,7 @@ FAULTS = (
         "tests/core/test_operations.py::test_a_coefficient_that_cancels_holds_nothing",
     ),
     Fault(
-        "settled-rotation-sign", "settled_rotation",
+        "settled-rotation-sign", "rounded_rotation",
         "graph.constant(math.copysign(1.0, value))",
         "graph.one",
         "a turn of half a turn becomes none",

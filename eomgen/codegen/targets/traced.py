@@ -122,7 +122,7 @@ def _context(program: Program, library: str) -> dict[str, Any]:
         "independent_q": independent_q,
         "independent_names": [program.velocities[k] for k in program.preferred],
         "turned": space is not None,
-        "given_rates": program.given_rates,
+        "general_rates": program.general_rates,
         "n_states": program.n_states,
         "slots": [list(slot) for slot in program.quaternion_slots],
         "plain": [] if space is None else list(zip(space.plain_q.tolist(), space.plain_v.tolist(), strict=True)),
@@ -166,7 +166,7 @@ def _require_traceable(program: Program, library: str) -> None:
         problems.append(
             f"method {program.metadata.get('method')!r} solves a linear system by pivoting; derive by method 'auto'"
         )
-    if program.given_rates and program.has_loops:
+    if program.general_rates and program.has_loops:
         problems.append("equations with given rates q' = N v and constraints are projected by pivoting")
     if problems:
         raise cannot(f"target {library!r}: {'; '.join(problems)}")

@@ -32,7 +32,7 @@ from ...mechanics import Kinematics
 from ...mechanics.methods import TreeEquations
 from ...mechanics.mobility import Mobility
 from ...mechanics.motion import force_and_moment
-from ...mechanics.wrenches import JointWrenches, carried_reactions
+from ...mechanics.wrenches import JointWrenches, joint_reactions
 from ...model.mechanism import Output
 from ...native.limits import definitions
 from ...runtime.bound_model import BoundModel
@@ -174,7 +174,7 @@ def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: Tr
         values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
     wrenches = JointWrenches(kinematics)
     labels = [constraints.labels[i] for i in mobility.independent_rows]
-    every = carried_reactions(wrenches, dict(zip(labels, values, strict=True)))
+    every = joint_reactions(wrenches, dict(zip(labels, values, strict=True)))
     found: list[Arrow] = []
     for spec, unknown in zip(wrenches.specs, open_, strict=True):
         if spec.name not in every:

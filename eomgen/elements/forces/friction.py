@@ -481,7 +481,7 @@ def multiplier_of(symbol: str) -> str | None:
     return found[1] if found else None
 
 
-def is_carried(symbol: str) -> bool:
+def is_reaction(symbol: str) -> bool:
     """Whether a symbol stands for a reaction or a multiplier."""
     return symbol.endswith((")", "]")) and (reaction_of(symbol) is not None or multiplier_of(symbol) is not None)
 

@@ -4,7 +4,7 @@ from .formula import Formulas as Formulas
 from .formula import Order as Order
 from .formula import number as number
 from .writers import PAGE as PAGE
-from .writers import given_mathml as given_mathml
+from .writers import bare_mathml as bare_mathml
 from .writers import latex as latex
 from .writers import latex_lines as latex_lines
 from .writers import mathml as mathml

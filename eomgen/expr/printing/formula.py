@@ -195,7 +195,7 @@ class Relation(NamedTuple):
     sides: tuple[Formula, ...]
 
 
-class CasesOf(NamedTuple):
+class PiecewiseOf(NamedTuple):
     """Values and the conditions under which they hold; the last may hold otherwise."""
 
     branches: tuple[tuple[Formula, Formula | None], ...]
@@ -215,7 +215,7 @@ class Words(NamedTuple):
 
 
 Formula = (
-    NumberPart | Name | Letter | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | MatrixOf | Words
+    NumberPart | Name | Letter | SumOf | Product | Quotient | Power | CallOf | Relation | PiecewiseOf | MatrixOf | Words
 )
 
 
@@ -307,7 +307,7 @@ class Formulas:
             return Name(f"{x.expr.func.__name__}_{'d' * int(x.variable_count[0][1])}ot")
         if isinstance(x, sympy.Piecewise):
             branches = ((self(value), None if when == sympy.true else self(when)) for value, when in x.args)
-            return CasesOf(tuple(branches))
+            return PiecewiseOf(tuple(branches))
         kind = type(x).__name__
         if kind in _SIGNS or kind in _LOGIC:
             return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))

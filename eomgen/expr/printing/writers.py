@@ -18,7 +18,7 @@ from . import formula as tree
 
 
 @cache
-def given_mathml(latex: str) -> str:
+def bare_mathml(latex: str) -> str:
     """The elements of a formula, without ``<math>``.
 
     Parameters
@@ -96,7 +96,7 @@ WRITTEN_BY: dict[type, str] = {
     tree.Power: "power",
     tree.CallOf: "call",
     tree.Relation: "relation",
-    tree.CasesOf: "cases",
+    tree.PiecewiseOf: "cases",
     tree.MatrixOf: "matrix",
 }
 
@@ -182,7 +182,7 @@ class _LatexWriter(FormulaWriter):
     def relation(self, formula: tree.Relation) -> str:
         return f" {_LATEX_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
 
-    def cases(self, formula: tree.CasesOf) -> str:
+    def cases(self, formula: tree.PiecewiseOf) -> str:
         rows = (
             rf"{self.write(value)} & " + (r"\text{otherwise}" if when is None else rf"\text{{if }} {self.write(when)}")
             for value, when in formula.branches
@@ -270,7 +270,7 @@ class _TextWriter(FormulaWriter):
     def relation(self, formula: tree.Relation) -> str:
         return f" {_TEXT_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
 
-    def cases(self, formula: tree.CasesOf) -> str:
+    def cases(self, formula: tree.PiecewiseOf) -> str:
         parts = (
             f"{self.write(value)} otherwise" if when is None else f"{self.write(value)} if {self.write(when)}"
             for value, when in formula.branches
@@ -336,7 +336,7 @@ class _MathMLWriter(FormulaWriter):
         return self.names.mathml(part.name)
 
     def letter(self, part: tree.Letter) -> str:
-        return given_mathml(part.latex)
+        return bare_mathml(part.latex)
 
     def words(self, part: tree.Words) -> str:
         return f"<mtext>{html_text(part.text)}</mtext>"
@@ -387,7 +387,7 @@ class _MathMLWriter(FormulaWriter):
         sign = html_text(_MATHML_RELATIONS.get(formula.sign, formula.sign))
         return row(f"<mo>{sign}</mo>".join(map(self.write, formula.sides)))
 
-    def cases(self, formula: tree.CasesOf) -> str:
+    def cases(self, formula: tree.PiecewiseOf) -> str:
         rows = []
         for value, when in formula.branches:
             held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if </mtext>", self.write(when))
@@ -453,7 +453,7 @@ def width(formula: tree.Formula, names: Notation) -> float:
             return len(formula.function) + fences + inside
         case tree.Relation():
             return sum(map(of, formula.sides)) + SIGN * (len(formula.sides) - 1)
-        case tree.CasesOf():
+        case tree.PiecewiseOf():
             return FENCES + max(of(x) + (of(when) if when else 9.0) + 2 * COLUMN for x, when in formula.branches)
         case tree.MatrixOf():
             return FENCES + sum(max(map(of, column)) + COLUMN for column in zip(*formula.rows, strict=True))

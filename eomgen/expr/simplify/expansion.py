@@ -325,13 +325,13 @@ class Expansion(OfNodes[Poly]):
     def times(self, a: Poly, b: Poly) -> Poly:
         """a b, multiplied out."""
         self.work.spend(len(a) * len(b))
-        return self._settled(multiply(a, b))
+        return self._rounded(multiply(a, b))
 
     def _sum(self, a: Poly, b: Poly, sign: int) -> Poly:
         self.work.spend((len(a) + len(b)) // 4)
         return add(a, b, sign)
 
-    def _settled(self, a: Poly) -> Poly:
+    def _rounded(self, a: Poly) -> Poly:
         """With sums to whole positive powers multiplied out again."""
         result: Poly = {}
         waiting = [a]
@@ -359,7 +359,7 @@ class Expansion(OfNodes[Poly]):
         ((monomial, x),) = factor.items()
         above = multiply(a, {inverse(monomial): ratio(1, x)})
         if below == {ONE: 1}:
-            return self._settled(above)
+            return self._rounded(above)
         return multiply(above, {((self.atoms.id("sum", freeze(below)), -1),): 1})
 
     def _root(self, a: Poly) -> Poly:

@@ -1,7 +1,7 @@
 """Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
 from . import amalgamated, augmented, embedding, gibbs_appell, hamilton, lagrange, newton_euler, recursive
-from .tree_equations import GIVEN, Method, TreeEquations, take_given, with_armature
+from .tree_equations import GIVEN, Method, TreeEquations, direct_equations, with_armature
 
 METHODS: dict[str, Method] = {
     "embedding": with_armature(embedding.derive),
@@ -14,4 +14,4 @@ METHODS: dict[str, Method] = {
     "hamilton": hamilton.derive,
 }
 
-__all__ = ["GIVEN", "METHODS", "Method", "TreeEquations", "take_given"]
+__all__ = ["GIVEN", "METHODS", "Method", "TreeEquations", "direct_equations"]

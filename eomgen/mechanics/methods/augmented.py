@@ -15,13 +15,13 @@ from .. import Kinematics
 from ..constraint_functions import Units
 from ..loops import Constraints
 from . import embedding
-from .tree_equations import LinearSystem, TreeEquations, take_given, with_armature
+from .tree_equations import LinearSystem, TreeEquations, direct_equations, with_armature
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """M and h of the tree, or those given, and the system with multipliers."""
     bare = kinematics.mechanism.bare
-    tree = take_given(kinematics, "augmented") if bare else with_armature(embedding.derive)(kinematics)
+    tree = direct_equations(kinematics, "augmented") if bare else with_armature(embedding.derive)(kinematics)
     tree.method = "augmented"
     if kinematics.constraints.labels:
         tree.system = _system(kinematics, tree)

@@ -45,7 +45,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     graph, a = kinematics.graph, kinematics.a
     rates, applied = joint_rates(kinematics), applied_wrenches(kinematics)
     rest = tuple(graph.zero for _ in kinematics.v)
-    own = Resolved.in_own_axes(kinematics.links, kinematics.twists, rates, applied)
+    own = Resolved.in_link_axes(kinematics.links, kinematics.twists, rates, applied)
     given = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
     inverse = _sweep(kinematics, own, inertias, a)
@@ -278,7 +278,7 @@ class ForceSlopes:
         self._rates = joint_rates(kinematics)
         still = (vec.zero(kinematics.graph), vec.zero(kinematics.graph))
         unloaded = [still] * len(kinematics.links)
-        self._resolved = Resolved.in_own_axes(kinematics.links, kinematics.twists, self._rates, unloaded)
+        self._resolved = Resolved.in_link_axes(kinematics.links, kinematics.twists, self._rates, unloaded)
         two = kinematics.graph.constant(2.0)
         self._omegas = [twist[0] for twist in kinematics.twists]
         self._twice = [vec.scale(two, omega) for omega in self._omegas]

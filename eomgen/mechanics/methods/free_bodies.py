@@ -32,7 +32,7 @@ def seen_from(frame: Frame, twist: Twist) -> Twist:
     return vec.transpose_times(frame.rotation, angular), vec.transpose_times(frame.rotation, moved)
 
 
-def given_to(frame: Frame, wrench: Wrench) -> Wrench:
+def wrench_at(frame: Frame, wrench: Wrench) -> Wrench:
     """A wrench at a frame, about the origin of its holder and in the holder's axes."""
     turn, push = (vec.times(frame.rotation, x) for x in wrench)
     return vec.add(turn, vec.cross(frame.position, push)), push
@@ -163,9 +163,9 @@ class FreeBodyCut:
             six = [f + entry * weight for f, entry in zip(six, row, strict=True)]
         wrench = (six[0], six[1], six[2]), (six[3], six[4], six[5])
         if self.inner != GROUND:
-            balances[self.inner] = add(balances[self.inner], given_to(self.marker, wrench))
+            balances[self.inner] = add(balances[self.inner], wrench_at(self.marker, wrench))
         if self.outer != GROUND:
-            carried = given_to(self.holder, given_to(self.pose, wrench))
+            carried = wrench_at(self.holder, wrench_at(self.pose, wrench))
             balances[self.outer] = sub(balances[self.outer], carried)
 
 

@@ -14,14 +14,14 @@ from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..wrenches import cut_drives, drive_inertias
 from .lagrange import form_energies, momentum_equations
-from .tree_equations import TreeEquations, take_given
+from .tree_equations import TreeEquations, direct_equations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Canonical equations of the spanning tree, or of a bare Lagrangian."""
     bare = kinematics.mechanism.lagrangian
     if bare is not None:
-        tree = take_given(kinematics, "hamilton")
+        tree = direct_equations(kinematics, "hamilton")
         momenta, rates = momenta_and_rates(bare, kinematics.q, kinematics.v)
         tree.canonical = (*momenta, *rates)
         return tree

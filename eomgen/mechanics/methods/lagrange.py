@@ -18,13 +18,13 @@ from ...expr.schedule import count
 from ...expr.vectors import Vec3
 from .. import Kinematics
 from ..wrenches import virtual_power
-from .tree_equations import TreeEquations, take_given
+from .tree_equations import TreeEquations, direct_equations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Lagrange's equations of the spanning tree; those of a bare Lagrangian are given."""
     if kinematics.mechanism.bare:
-        return take_given(kinematics, "lagrange")
+        return direct_equations(kinematics, "lagrange")
     tree = momentum_equations(kinematics, "lagrange", *form_energies(kinematics))
     tree.canonical = ()
     return tree

@@ -208,7 +208,7 @@ def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr
 GIVEN = "given"  #: what stands where the name of a method would
 
 
-def take_given(kinematics: Kinematics, method: str = GIVEN) -> TreeEquations:
+def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquations:
     """The equations of a mechanism that has them; only the lower triangle of M is read."""
     given = kinematics.mechanism.given
     assert given is not None

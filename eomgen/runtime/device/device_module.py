@@ -13,7 +13,7 @@ from ...base.value_rules import read_count
 from ...errors import cannot, ill_shaped, ill_typed, incomplete, no_choice, no_such
 from ..ensembles.block import RunBlock
 from ..layout import ModelInfo
-from ..runs.run_arguments import declare, find_span, ordered_times, own_step, steps_of
+from ..runs.run_arguments import declare, declared_step, find_span, ordered_times, steps_of
 from ..trajectory import Span
 from .cuda_device import Array, Device, DeviceArray
 
@@ -196,7 +196,7 @@ def carry_out(
             f"runs on a device of a model with sampled states begin at 0 s and go forward, not from {start:.6g} s to "
             f"{end:.6g} s; use simulate_many of the module"
         )
-    method, step = own_step(like, declared["method"] if method is None else method, step)
+    method, step = declared_step(like, declared["method"] if method is None else method, step)
     methods = [name.upper() for name in module.facts["methods"]]
     if method not in methods:
         raise no_choice(f"no method {method!r} on a device; there are {', '.join(methods)}")

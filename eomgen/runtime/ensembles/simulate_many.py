@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 
 from ...base.value_rules import read_count
 from ...errors import bad_data, ill_typed, no_choice, untrue
-from ..argument_checks import check_names, require_room, without_dots
+from ..argument_checks import check_names, require_size, without_dots
 from ..identity import code_digest, digest
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted
 from ..runs.compiled import can_run
 from ..runs.events import require_forward
-from ..runs.run_arguments import declare, find_span, ordered_times, own_step, steps_of
+from ..runs.run_arguments import declare, declared_step, find_span, ordered_times, steps_of
 from ..trajectory import Span
 from .block import (
     GRAIN,
@@ -153,7 +153,7 @@ def simulate_many(
         varied.count if reduce in (None, "states", "events") else 1
     )
     fewer = "give fewer runs, fewer t_eval, fewer keep_events, or reduce='statistics'"
-    require_room(f"simulate_many with {varied.count} runs", whole, fewer)
+    require_size(f"simulate_many with {varied.count} runs", whole, fewer)
     with ExitStack() as stack:
         if watch is not None:
             stack.callback(watch.close)
@@ -225,7 +225,7 @@ def _plan(
     declared = declare(module)
     start, end = find_span(span, float(declared["end"]))
     require_forward(module, start, end)
-    method, step = own_step(module, declared["method"] if method is None else method, step)
+    method, step = declared_step(module, declared["method"] if method is None else method, step)
     refuse_moreau(method, "simulate_many")
     if not isinstance(method, str):
         raise no_choice(f"method of simulate_many must be the name of a method, not {method!r}")

@@ -16,7 +16,7 @@ from ...base.algebra import Array
 from ...base.names import place_of_marker
 from ...base.value_rules import read_count
 from ...errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
-from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_room, without_dots
+from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_size, without_dots
 from ..initial import Initial
 from ..kernels import Kernels
 from ..layout import silent, values_at, warn_of_fixed
@@ -61,7 +61,7 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
             raise at_odds(f"grid: {', '.join(twice)} is given in {what} too; give it once")
     axes = grid_axes(grid)
     count = math.prod(map(len, axes.values()))
-    require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
+    require_size(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
     columns = [column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")]
     initial, parameters, inputs = (dict(given or {}) for given in groups)
     for name, column in zip(grid, columns, strict=True):
@@ -202,7 +202,7 @@ def collect_variations(
     if states is None:
         declared = (*module.layout.initial, *module.layout.initial_outputs)
         warn_of_fixed(module.layout, p, [name for name in declared if name not in values])
-    require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
+    require_size(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
     return Variations(k, p, u, states, values)
@@ -241,7 +241,7 @@ def assemble_states(
 
 def _refuse_disagreement(module: BoundModel, varied: Variations, t: float, x: Array, reasons: dict[int, str]) -> None:
     """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
-    layout, by_name = module.layout, varied.states is None and bool(module.info.held_rows)
+    layout, by_name = module.layout, varied.states is None and bool(module.info.rows_to_hold)
     for k in set(range(varied.count)) - reasons.keys():
         try:
             require_switched(layout, x[layout.n_x - layout.n_states :, k])

@@ -266,7 +266,7 @@ _SILENT: ContextVar[bool] = ContextVar("events_silent", default=False)
 
 
 @contextmanager
-def told_by_the_caller() -> Iterator[None]:
+def inner_run() -> Iterator[None]:
     """Within it :func:`warn_of_unknown` is silent: a run that is part of another call, which warns itself."""
     token = _SILENT.set(True)
     try:
@@ -275,7 +275,7 @@ def told_by_the_caller() -> Iterator[None]:
         _SILENT.reset(token)
 
 
-def is_told_by_the_caller() -> bool:
+def is_inner_run() -> bool:
     """Whether a run is part of another call, which warns itself."""
     return _SILENT.get()
 
@@ -377,7 +377,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
     """
     layout = module.layout
     require_switched(layout, x[layout.n_x - layout.n_states :])
-    rows = module.info.held_rows
+    rows = module.info.rows_to_hold
     if (
         not rows
         or not (initial is None or isinstance(initial, Mapping))

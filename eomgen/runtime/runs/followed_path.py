@@ -86,7 +86,7 @@ class DrivenCoordinates:
 
     # positions
 
-    def led_values(self, q: Array, t: float) -> Array:
+    def prescribed_values(self, q: Array, t: float) -> Array:
         """y (k,) at a position."""
         return self.system.at(t).measure(self.led, q)[0]
 
@@ -146,7 +146,7 @@ class DrivenCoordinates:
         n_q, n = layout.n_q, layout.n_v
         if self.direct:
             assert self._kinematics is not None
-            found = self._kinematics(np.concatenate([self.led_values(q, t), y1, y2, q]), t=t)
+            found = self._kinematics(np.concatenate([self.prescribed_values(q, t), y1, y2, q]), t=t)
             return found[n_q : n_q + n], found[n_q + n :]
         K = self.matrix(q, t)
         v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
@@ -344,7 +344,7 @@ def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tang
     held = np.abs(tangent.rows[: layout.n_c])
     labels = [layout.constraint_labels[i] for i in np.flatnonzero(held >= SHARE * np.abs(tangent.rows).max())]
     joints = tuple(dict.fromkeys(label.partition(".")[0] for label in labels))
-    values = dict(zip(driven.led, driven.led_values(q, t).tolist(), strict=True))
+    values = dict(zip(driven.led, driven.prescribed_values(q, t).tolist(), strict=True))
     return Singular(kind, t, values, q, moving, joints)
 
 

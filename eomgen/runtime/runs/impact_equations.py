@@ -470,7 +470,7 @@ def require_distances(
     layout = module.layout
     joints = layout.info.translations
     rubs = np.flatnonzero(sliding.coefficients[sliding.owner] > 0.0)
-    depend = layout.n_c or layout.info.held_rows  # coordinates, on each other
+    depend = layout.n_c or layout.info.rows_to_hold  # coordinates, on each other
     if not joints or not rubs.size or depend or "poses" not in module.kernels.core.names:
         return
     for gap in sorted({*sliding.owner[rubs].tolist()}):

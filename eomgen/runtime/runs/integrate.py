@@ -23,7 +23,7 @@ from ..columns import Columns, describe, project, units_of_layout
 from ..inputs import Forcing
 from ..layout import Layout
 from ..trajectory import Trajectory
-from .events import is_told_by_the_caller, warn_of_unknown
+from .events import is_inner_run, warn_of_unknown
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -369,7 +369,7 @@ def passed_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: flo
 
 def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: float) -> None:
     """Tell the line of the user's that called of limits that a run passes."""
-    found = [] if is_told_by_the_caller() else passed_limits(trajectory, layout, rtol, atol)
+    found = [] if is_inner_run() else passed_limits(trajectory, layout, rtol, atol)
     if found:
         more = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
         warnings.warn(

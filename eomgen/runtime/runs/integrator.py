@@ -19,7 +19,7 @@ from .bound_run import Crawling, Run, StallCheck
 from .compiled import can_run, stepper_options
 from .events import Events
 from .integrate import RESET_FAILED, TOO_SMALL, choose_solver
-from .run_arguments import check_method, check_tolerances, declare, own_step
+from .run_arguments import check_method, check_tolerances, declare, declared_step
 from .simulate import simulate
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def integrator(
     require_support(module.layout, "integrator")
     check_names("option of integrator", options, OPTIONS)
     declared = declare(module)
-    method, step = own_step(module, method, options.pop("step", None))
+    method, step = declared_step(module, method, options.pop("step", None))
     options |= {"method": method, "step": step}
     refuse_moreau(method, "integrator")
     given = {name: declared[name] for name in ("method", "rtol", "atol")}

@@ -370,7 +370,7 @@ def follow_drivers(
     options: Mapping[str, Any],
 ) -> KinematicAnalysis | None:
     """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other."""
-    if not is_driven(module) or _led_by_inputs(module, inputs, method):
+    if not is_driven(module) or _moved_by_inputs(module, inputs, method):
         if method is not None:
             raise not_driven(module.layout)
         return None
@@ -397,7 +397,7 @@ def follow_drivers(
     return motion.keep(found.t, found.t_events, found.x_events, header)
 
 
-def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
+def _moved_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
     """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
     led = Forcing(module.layout, inputs).constrained
     if led and method == "kinematic":

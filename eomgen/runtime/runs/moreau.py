@@ -54,13 +54,13 @@ from ...errors import (
     off_range,
     untrue,
 )
-from ..argument_checks import check_names, read_number, require_room, require_steps, unknown
+from ..argument_checks import check_names, read_number, require_size, require_steps, unknown
 from ..columns import Columns
 from ..inputs import Forcing
-from ..kernels import LateCore, eager
+from ..kernels import LazyCore, eager
 from ..trajectory import Span, Start, Trajectory
 from .bound_run import watch_run
-from .events import Events, is_told_by_the_caller
+from .events import Events, is_inner_run
 from .integrate import Solution, record
 from .run_arguments import check_step, deep_start, find_state, ordered_times, set_up
 
@@ -349,7 +349,7 @@ class RigidSteps:
                 if name != "meeting_time" and 0 not in layout.shape(name):
                     raise kernels.missing(name)
                 continue
-            core = core.having(name) if isinstance(core, LateCore) and name not in core.core.names else eager(core)
+            core = core.having(name) if isinstance(core, LazyCore) and name not in core.core.names else eager(core)
             context = bound if core is eager(self.module.core) else core.context(bound.p, bound.u, UsageError)
             sources[name], n_work = (core.address(name), context.c), max(n_work, core.sizes["n_work"])
         return sources, n_work
@@ -448,7 +448,7 @@ def step_rigidly(
     _require_no_others(module, events)
     forcing.begin(start, end)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
-    require_room("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
+    require_size("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
     x = np.array(find_state(bound, initial, start, forcing))
     steps = RigidSteps(bound, forcing, tolerance, iterations)
     found = deep_start(bound, start, x, forcing(start, x) if forcing else None)
@@ -485,7 +485,7 @@ def step_rigidly(
         if watch is not None:
             watch.close()
     met = steps.stepper.figures
-    if met["missed_steps"] and not is_told_by_the_caller():
+    if met["missed_steps"] and not is_inner_run():
         warnings.warn(
             f"{met['missed_steps']} of {steps.taken} steps leave a residual of the contact laws of up to "
             f"{met['contact_residual']:.3g} m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, "

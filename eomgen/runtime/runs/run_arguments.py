@@ -30,7 +30,7 @@ from ..argument_checks import as_real, read_flag, read_number, read_numbers, rea
 from ..initial import Initial
 from ..inputs import Forcing
 from ..trajectory import Span, Start, last_state
-from .events import at_next_samples, is_told_by_the_caller
+from .events import at_next_samples, is_inner_run
 from .integrate import NAMES
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 ROUNDS = 50
 
 
-def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callable[[Array], Array]) -> Array:
+def assemble_with_inputs(layout: Layout, forcing: Forcing, t: float, assembled: Callable[[Array], Array]) -> Array:
     """The state (n_x,) that is assembled with the inputs that it gives itself.
 
     Parameters
@@ -215,7 +215,7 @@ def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
     return {} if own is None or (isinstance(method, str) and method in STIFF) else {"max_step": own}
 
 
-def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
+def declared_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
     """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
     own, named = map(module.info.simulation.get, ("step", "method"))
     if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
@@ -279,7 +279,9 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
 
 def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None) -> Array:
     if forcing is not None and forcing.constrained:
-        return find_led_state(module.layout, forcing, t, lambda u: _find_state(module.bind(None, u), initial, t, None))
+        return assemble_with_inputs(
+            module.layout, forcing, t, lambda u: _find_state(module.bind(None, u), initial, t, None)
+        )
     if initial is None:
         return module.x0(t=t) if t else module._declared_start.copy()
     if isinstance(initial, Mapping):
@@ -319,7 +321,7 @@ def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
 
 def warn_of_depth(module: BoundModel, t: float, x: Array, u: Any) -> None:
     """Tell the line of the user's that called of a start inside each other."""
-    found = None if is_told_by_the_caller() else deep_start(module, t, x, u)
+    found = None if is_inner_run() else deep_start(module, t, x, u)
     if found is not None:
         warnings.warn(
             f"{module.name} starts with shapes inside each other; {found}. Stiff contacts drive them apart at once, "

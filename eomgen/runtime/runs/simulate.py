@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import EvaluationError, SimulationError, SimulationInterrupted, calls_within, cannot
-from ..argument_checks import check_names, read_flag, require_room, require_steps
+from ..argument_checks import check_names, read_flag, require_size, require_steps
 from ..inputs import Forcing
 from ..refusals import not_driven, require_rigid_contacts
 from ..trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
 from .compiled import can_run
-from .events import WAIT, ControlledEvents, Events, is_told_by_the_caller, told_by_the_caller
+from .events import WAIT, ControlledEvents, Events, inner_run, is_inner_run
 from .integrate import (
     Solution,
     check_options,
@@ -35,11 +35,11 @@ from .run_arguments import (
     check_method,
     check_tolerances,
     declare,
+    declared_step,
     find_span,
     find_state,
     longest_step,
     ordered_times,
-    own_step,
 )
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def simulate(
     plain = plain and max_step is None and first_step is None and step is None and SIMPLE.issuperset(map(type, key))
     plan: Plan | None = module._plans.get(key) if plain else None
     if plan is None:
-        method, step = own_step(module, method, step)
+        method, step = declared_step(module, method, step)
         limits = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
             if module.layout.n_dof:
@@ -270,7 +270,7 @@ def simulate(
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
-    if any(event.action == WAIT for event in watched.model) and not is_told_by_the_caller():
+    if any(event.action == WAIT for event in watched.model) and not is_inner_run():
         from .impact import describe_negative_gaps
 
         if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
@@ -291,7 +291,7 @@ def simulate(
     numbers = (1 + module.n_x) * ((stored is None) + 8 * dense_output)  # of each step
     many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take
     if many:
-        require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
+        require_size(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     run.begin(start, end, x0, longest, numbers)
     try:
         solution, failure, raised = integrate(
@@ -332,7 +332,7 @@ def simulate(
     return made
 
 
-_again = told_by_the_caller()(simulate)  # without the warnings that the first run gave
+_again = inner_run()(simulate)  # without the warnings that the first run gave
 
 
 def _copied(value: Any) -> Any:
