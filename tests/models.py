@@ -56,7 +56,7 @@ IN_C: dict[str, Any] = {
         "constraint_jacobian", "coordinate_slopes", "velocity_constraints", "project", "poses", "outputs", "events",
         "resets", "held_errors", "kinematics", "loop_coordinates", "loop_coordinate_jacobian", "alignment",
         "finite_forces", "meeting_time", "scales", "centroidal", "needed_wrenches", "wrench_geometry",
-        "inverse_dynamics", "near_pairs", "bias_apart", "motion_axes", "event_slopes", "event_derivatives",
+        "inverse_dynamics", "near_pairs", "bias_apart", "motion_axes", "event_derivatives",
         "strike_derivatives", "motion_outputs", "input_jacobian", "parameter_jacobian", "assembly_jacobian",
         "output_derivatives", "inertial_terms", "inverse_dynamics_derivatives", "dae_residual", "dae_jacobian",
     ),

@@ -110,7 +110,6 @@ KERNELS: tuple[Kernel, ...] = (
            "new values of states after events, in the order of `resets`", absent=True),
     Kernel("held_errors", ("q", "v"), lambda s: (s.n_held,), "errors and their rates of equations that are closed now",
            absent=True),
-    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
         "event_derivatives", ("q", "v"),
         lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
@@ -182,7 +181,7 @@ KERNELS: tuple[Kernel, ...] = (
 #: Those that take the time first.
 TIMED = frozenset((
     *("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian", "dae_residual", "dae_jacobian"),
-    *("events", "resets", "held_errors", "event_slopes", "event_derivatives", "strike_derivatives"),
+    *("events", "resets", "held_errors", "event_derivatives", "strike_derivatives"),
 ))  # fmt: skip
 #: The same by name.
 NAMED = {kernel.name: kernel for kernel in KERNELS}

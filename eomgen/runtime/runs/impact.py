@@ -350,7 +350,8 @@ def strike_events(
                     f"event {events[i]['name']}: the gap depends on the input {layout.u[k]}, which depends on the "
                     "state, so an impact would change its rate; write the gap in coordinates instead"
                 )
-    slopes = dict(zip(gaps, module.kernels.rows("event_slopes", [*gaps], t, x, u), strict=True))
+    by_state = np.ix_([*gaps], range(layout.n_x))
+    slopes = dict(zip(gaps, module.kernels.rows("event_derivatives", by_state, t, x, u), strict=True))
     states = one_state(module, t, x)
     q, v = states.q[:, 0], states.v[:, 0]
     for i in gaps:
