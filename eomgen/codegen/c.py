@@ -15,8 +15,8 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files
 from .c_layout import describe_equations, is_straight, work_areas
 from .c_pairs import pair_declarations, pair_files
-from .c_rolled import print_block_of_branches, print_rolled, print_rolled_precompute
-from .c_text import Printed, print_block, print_precompute, used_helpers, with_pieces
+from .c_rolled import print_block_of_branches, print_rolled
+from .c_text import Printed, print_block, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .loop_systems import LARGE
 from .pair_sums import contact_tables
@@ -163,17 +163,13 @@ def _print(program: Program, apart: Collection[str], branches: bool = False) -> 
 
     ``branches``: statements of alike branches as vectors.
     """
-    printed = {"precompute": _print_precompute(program)} if program.hoisted else {}
-    printed |= {b.name: _print_function(program, b, branches) for b in program.blocks if b.name not in program.aliases}
+    blocks = [program.precompute] if program.hoisted else []
+    blocks += [block for block in program.blocks if block.name not in program.aliases]
+    printed = {block.name: _print_function(program, block, branches) for block in blocks}
     for name in _linked(program, apart):
         text = printed[name].text.replace(f"static flag {name}_block(", f"flag {program.name}_{name}_block(")
         printed[name] = printed[name]._replace(text=text)
     return printed
-
-
-def _print_precompute(program: Program) -> Printed:
-    rolled = print_rolled_precompute(program) if program.is_rolled("precompute") else None
-    return rolled or print_precompute(program)
 
 
 def _print_function(program: Program, block: Block, branches: bool) -> Printed:

@@ -17,7 +17,7 @@ from .c_text import Printed, helper, literal, used_helpers, with_pieces
 from .files import render
 from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import MOST_ORDER, Series, Term, behind, make_series
-from .statements import print_angles, references
+from .statements import gather_angles, print_angles, references
 
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
@@ -120,7 +120,7 @@ def series_files(program: Program) -> dict[str, str]:
     """
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")
-    printer = _SeriesPrinter(series, references(program, block.inputs))
+    printer = _SeriesPrinter(series, references(program, block))
     used = {t.kind for t in series.terms} & OPERATIONS.keys()
     used |= {"absorb"} if used & {"sqrt", "hypot"} else set()
     context = {
@@ -323,19 +323,9 @@ class _SeriesPrinter:
     def first(self) -> list[str]:
         """Values of all terms, the angles' sin and cos together, and the beginnings of the rows."""
         made = [i for i, t in enumerate(self._terms) if self._zero(i) == f"a{i}"]
-        late: set[int] = set()
-        angles: dict[int, int] = {}
-        for i in made:
-            operands, circular = self._terms[i].operands, self._terms[i].kind in ("sin", "cos")
-            if circular and late.isdisjoint(operands):
-                angles.setdefault(operands[0], len(angles))
-            if circular or not late.isdisjoint(operands):
-                late.add(i)
-        early = set(angles)
-        for i in reversed(made):
-            if i in early:
-                early.update(self._terms[i].operands)
-        lines = [self._value(i, {}) for i in made if i in early]
+        early, arguments = gather_angles(made, lambda i: (self._terms[i].kind, *self._terms[i].operands))
+        angles = {i: k for k, i in enumerate(arguments)}
+        lines = [self._value(i, {}) for i in early]
         lines += print_angles([self._zero(i) for i in angles]) if angles else []
         lines += [self._value(i, angles) for i in made if i not in early]
         lines += [f"EOMGEN_REJECT({self._zero(i)} <= 0.0)" for i in self._series.checks]

@@ -126,8 +126,8 @@ def places_again(program: Program, block: Block) -> dict[str, str]:
     again = sums_again(program) if block.name in BY_BODIES[1:] else []
     if not again:
         return {}
-    known = next(b.n_in for b in program.blocks if b.name == BY_BODIES[1]) - program.sizes.n_q
-    count = known + max(program.sizes.n_q, program.sizes.n_v)
+    lengths = dict(_areas_of_bodies(program))
+    count = lengths["COEFFICIENTS"] + lengths["TURNING"]
     found, at = {}, count + len(again)
     for k, function in enumerate(one.function for one in again):
         found[function.name] = f"w + (x - w) + {count + k}, w + (x - w) + {at}"

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..expr.core import Expr
 from .c_layout import places_again
 from .c_text import BlockPrinter, Printed, direct_results, function_text, print_block
 from .program import Block, Program
@@ -26,41 +25,19 @@ ALIKE = 2
 
 def print_rolled(program: Program, block: Block) -> Printed | None:
     """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
-    texts = references(program, block.inputs)
-    again = places_again(program, block)
-    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts, again)
-
-
-def print_rolled_precompute(program: Program) -> Printed | None:
-    """The same of ``precompute_block``."""
-    texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
-    return _print(program, "precompute", program.hoisted, (), frozenset(), texts, {})
-
-
-def _print(
-    program: Program,
-    block: str,
-    outputs: Sequence[Expr],
-    checks: Sequence[Expr],
-    skipped: frozenset[int],
-    texts: dict[int, str],
-    again: dict[str, str],
-) -> Printed | None:
-    graph, name = program.graph, f"{block}_block"
-    given = {i: _place(text) for i, text in texts.items()}
-    longest = max(1, program.limits.statements // 2)
-    found = find_segments(graph, outputs, checks, skipped, given, longest, program.is_searched(block))
+    name, texts = f"{block.name}_block", references(program, block)
+    found = find_segments(program, block, {i: _place(text) for i, text in texts.items()})
     if ALIKE * found.written > found.carried_out:
         return None
-    found.lists.again = again
+    found.lists.again = places_again(program, block)
     recurrences = _find_recurrences(found)
     printed = [
         _print_kind(program, found, kind, along, f"{name}_{n}")
         for n, (kind, along) in enumerate(zip(found.kinds, recurrences, strict=True))
     ]
     made = {i for k in found.kinds for segment in k.members for i in segment}
-    direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
-    bare = tuple(sorted({y.id for y in checks} - made))
+    direct = tuple((k, y.id) for k, y in enumerate(block.outputs) if y.id not in made)
+    bare = tuple(sorted({y.id for y in block.checks} - made))
     pieces = Pieces((), direct, bare, 0)
     printer = BlockPrinter(program, texts, pieces)
     main = direct_results(printer, pieces)

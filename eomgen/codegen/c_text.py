@@ -110,7 +110,7 @@ class BlockPrinter:
     def lines(self, piece: PrintedFunction) -> list[str]:
         result: list[str] = []
         loaded: set[int] = set()
-        angles = gather_angles(self._graph, piece, self.pairs)
+        angles = gather_angles(piece.statements, self._nodes.__getitem__, self.pairs)
         self._angles = {}
         self._uses = self._count_uses(piece)
         first = frozenset(angles.first)
@@ -242,9 +242,9 @@ def print_block(
         outputs[run.first : run.first + run.length] = [graph.zero] * run.length
     lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
     pieces = cut(
-        graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find, block.guards
+        graph, outputs, block.checks, program.made_before(block), program.limits.statements, lists, find, block.guards
     )
-    texts = references(program, block.inputs)
+    texts = references(program, block)
     again, labels = places_again(program, block), _label_results(program, block.name)
     return print_pieces(program, f"{block.name}_block", pieces, texts, runs, again, printing, labels)
 
@@ -307,14 +307,6 @@ def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
         lines.append(f"memset(out + {zeros[0]}, 0, {zeros[-1] - zeros[0] + 1} * sizeof *out);")
         direct = tuple((k, i) for k, i in direct if i != zero)
     return lines + [printer.result([k], printer.real(i)) for k, i in direct]
-
-
-def print_precompute(program: Program) -> Printed:
-    """``precompute_block``, which fills the hoisted constants; its work lies behind them."""
-    graph = program.graph
-    texts = {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
-    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
-    return print_pieces(program, "precompute_block", pieces, texts)
 
 
 def helper(row: Operation) -> str:

@@ -12,8 +12,8 @@ from ..mechanics import Kinematics
 from ..mechanics.methods import METHODS, TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.wrenches import cut_drives
-from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
-from .loop_systems import BodyLoops, EmbeddedLoops, LoopBlocks, estimate
+from .factor import factoring_operations, factorize, has_long_paths, is_unrolled
+from .loop_systems import BodyLoops, EmbeddedLoops, estimate
 from .program import Limits
 from .terms import SystemTerms
 
@@ -68,7 +68,7 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
         embedded = EmbeddedLoops(SystemTerms(kinematics, mobility, embedding))
         if not mobility.n_dof or not embedded.determined:
             return embedding, None
-        operations["embedding"] = _count(embedded)
+        operations["embedding"] = embedded.operations
     recursive = METHODS["recursive"](kinematics)
     if not has_long_paths(kinematics.parent):
         embedding = embedding or METHODS["embedding"](kinematics)
@@ -77,8 +77,8 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
     if "embedding" not in operations:
-        return recursive, Choice("recursive", lambda: {"recursive": _count(bodies)})
-    operations["recursive"] = _count(bodies)
+        return recursive, Choice("recursive", lambda: {"recursive": bodies.operations})
+    operations["recursive"] = bodies.operations
     assert embedding is not None
     chosen = embedding if operations["embedding"] <= operations["recursive"] else recursive
     return chosen, Choice(chosen.method, operations)
@@ -93,11 +93,6 @@ def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEqu
     if count(list(embedding.inverse_dynamics)).total < count(list(recursive.inverse_dynamics)).total:
         found.inverse_dynamics = embedding.inverse_dynamics
     return found
-
-
-def _count(blocks: LoopBlocks) -> int:
-    outputs, checks = blocks.dynamics()
-    return count([*outputs, *checks]).total
 
 
 def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> bool:
@@ -133,7 +128,7 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     else:
         turned = embedding.turned
         mass, bias = turned.system if turned else (embedding.mass_matrix, embedding.bias)
-        solution = solve(factorize(mass, kinematics.parent), [-h for h in bias])
+        solution = factorize(mass, kinematics.parent).solve([-h for h in bias])
         total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
     chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding

@@ -11,18 +11,10 @@ from collections.abc import Sequence
 
 from ..base.limits.numbers import NOTHING, SINGULAR
 from ..expr.core import Expr
-from ..expr.records import dataclass
+from . import linear_algebra
+from .linear_algebra import Row, SparseFactor
 
 LONG = 24  #: velocities on the way to ground, on average, with which a mass matrix is written out
-
-
-@dataclass(frozen=True)
-class Factor:
-    """M = L^T D L."""
-
-    lower: tuple[dict[int, Expr], ...]  #: row i: {j: L[i, j]} for j on the path from i to ground
-    pivots: tuple[Expr, ...]  #: D
-    reciprocals: tuple[Expr, ...]  #: 1 / D
 
 
 def path(parent: Sequence[int], index: int) -> list[int]:
@@ -33,39 +25,17 @@ def path(parent: Sequence[int], index: int) -> list[int]:
     return result
 
 
-def factorize(matrix: Sequence[Sequence[Expr]], parent: Sequence[int]) -> Factor:
+def factorize(matrix: Sequence[Sequence[Expr]], parent: Sequence[int]) -> SparseFactor:
     """Factor a symmetric matrix with the branch-induced pattern of `parent`; only its lower triangle is read."""
-    n = len(matrix)
-    H = {(i, j): matrix[i][j] for i in range(n) for j in (i, *path(parent, i))}
-    lower: list[dict[int, Expr]] = [{} for _ in range(n)]
-    reciprocals: list[Expr] = [matrix[i][i] for i in range(n)]
-    for k in reversed(range(n)):
-        above = [i for i in path(parent, k) if not H[k, i].is_zero]
-        reciprocals[k] = 1.0 / H[k, k]
-        for i in above:
-            ratio = H[k, i] * reciprocals[k]
-            for j in above:
-                if j <= i:
-                    H[i, j] = H[i, j] - ratio * H[k, j]
-            lower[k][i] = ratio
-    return Factor(tuple(lower), tuple(H[k, k] for k in range(n)), tuple(reciprocals))
+    rows: list[Row] = [{i: row[i]} for i, row in enumerate(matrix)]
+    for i, row in enumerate(matrix):
+        for j in path(parent, i):
+            if not row[j].is_zero:
+                rows[i][j] = rows[j][i] = row[j]
+    return linear_algebra.factorize(rows, order=range(len(rows))[::-1])
 
 
-def solve(factor: Factor, right: Sequence[Expr]) -> list[Expr]:
-    """x with L^T D L x = right."""
-    x = list(right)
-    n = len(x)
-    for i in reversed(range(n)):
-        for j, ratio in factor.lower[i].items():
-            x[j] = x[j] - ratio * x[i]
-    for i in range(n):
-        x[i] = x[i] * factor.reciprocals[i]
-        for j, ratio in factor.lower[i].items():
-            x[i] = x[i] - ratio * x[j]
-    return x
-
-
-def positivity(matrix: Sequence[Sequence[Expr]], factor: Factor, scales: Sequence[Expr]) -> list[Expr]:
+def positivity(matrix: Sequence[Sequence[Expr]], factor: SparseFactor, scales: Sequence[Expr]) -> list[Expr]:
     """Conditions (each 1.0 or 0.0) that all hold exactly where the matrix is safely positive definite.
 
     Each pivot, made dimensionless by the scales of the coordinates, must exceed 1e-13 of its own diagonal entry, and

@@ -15,7 +15,8 @@ from ..expr.core import Expr, reachable, substitute
 from ..expr.differentiate import jacobian
 from ..expr.schedule import count
 from ..mechanics.methods.embedding import ForceSlopes
-from .factor import Factor, factorize, path, positivity, solve
+from .factor import factorize, path, positivity
+from .linear_algebra import SparseFactor
 from .program import Limits
 from .terms import SystemTerms
 
@@ -105,10 +106,10 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
         return None
     found: list[tuple[Entries, Solved]] = []
     if slopes.forces is not None:
-        solved = _solve(terms, slopes.forces.mass_matrix, slopes.forces.bias)
+        solved = solve_tree(terms, slopes.forces.mass_matrix, slopes.forces.bias)
         found.append((slopes.joined(slopes.forces, solved.accelerations), solved))
     if (terms.accelerations is None or not found) and slopes.is_short(terms.inverse_dynamics):
-        solved = _solve(terms, terms.mass_matrix, terms.bias)
+        solved = solve_tree(terms, terms.mass_matrix, terms.bias)
         found.append((_at(terms, slopes.by_formula(), solved.accelerations), solved))
     if not found:
         return None
@@ -125,7 +126,7 @@ def unrolled_shift(
     if not terms.mass_matrix or not _fits(terms, slopes.limits, len(names)):
         return None
     symbols = terms.symbols(names)
-    solved = _solve(terms, terms.mass_matrix, terms.bias)
+    solved = solve_tree(terms, terms.mass_matrix, terms.bias)
     found = jacobian(list(terms.inverse_dynamics), symbols)
     rows = _rows(terms, {}, _at(terms, found, solved.accelerations), solved, len(names))
     return (rows, solved.checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
@@ -140,14 +141,15 @@ def _at(terms: SystemTerms, entries: Entries, accelerations: Sequence[Expr]) -> 
 class Solved(NamedTuple):
     """The factor of a tree's mass matrix, its accelerations, and the conditions for them to exist."""
 
-    factor: Factor
+    factor: SparseFactor
     accelerations: list[Expr]
     checks: list[Expr]
 
 
-def _solve(terms: SystemTerms, mass: Sequence[Sequence[Expr]], bias: Sequence[Expr]) -> Solved:
+def solve_tree(terms: SystemTerms, mass: Sequence[Sequence[Expr]], bias: Sequence[Expr]) -> Solved:
+    """The accelerations of a tree with this mass matrix and bias."""
     factor = factorize(mass, terms.parent)
-    return Solved(factor, solve(factor, [-h for h in bias]), positivity(mass, factor, terms.coordinate_scales))
+    return Solved(factor, factor.solve([-h for h in bias]), positivity(mass, factor, terms.coordinate_scales))
 
 
 def _fits(terms: SystemTerms, limits: Limits, columns: int) -> bool:
@@ -162,7 +164,7 @@ def _rows(terms: SystemTerms, rates: Entries, forces: Entries, solved: Solved, w
     columns = [
         [
             *(rates.get((i, k), zero) for i in range(n_q)),
-            *solve(solved.factor, [-forces.get((i, k), zero) for i in range(n)]),
+            *solved.factor.solve([-forces.get((i, k), zero) for i in range(n)]),
         ]
         for k in range(width)
     ]

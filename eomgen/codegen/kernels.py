@@ -16,8 +16,8 @@ from ..expr.pairs import pairs_of_bodies, without_pairs
 from ..expr.schedule import count
 from ..mechanics.wrenches import inertial_terms
 from .contact_columns import COLUMNS, ContactColumns, contact_columns
-from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
-from .jacobian_blocks import Entries, ResidualSlopes, unrolled_jacobian, unrolled_shift
+from .factor import articulated_positivity, is_unrolled
+from .jacobian_blocks import Entries, ResidualSlopes, solve_tree, unrolled_jacobian, unrolled_shift
 from .loop_motions import MotionLoops, motion_loops
 from .loop_slopes import BY_BODIES, LoopSlopes
 from .loop_systems import BodyLoops, LoopBlocks, straight_loops
@@ -128,7 +128,6 @@ EXPRESSIONS: Mapping[str, Expressions] = {
     "events": lambda s: s.events,
     "resets": lambda s: s.resets,
     "held_errors": lambda s: s.held_errors,
-    "event_slopes": lambda s: _derivatives(s, s.events, (*s.q, *s.v)),
     "event_derivatives": lambda s: _by_everything(s, [*s.events, *s.resets]),
     "strike_derivatives": lambda s: _by_everything(s, _strike_rows(s)),
     "assembly_jacobian": _assembly_jacobian,
@@ -215,10 +214,8 @@ class BlockMaker:
             checks = articulated_positivity(terms.pivots, terms.coordinate_scales, terms.parent)
             return list(terms.accelerations), [*self._turned, *checks]
         mass, bias = terms.turned.system if terms.turned else (terms.mass_matrix, terms.bias)
-        factor = factorize(mass, terms.parent)
-        checks = positivity(mass, factor, terms.coordinate_scales)
-        solution = solve(factor, [-h for h in bias])
-        return (terms.turned.accelerations(solution) if terms.turned else solution), [*self._turned, *checks]
+        _, a, checks = solve_tree(terms, mass, bias)
+        return (terms.turned.accelerations(a) if terms.turned else a), [*self._turned, *checks]
 
     @property
     def _residuals(self) -> list[Expr]:

@@ -9,7 +9,7 @@ from itertools import pairwise
 from ..base.operations import CONDITION, operations_with
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import jacobian
-from ..expr.tensors import Matrix, combined, eliminate, total
+from ..expr.tensors import Matrix, combined, dot, eliminate, reduced, substituted_back, total
 from ..native.limits.systems import FIXED
 
 #: Most pieces of one law: what is written out grows with them.
@@ -133,13 +133,8 @@ def _minor_sums(A: Matrix) -> list[Expr]:
         found.append(e)
         if k < n:
             rest = [[(e if i == j else e * 0.0) - power[i][j] for j in range(n)] for i in range(n)]
-            power = _product(A, rest)
+            power = [[dot(row, column) for column in zip(*rest, strict=True)] for row in A]
     return found
-
-
-def _product(A: Matrix, B: Matrix) -> Matrix:
-    n = range(len(A))
-    return [[total([A[i][0] * B[0][j], *(A[i][k] * B[k][j] for k in n[1:])]) for j in n] for i in n]
 
 
 def _halves(part: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -154,23 +149,14 @@ def _halves(part: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
 
 def solve_by_largest_pivots(matrix: Matrix, right: Matrix) -> Matrix:
     """X with A X = B, by columns, with exchange of rows: A may be turned so that a leading entry of it vanishes."""
-    A, columns, n = [list(row) for row in matrix], [list(column) for column in right], len(matrix)
-    for k in range(n):
-        for i in range(k + 1, n):
+
+    def exchange(A: Matrix, columns: Matrix, k: int) -> None:
+        for i in range(k + 1, len(A)):
             if not A[i][k].is_zero:
                 _larger_first(A, columns, k, i)
-        for i in range(k + 1, n):
-            if A[i][k].is_zero:
-                continue
-            ratio = A[i][k] / A[k][k]
-            for j in range(k + 1, n):
-                A[i][j] = A[i][j] - ratio * A[k][j]
-            for x in columns:
-                x[i] = x[i] - ratio * x[k]
-    for x in columns:
-        for k in reversed(range(n)):
-            x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))]) / A[k][k]
-    return columns
+
+    A, columns = reduced(matrix, right, exchange)
+    return [substituted_back(A, x) for x in columns]
 
 
 def _larger_first(A: Matrix, columns: Matrix, k: int, i: int) -> None:
@@ -317,19 +303,10 @@ def _certain(of: Sequence[int], D: Mapping[tuple[int, int], Expr], gain: Matrix,
         for j in range(n):
             size = steep * _length([gain[m][j] for m, _ in used], graph.zero)
             sizes[i][j] = size if sizes[i][j].is_zero else graph.apply("max", sizes[i][j], size)
-    return _positive_pivots([[(one if i == j else graph.zero) - sizes[i][j] for j in range(n)] for i in range(n)], one)
-
-
-def _positive_pivots(given: Matrix, one: Expr) -> Expr:
-    """1 where all pivots of the elimination are positive, else 0."""
-    graph, n, matrix = one.graph, len(given), [list(row) for row in given]
+    pivots, _ = reduced([[(one if i == j else graph.zero) - sizes[i][j] for j in range(n)] for i in range(n)], [])
     certain = one
     for k in range(n):
-        certain = certain * graph.apply("lt", 0.0, matrix[k][k])
-        for i in range(k + 1, n):
-            ratio = matrix[i][k] / matrix[k][k]
-            for j in range(k + 1, n):
-                matrix[i][j] = matrix[i][j] - ratio * matrix[k][j]
+        certain = certain * graph.apply("lt", 0.0, pivots[k][k])
     return certain
 
 

@@ -152,25 +152,28 @@ class SparseFactor:
         return x
 
 
-def factorize(matrix: Sequence[Mapping[int, Expr]], term: Expr | None = None) -> SparseFactor:
+def factorize(
+    matrix: Sequence[Mapping[int, Expr]], term: Expr | None = None, order: Sequence[int] | None = None
+) -> SparseFactor:
     """Factor a symmetric positive definite matrix given by both triangles, without square roots.
 
-    ``term`` is what its diagonal has beyond the matrix that is meant; see :meth:`SparseFactor.settle`.
+    ``term`` is what its diagonal has beyond the matrix that is meant; see :meth:`SparseFactor.settle`.  Without an
+    ``order`` of elimination it is one with little fill.
     """
     work = [dict(row) for row in matrix]
-    order, _ = minimum_degree(matrix)
+    forward, order = order is None, minimum_degree(matrix)[0] if order is None else order
     columns: list[Row] = [{} for _ in work]
     pivots = [row[i] for i, row in enumerate(work)]
     reciprocals = list(pivots)
     for i in order:
         pivot = pivots[i] = work[i].pop(i)
         inverse = reciprocals[i] = 1.0 / pivot
-        below = sorted(work[i])
+        below = sorted(work[i], reverse=not forward)
         for k in below:
             columns[i][k] = work[i][k] * inverse
             del work[k][i]
-        for a, k in enumerate(below):
-            for j in below[: a + 1]:
+        for k in below:
+            for j in (j for j in below if j <= k):
                 change = columns[i][k] * work[i][j]
                 work[k][j] = work[j][k] = work[k][j] - change if j in work[k] else -change
     return SparseFactor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals), term)

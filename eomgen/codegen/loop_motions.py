@@ -33,6 +33,7 @@ from .linear_algebra import (
     work,
 )
 from .loop_systems import SPREAD, LoopBlocks, embedded_accelerations, largest, total_magnitude
+from .terms import SystemTerms
 
 ENDLESS = 1e300  #: the length of a step that is not known here
 ROW = 64  #: columns beside one from which on rows tell what is near, as columns of 160 four-bars no longer can
@@ -40,17 +41,19 @@ SAVED = 0.7  #: part of the operations of the ordinary blocks that others take a
 LONGER = 4  #: times as many multiplications as those these may take: 320 four-bars in a row take 0.6 of the time
 
 
-class MotionLoops:
-    """The expressions of both blocks; ``loops`` take over."""
+class MotionLoops(LoopBlocks):
+    """The expressions of both blocks, by motions."""
 
-    def __init__(self, loops: LoopBlocks) -> None:
-        self.loops, self.terms = loops, loops.terms
-        preferred = set(self.terms.preferred)
-        self.dependent = [k for k in range(self.terms.n_v) if k not in preferred]
+    passes = 1, 1
+
+    def __init__(self, terms: SystemTerms) -> None:
+        super().__init__(terms)
+        self.lost = 1.0
+        self.dependent = [k for k in range(terms.n_v) if k not in terms.preferred]
         place = {k: j for j, k in enumerate(self.dependent)}
-        self._left = [{place[k]: x for k, x in row.items() if k in place} for row in loops.rows]
+        self._left = [{place[k]: x for k, x in row.items() if k in place} for row in self.rows]
         self.order = fronts(self._left, len(self.dependent))
-        weights = [1.0 / s for s in loops.s]
+        weights = [1.0 / s for s in self.s]
         self.weights = [x * x for x in weights]
 
     @property
@@ -58,7 +61,7 @@ class MotionLoops:
         """About how many multiplications the linear algebra takes, by the pattern alone."""
         total = work(self.order or (), 1) + self.terms.n_dof**3 // 6
         for part in connected(self._left):
-            own = [row for row, left in zip(self.loops.rows, self._left, strict=True) if not part.isdisjoint(left)]
+            own = [row for row, left in zip(self.rows, self._left, strict=True) if not part.isdisjoint(left)]
             freedoms = len(set().union(*own)) - len(part)
             total += len(part) * freedoms * (freedoms + 2)
         return total
@@ -66,7 +69,7 @@ class MotionLoops:
     @property
     def possible(self) -> bool:
         """Whether there is a mass matrix, all rows are of positions, and hold the dependent velocities."""
-        return self.order is not None and self.loops.h == len(self.loops.J) and not self.terms.by_columns
+        return self.order is not None and self.h == len(self.J) and not self.terms.by_columns
 
     # -- motions --------------------------------------------------------------------------------------------------
     @cached_property
@@ -86,7 +89,7 @@ class MotionLoops:
     def _motions(self) -> list[Row]:
         """B (n rows of f)."""
         zero = self.terms.graph.zero
-        columns = [self._particular([-row.get(k, zero) for row in self.loops.rows])[0] for k in self.terms.preferred]
+        columns = [self._particular([-row.get(k, zero) for row in self.rows])[0] for k in self.terms.preferred]
         for k, column in zip(self.terms.preferred, columns, strict=True):
             column[k] = self.terms.graph.one
         return [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
@@ -101,7 +104,7 @@ class MotionLoops:
         zero, one, found = self.terms.graph.zero, self.terms.graph.one, list[Leg]()
         for part in self._factor.parts:
             held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
-            rows = [self.loops.rows[i] for i in held]
+            rows = [self.rows[i] for i in held]
             C = [{r: -row[k] for r, row in enumerate(rows) if k in row} for k in self.terms.preferred]
             if len(held) < sum(map(bool, C)):
                 units = [[one if j == i else zero for j in range(len(self._left))] for i in held]
@@ -137,7 +140,7 @@ class MotionLoops:
         """Whether the dependent velocities follow well from the independent ones: not by columns that are nearly
         parallel, or short beside others, nor so that they move many times as fast.
         """
-        graph, s = self.terms.graph, self.loops.s
+        graph, s = self.terms.graph, self.s
         found = self._across(LOST if self._in_a_row else NEAR_SQUARE)
         for j, k in enumerate(self.terms.preferred):
             square = self._products[j][j] * (s[k] * s[k])
@@ -146,7 +149,7 @@ class MotionLoops:
 
     def _across(self, limit: float) -> list[Expr]:
         """Whether every column has more than this part of its square across those before it."""
-        graph, s = self.terms.graph, self.loops.s
+        graph, s = self.terms.graph, self.s
         scales = [s[k] * s[k] for k in self.dependent]
         lengths = [x * k for x, k in zip(self._factor.squares, scales, strict=True)]
         least: dict[int, Expr] = {}
@@ -159,58 +162,44 @@ class MotionLoops:
             found.append(graph.apply("lt", ordinary * limit, apart))
         return found
 
-    def _far(self) -> list[Expr]:
-        """Conditions besides by which no change point is near: none where columns tell that already."""
-        if not self._in_a_row:
-            return []
-        columns = self.loops.all_of(self._across(NEAR_SQUARE))
-        return [self.terms.graph.apply("or", columns, self.loops.separate_rows())]
-
-    @property
-    def guards(self) -> list[Expr]:
-        """As of LoopBlocks."""
-        return self.loops.guards
-
     # -- blocks ---------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
         """As of LoopBlocks; the length is endless where another form is to take the step."""
-        graph, loops = self.terms.graph, self.loops
-        e = loops.residuals
-        size = total_magnitude(e) * (loops.unit / float(loops.h))
+        graph, e = self.terms.graph, self.residuals
+        size = total_magnitude(e) * (self.unit / float(self.h))
         d, rest = self._particular(e)
-        left = total_magnitude(rest) * loops.unit if rest else graph.zero
+        left = total_magnitude(rest) * self.unit if rest else graph.zero
         dz = [x - y for x, y in zip(d, times(self._motions, self._along(d)), strict=True)]
-        length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
-        length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
+        length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, self.s, strict=True)])
+        length = graph.apply("select", self.all_of(self._follows()), length, graph.constant(ENDLESS))
         return [size, left, length, *(-x for x in dz)]
 
-    @cached_property
-    def _rate(self) -> list[Expr]:
-        return [x * i for x, i in zip(self.terms.constraint_rate, self.loops.inverse, strict=True)]
-
-    @cached_property
-    def moved(self) -> list[Expr]:
-        """Projected velocities (n,)."""
-        terms = self.terms
-        v = [terms.graph.symbol(name) for name in terms.v]
-        given, _ = self._particular([-x for x in self._rate])
-        y = [v[k] for k in terms.preferred]
+    def _moved(self, conditions: list[Expr]) -> list[Expr]:
+        v = self.terms.symbols(self.terms.v)
+        given, _ = self._particular([-x for x in self.scaled(self.terms.constraint_rate)])
+        y = [v[k] for k in self.terms.preferred]
         missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
         return [a + b for a, b in zip(given, times(self._motions, y), strict=True)]
 
-    def dynamics(self) -> tuple[list[Expr], list[Expr]]:
-        """As of LoopBlocks; where it is sound, no change point is near."""
+    def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms = self.terms
-        v = [terms.graph.symbol(name) for name in terms.v]
-        here = substitute([*terms.bias, *terms.gamma], dict(zip(v, self.moved, strict=True)))
-        gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
+        here = substitute([*terms.bias, *terms.gamma], moved)
+        gamma = self.scaled(here[terms.n_v :])
         given, _ = self._particular([-x for x in gamma])
         a, checks = embedded_accelerations(terms, self._motions, given, here[: terms.n_v], self._legs)
-        conditions = [*self._follows(), *self._far(), self.loops.long_rows()]
-        if self.loops.redundant:  # whose rates may contradict each other
-            conditions += [self.loops.is_met(self.moved, self._rate), self.loops.is_met(a, gamma)]
-        return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks
+        conditions += self._follows()
+        if self._in_a_row:  # else columns tell already that no change point is near
+            columns = self.all_of(self._across(NEAR_SQUARE))
+            conditions.append(terms.graph.apply("or", columns, self.separate_rows()))
+        if self.redundant:  # whose rates may contradict each other
+            rate = self.scaled(terms.constraint_rate)
+            conditions += [self.is_met(list(moved.values()), rate), self.is_met(a, gamma)]
+        return a, checks
+
+    def _far(self) -> Expr:
+        """Where this form is sound, no change point is near."""
+        return self.terms.graph.one
 
 
 def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
@@ -220,12 +209,8 @@ def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
     """
     if loops is None or not loops.gentle:
         return None
-    shorter = MotionLoops(loops)
+    shorter = MotionLoops(loops.terms)
     if not shorter.possible or shorter.estimate > LONGER * longest:
         return None
-    return shorter if _operations(shorter) < SAVED * _operations(loops) else None
-
-
-def _operations(blocks: LoopBlocks | MotionLoops) -> int:
-    outputs, checks = blocks.dynamics()
-    return count(blocks.closing()).total + count([*outputs, *checks]).total
+    found, ordinary = (one.operations + count(one.closing()).total for one in (shorter, loops))
+    return shorter if found < SAVED * ordinary else None

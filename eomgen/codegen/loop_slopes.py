@@ -14,13 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from ..base.limits.constraints import TIKHONOV
 from ..expr.core import Expr, reachable, substitute
 from ..expr.differentiate import jacobian, jvp
 from ..expr.pairs import list_operands
 from ..expr.tensors import dot, total
-from ..mechanics.methods.recursions import ConstraintRow
-from .linear_algebra import times
 from .loop_systems import BodyLoops
 from .program import Block, Port
 
@@ -64,25 +61,15 @@ class LoopSlopes:
     def _velocities(self, dq: Sequence[Expr], dv: list[Expr]) -> list[Expr]:
         """The change of the projected v, q changing by dq."""
         turned = jvp(self.terms.velocity_constraints, dict(zip(self.q, dq, strict=True)))
-        r = [x * i for x, i in zip(turned, self.loops.inverse, strict=True)]
+        r = self.loops.scaled(turned)
         return self.loops.nearest(dv, r, len(r), *self.loops.of_velocities)
 
     # -- accelerations --------------------------------------------------------------------------------------------
     def _changed(self, r1: Sequence[Expr], r2: Sequence[Expr]) -> list[Expr]:
         """da of the change of both residuals."""
-        loops, terms = self.loops, self.terms
-        assert terms.constrained is not None
-        rest = [x * i for x, i in zip(r2, loops.inverse, strict=True)]
-        rows = [ConstraintRow(row, x) for row, x in zip(loops.rows, rest, strict=True)]
-        term = TIKHONOV if loops.redundant else 0.0
-        da = list(terms.constrained(rows, term, loaded=False, forces=[-x for x in r1]).accelerations)
-        if loops.redundant:
-            again = [
-                ConstraintRow(row.entries, row.rest + x) for row, x in zip(rows, times(loops.rows, da), strict=True)
-            ]
-            more = terms.constrained(again, term, loaded=False).accelerations
-            da = [x + y for x, y in zip(da, more, strict=True)]
-        return loops.nearest(da, rest, len(rest), loops.solver[0], 1)
+        rest = self.loops.scaled(r2)
+        solved, _ = self.loops.move(rest, [-x for x in r1])
+        return self.loops.nearest(solved.accelerations, rest, len(rest), self.loops.solver[0], 1)
 
     def _along(self, dq: Sequence[Expr], dv: Sequence[Expr]) -> Outputs:
         """dq' and da along a projected direction."""
@@ -94,7 +81,7 @@ class LoopSlopes:
         changes = jvp([*terms.q_dot, *r1, *r2], seeds)
         n_q, n = len(self.q), terms.n_v
         da = self._changed(changes[n_q : n_q + n], changes[n_q + n :])
-        multipliers = [x * i for x, i in zip(self.loops.multipliers, self.loops.inverse, strict=True)]
+        multipliers = self.loops.scaled(self.loops.multipliers)
         here = dict(zip((*self.a, *l), (*motion.accelerations, *multipliers), strict=True))
         return substitute(substitute([*changes[:n_q], *da], here), dict(zip(self.v, self.loops.moved, strict=True)))
 

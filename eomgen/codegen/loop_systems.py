@@ -14,6 +14,8 @@ from functools import cached_property
 from ..base.limits.constraints import GENTLE, KEPT, LEFT, LOST, ROUNDED, TIKHONOV, UNMOVED, VANISHED
 from ..base.limits.numbers import ROW, STILL
 from ..expr.core import Expr, substitute
+from ..expr.schedule import count
+from ..expr.tensors import total
 from ..mechanics.constraint_functions import ALL, UNIT
 from ..mechanics.diagonal_blocks import DiagonalBlock, diagonal_blocks
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
@@ -49,11 +51,7 @@ def largest(values: Sequence[Expr]) -> Expr:
 
 def total_magnitude(values: Sequence[Expr]) -> Expr:
     """The sum of absolute values, which takes no comparisons."""
-    graph = values[0].graph
-    total = graph.zero
-    for x in values:
-        total = total + graph.apply("abs", x)
-    return total
+    return total(x.graph.apply("abs", x) for x in values)
 
 
 def summands(x: Expr) -> list[Expr]:
@@ -94,8 +92,6 @@ class LoopBlocks(ABC):
 
     #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations.
     passes: tuple[int, int]
-    #: Solutions that leave no trace of the term TIKHONOV of redundant rows, each for what the last one left.
-    solutions = 2
 
     def __init__(self, terms: SystemTerms) -> None:
         self.terms = terms
@@ -113,6 +109,10 @@ class LoopBlocks(ABC):
         self.lost = VANISHED if self.gentle else LOST
         #: whether there are more rows than their rank
         self.redundant = len(self.J) > terms.n_v - terms.n_dof
+
+    def scaled(self, x: Sequence[Expr]) -> list[Expr]:
+        """What belongs to rows, the first ones or all, in their scales."""
+        return [a * i for a, i in zip(x, self.inverse, strict=False)]
 
     def _regularised(self, rows: Sequence[Row], relative: Expr | float) -> tuple[SparseFactor, Expr]:
         """The factor of J J^T + relative max(diag) I, and what was added."""
@@ -144,7 +144,7 @@ class LoopBlocks(ABC):
     def residuals(self) -> list[Expr]:
         """The scaled holonomic rows (h,); all zero where rounding is all that is left of them."""
         graph = self.terms.graph
-        e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
+        e = self.scaled(self.terms.constraints)
         if self.gentle:
             e = [graph.apply("select", self._closed, graph.zero, x) for x in e]
         return e
@@ -169,7 +169,7 @@ class LoopBlocks(ABC):
         if self.gentle:
             return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
-            return self._regularised(self.J, TIKHONOV)[0], (self.solutions, self.solutions)
+            return self._regularised(self.J, TIKHONOV)[0], (2, 2)
         return factorize(gram(self.J)), (1, 1)
 
     def _step(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
@@ -224,20 +224,23 @@ class LoopBlocks(ABC):
         return self._moved([])
 
     def _moved(self, conditions: list[Expr]) -> list[Expr]:
-        v = [self.terms.graph.symbol(name) for name in self.terms.v]
-        rate = [x * i for x, i in zip(self.terms.constraint_rate, self.inverse, strict=True)]
-        return self._corrected(v, rate, conditions)
+        return self._corrected(self.terms.symbols(self.terms.v), self.scaled(self.terms.constraint_rate), conditions)
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
         """Projected velocities (n,), accelerations (n,), 1 if these are sound, 1 if no change point can be near; and
         checks of the inertia.
         """
-        v = [self.terms.graph.symbol(name) for name in self.terms.v]
         conditions: list[Expr] = []
         moved = self._moved(conditions)
-        a, checks = self._accelerate(dict(zip(v, moved, strict=True)), conditions)
+        a, checks = self._accelerate(dict(zip(self.terms.symbols(self.terms.v), moved, strict=True)), conditions)
         conditions.append(self.long_rows(self.lost))
         return [*moved, *a, self.all_of(conditions), self._far()], checks
+
+    @property
+    def operations(self) -> int:
+        """Of :meth:`dynamics`."""
+        outputs, checks = self.dynamics()
+        return count([*outputs, *checks]).total
 
     @abstractmethod
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -304,10 +307,7 @@ class LoopBlocks(ABC):
         """Whether a condition holds for as many rows as their rank."""
         if not self.redundant:
             return self.all_of(rows)
-        graph, held = self.terms.graph, self.terms.graph.zero
-        for row in rows:
-            held = held + row
-        return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
+        return self.terms.graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, total(rows))
 
 
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
@@ -355,7 +355,7 @@ class EmbeddedLoops(LoopBlocks):
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms, graph = self.terms, self.terms.graph
         here = substitute([*terms.bias, *terms.gamma], moved)
-        gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
+        gamma = self.scaled(here[terms.n_v :])
         if self.gentle:
             a = self._corrected([graph.zero] * terms.n_v, gamma, conditions, 2)
             B, _ = self._partition(None, conditions)
@@ -466,28 +466,30 @@ class BodyLoops(LoopBlocks):
     @cached_property
     def motion(self) -> TreeMotion | None:
         """The accelerations by articulated bodies, at the given velocities; None where some joint moves no mass."""
-        terms = self.terms
-        if terms.constrained is None:
+        if self.terms.constrained is None:
             return None
-        rows = [ConstraintRow(row, x * i) for row, x, i in zip(self.rows, terms.gamma, self.inverse, strict=True)]
-        solved = terms.constrained(rows, TIKHONOV if self.redundant else 0.0)
-        if any(d.is_zero for d in solved.pivots):
-            return None
-        self.multipliers = list(solved.multipliers)
-        for _ in range(self.solutions - 1 if self.redundant else 0):  # with what the term in G has left of the rows
-            left = times(self.rows, solved.accelerations)
-            again = [ConstraintRow(row.entries, row.rest + x) for row, x in zip(rows, left, strict=True)]
-            more = terms.constrained(again, TIKHONOV, loaded=False)
-            total = tuple(a + b for a, b in zip(solved.accelerations, more.accelerations, strict=True))
-            self.multipliers = [a + b for a, b in zip(self.multipliers, more.multipliers, strict=True)]
-            solved = solved._replace(accelerations=total)
-        return solved
+        solved, self.multipliers = self.move(self.scaled(self.terms.gamma))
+        return None if any(d.is_zero for d in solved.pivots) else solved
+
+    def move(self, rest: Sequence[Expr], forces: Sequence[Expr] | None = None) -> tuple[TreeMotion, list[Expr]]:
+        """The motion with C_q a + rest = 0 under the loads, or under these forces alone; and the multipliers."""
+        assert self.terms.constrained is not None
+        rows = [ConstraintRow(row, x) for row, x in zip(self.rows, rest, strict=True)]
+        solved = self.terms.constrained(rows, TIKHONOV if self.redundant else 0.0, loaded=forces is None, forces=forces)
+        if not self.redundant or any(d.is_zero for d in solved.pivots):
+            return solved, list(solved.multipliers)
+        left = times(self.rows, solved.accelerations)  # by the term in G
+        again = [ConstraintRow(row.entries, row.rest + x) for row, x in zip(rows, left, strict=True)]
+        more = self.terms.constrained(again, TIKHONOV, loaded=False)
+        total = tuple(a + b for a, b in zip(solved.accelerations, more.accelerations, strict=True))
+        multipliers = [a + b for a, b in zip(solved.multipliers, more.multipliers, strict=True)]
+        return solved._replace(accelerations=total), multipliers
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms, graph, solved = self.terms, self.terms.graph, self.motion
         assert solved is not None
         conditions.append(self.is_sound)
-        gamma = [x * i for x, i in zip(terms.gamma, self.inverse, strict=True)]
+        gamma = self.scaled(terms.gamma)
         pushed = [g * l for g, l in zip(solved.row_sizes, solved.multipliers, strict=True)]
         here = substitute([*solved.accelerations, *gamma, *pushed], moved)
         a, gamma, pushed = here[: terms.n_v], here[terms.n_v : -len(pushed)], here[-len(pushed) :]

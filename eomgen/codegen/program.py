@@ -194,6 +194,15 @@ class Program:
         return self.sizes.n_c > 0
 
     @property
+    def precompute(self) -> Block:
+        """What makes the hoisted values of the parameters."""
+        return Block("precompute", (Port("p", self.parameters),), self.hoisted, (len(self.hoisted),), public=False)
+
+    def made_before(self, block: Block) -> frozenset[int]:
+        """Ids of what a block does not evaluate."""
+        return frozenset() if block.name == "precompute" else self.parameter_only
+
+    @property
     def block_names(self) -> frozenset[str]:
         """Names of all blocks."""
         return frozenset(b.name for b in self.blocks)

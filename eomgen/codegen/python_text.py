@@ -144,7 +144,7 @@ def print_block(program: Program, block: Block, lists: bool = False) -> str:
     where there are checks the text calls ``checked(out, good)``.
     """
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    printer = _NumpyPrinter(program, references(program, block.inputs), traced=lists)
+    printer = _NumpyPrinter(program, references(program, block), traced=lists)
     start = [f"out = [0.0] * {block.n_out}" if lists else f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
     if not lists and program.time in symbols_of((*block.outputs, *block.checks)):
         start.append("t = np.asarray(t, dtype=float)[()]")  # never a Python float, whose division by zero raises

@@ -34,20 +34,24 @@ from ..mechanics.switched import SwitchedRow, switched_rows
 from ..mechanics.wrenches import JointWrenches, Row6, joint_reactions
 from ..model.mechanism import Mechanism
 from ..native.limits.systems import UNTOUCHED
-from .factor import factorize, solve
+from .factor import factorize
 from .laws import MANY, laws_in, pieces_of, solve_laws
 from .switched_constraints import AfterEvents, LinearValues, solve_rows
 
 
+def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) -> list[Expr]:
+    """l = -(C C^T)^-1 C (M a + h), the multipliers of independent rows C."""
+    gram = [[dot(one, other) for other in rows] for one in rows]
+    return factorize(gram, range(-1, len(rows) - 1)).solve([-dot(row, forces) for row in rows])
+
+
 def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
-    """What the named multipliers stand for: l = -(C_q C_q^T)^-1 C_q (M a + h), of independent constraints."""
+    """What the named multipliers of a model stand for."""
     given = kinematics.mechanism.given
     if given is None or not given.multipliers:
         return {}
-    graph, rows = kinematics.graph, kinematics.constraints.jacobian
-    gram = [[dot(one, other) for other in rows] for one in rows]
-    right = [-dot(row, equations.inverse_dynamics) for row in rows]
-    values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
+    graph = kinematics.graph
+    values = solve_multipliers(kinematics.constraints.jacobian, equations.inverse_dynamics)
     names = {f"constraint_{k + 1}": name for k, name in enumerate(given.multipliers)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
@@ -434,8 +438,8 @@ def _motion(
     right = [[-h for h in bias]]
     right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
     factor = factorize(mass_matrix, parent)
-    free = [solve(factor, column) for column in right]
-    moved = [solve(factor, row) for row in C]
+    free = [factor.solve(column) for column in right]
+    moved = [factor.solve(row) for row in C]
     schur = [[dot(row, y) for y in moved] for row in C]
     found = []
     for k, a in enumerate(free):

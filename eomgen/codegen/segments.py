@@ -16,9 +16,10 @@ from itertools import chain, groupby
 
 import numpy as np
 
-from ..expr.core import LEAVES, Expr, Graph, parts, reachable
+from ..expr.core import LEAVES, Graph, parts, reachable
 from ..expr.records import dataclass
 from .pair_sums import PairLists
+from .program import Block, Program
 from .statements import CIRCULAR
 
 #: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
@@ -209,25 +210,14 @@ class Segments:
         return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
 
 
-def find_segments(
-    graph: Graph,
-    outputs: Sequence[Expr],
-    checks: Sequence[Expr],
-    skipped: frozenset[int],
-    given: Mapping[int, Place],
-    longest: int,
-    searched: bool = True,
-) -> Segments:
-    """The segments of a block, of so many statements at most, and the kinds that they are of.
-
-    Operations ``skipped`` are not evaluated here, symbols and hoisted values are ``given`` at places; statements
-    between marks are ``searched`` for what repeats itself.
-    """
-    nodes = graph.nodes
+def find_segments(program: Program, block: Block, given: Mapping[int, Place]) -> Segments:
+    """The segments of a block and the kinds that they are of; symbols and hoisted values are ``given`` at places."""
+    graph, nodes, skipped = program.graph, program.graph.nodes, program.made_before(block)
+    longest = max(1, program.limits.statements // 2)
     places: dict[int, list[int]] = {}
-    for k, y in enumerate(outputs):
+    for k, y in enumerate(block.outputs):
         places.setdefault(y.id, []).append(k)
-    checked = frozenset(y.id for y in checks)
+    checked = frozenset(y.id for y in block.checks)
     every = reachable(graph, [*places, *checked], stop=skipped)
     statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
     kept = {*places, *checked}
@@ -252,7 +242,7 @@ def find_segments(
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
     segments = _merged(segments, _kept(reader, segments))
-    if searched:
+    if program.is_searched(block.name):
         segments = _repeated(reader, segments, _kept(reader, segments), 2 * longest)
         segments = _merged(segments, _kept(reader, segments))
     segments = _shortened(segments, _kept(reader, segments), longest)

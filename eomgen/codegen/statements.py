@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..base.operations import CONDITION, operations_with
 from ..expr.core import LEAVES, Expr, Graph
 from ..expr.records import dataclass
 from ..expr.schedule import chunk, order
-from .program import Program
+from .program import Block, Program
 
 #: Operations on pairs; both signs of a sum are one, since signs may differ.
 PAIRED = {"add": "+", "sub": "+", "mul": "*", "div": "/", "neg": "-", "sin": "sin", "cos": "cos"}
@@ -438,15 +438,15 @@ def conditions(graph: Graph, statements: Iterable[int], kept: Container[int], ch
     return frozenset(found)
 
 
-def references(program: Program, inputs: Sequence[str]) -> dict[int, str]:
+def references(program: Program, block: Block) -> dict[int, str]:
     """Node id -> text, for every leaf symbol and hoisted value a block can read."""
     graph = program.graph
     texts = {graph.symbol(program.time).id: "t"}
-    texts.update({graph.symbol(name).id: f"c[{k}]" for k, name in enumerate(program.parameters)})
-    texts.update({y.id: f"c[{len(program.parameters) + k}]" for k, y in enumerate(program.hoisted)})
-    texts.update({graph.symbol(name).id: f"u[{k}]" for k, name in enumerate(program.inputs)})
-    texts.update({graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(inputs)})
-    return texts
+    texts |= {graph.symbol(name).id: f"c[{k}]" for k, name in enumerate(program.parameters)}
+    if program.made_before(block):
+        texts |= {y.id: f"c[{len(program.parameters) + k}]" for k, y in enumerate(program.hoisted)}
+    texts |= {graph.symbol(name).id: f"u[{k}]" for k, name in enumerate(program.inputs)}
+    return texts | {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(block.inputs)}
 
 
 CIRCULAR = ("sin", "cos")
@@ -459,23 +459,29 @@ class Angles(NamedTuple):
     arguments: tuple[int, ...]  #: ids of the angles
 
 
-def gather_angles(graph: Graph, piece: PrintedFunction, pairs: Pairs | None = None) -> Angles:
-    """The angles of a piece that do not themselves depend on a sin or cos computed in it; first those of pairs."""
-    nodes = graph.nodes
-    inside = set(piece.statements)
+def gather_angles(
+    statements: Sequence[int], node: Callable[[int], Sequence[Any]], pairs: Pairs | None = None
+) -> Angles:
+    """The angles of statements that do not themselves depend on a sin or cos among these; first those of pairs.
+
+    ``node`` is the operation of a statement, with what it reads.
+    """
     late: set[int] = set()
     arguments: dict[int, None] = {}
-    for i in piece.statements:
-        node = nodes[i]
-        circular = node[0] in CIRCULAR
-        if circular and node[1] not in late:
-            arguments[node[1]] = None
-        if circular or not late.isdisjoint(node[1:]):
+    for i in statements:
+        operation, *operands = node(i)
+        circular = operation in CIRCULAR
+        if circular and operands[0] not in late:
+            arguments[operands[0]] = None
+        if circular or not late.isdisjoint(operands):
             late.add(i)
     if pairs is not None:
         arguments = _side_by_side(arguments, pairs)
-    first = _behind(graph, arguments, inside)
-    return Angles(tuple(i for i in piece.statements if i in first), tuple(arguments))
+    first = set(arguments)
+    for i in reversed(statements):
+        if i in first:
+            first.update(node(i)[1:])
+    return Angles(tuple(i for i in statements if i in first), tuple(arguments))
 
 
 def _side_by_side(arguments: dict[int, None], pairs: Pairs) -> dict[int, None]:
@@ -484,18 +490,6 @@ def _side_by_side(arguments: dict[int, None], pairs: Pairs) -> dict[int, None]:
         if len(operands) == 1 and arguments.keys() >= {operands[0][0], operands[0][1]}:
             found |= {operands[0][0]: None, operands[0][1]: None}
     return found | arguments
-
-
-def _behind(graph: Graph, roots: Collection[int], inside: set[int]) -> set[int]:
-    """The statements that roots are made of, themselves included."""
-    found: set[int] = set()
-    open_ends = [i for i in roots if i in inside]
-    while open_ends:
-        i = open_ends.pop()
-        if i not in found:
-            found.add(i)
-            open_ends.extend(k for k in graph.nodes[i][1:] if k in inside)
-    return found
 
 
 def print_angles(operands: Sequence[str]) -> list[str]:

@@ -14,6 +14,7 @@ from ..elements.frames import Frame, Marker
 from ..errors import UsageError
 from ..expr.core import Expr, reachable, substitute
 from ..expr.notation import rate_of
+from ..expr.tensors import combined, total
 from ..mechanics import Kinematics
 from ..mechanics.closing import shortest_gamma, shortest_rows
 from ..mechanics.constraint_functions import row_groups, row_scales
@@ -276,12 +277,8 @@ class SystemTerms:
     @cached_property
     def acceleration_residual(self) -> list[Expr]:
         """r2 = C_q a + gamma (m,)"""
-        a, r2 = self.symbols(self.a), []
-        for row, r in zip(self.constraint_jacobian, self.gamma, strict=True):
-            for c, x in zip(row, a, strict=True):
-                r = r + c * x
-            r2.append(r)
-        return r2
+        a = self.symbols(self.a)
+        return [combined(r, row, a) for row, r in zip(self.constraint_jacobian, self.gamma, strict=True)]
 
 
 def _constrained(
@@ -313,9 +310,9 @@ def flag_forces(kinematics: Kinematics) -> list[tuple[str, Expr]]:
     """Names of the elements whose loads need not be finite, and flags of (t, q, v, u): 1 where they are, else 0."""
     found = []
     for terms in kinematics.forces:
-        total = _size(terms)
-        if total is not None:
-            finite = total.graph.apply("lt", total, LARGEST)  # false for what is not a number
+        size = _size(terms)
+        if size is not None:
+            finite = size.graph.apply("lt", size, LARGEST)  # false for what is not a number
             found.append((terms.force.name, finite))
     return found
 
@@ -332,10 +329,7 @@ def _size(terms: ForceTerms) -> Expr | None:
     fragile = operations_with(lambda row: row.fragile)
     if not any(graph.nodes[i][0] in fragile for i in reachable(graph, [e.id for e in entries])):
         return None
-    total = graph.zero
-    for entry in entries:
-        total = total + graph.apply("abs", entry)
-    return total
+    return total(graph.apply("abs", entry) for entry in entries)
 
 
 def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import reduce
+from operator import add
 
 from . import vectors as vec
 from .core import Expr
@@ -26,27 +28,41 @@ def combined(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Exp
     return base
 
 
-def total(terms: Sequence[Expr]) -> Expr:
+def total(terms: Iterable[Expr]) -> Expr:
     """The sum of terms, of which there is one at least."""
-    found = terms[0]
-    for term in terms[1:]:
-        found = found + term
-    return found
+    return reduce(add, terms)
 
 
 def eliminate(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
     """x with A x = right, without exchange of rows: A is positive definite, or I less a contraction."""
-    A, x, n = [list(row) for row in matrix], list(right), len(right)
+    A, (x,) = reduced(matrix, [right])
+    return substituted_back(A, x)
+
+
+def reduced(
+    matrix: Sequence[Sequence[Expr]],
+    columns: Sequence[Sequence[Expr]],
+    before: Callable[[Matrix, Matrix, int], None] = lambda A, columns, k: None,
+) -> tuple[Matrix, Matrix]:
+    """A matrix with columns on its right, upper triangular; ``before`` may change both before it takes out k."""
+    A, found, n = [list(row) for row in matrix], [list(column) for column in columns], len(matrix)
     for k in range(n):
+        before(A, found, k)
         for i in range(k + 1, n):
             if A[i][k].is_zero:
                 continue
             ratio = A[i][k] / A[k][k]
             for j in range(k + 1, n):
                 A[i][j] = A[i][j] - ratio * A[k][j]
-            x[i] = x[i] - ratio * x[k]
-    for k in reversed(range(n)):
-        x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))]) / A[k][k]
+            for x in found:
+                x[i] = x[i] - ratio * x[k]
+    return A, found
+
+
+def substituted_back(A: Matrix, x: list[Expr]) -> list[Expr]:
+    """The solution for a column and an upper triangular matrix."""
+    for k in reversed(range(len(x))):
+        x[k] = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, len(x)))]) / A[k][k]
     return x
 
 

@@ -20,7 +20,7 @@ from ...toolchain.layer import read_layer, read_sources
 from ...toolchain.targets import DEVICE_KERNELS
 from ..c import count_constants, emit_c
 from ..c_functions import used_calls
-from ..c_text import print_precompute
+from ..c_text import print_block
 from ..files import example_state, render
 from ..package import carry, folders_of
 from ..pair_sums import refuse_sums
@@ -84,7 +84,7 @@ def describe_device(program: Program) -> dict[str, Any]:
     """What a program in Python has to know of the text: kernels with their arguments and shapes, lengths, methods."""
     return {
         "name": program.name,
-        "n_const": count_constants(program, print_precompute(program)) if program.hoisted else len(program.parameters),
+        "n_const": count_constants(program, print_block(program, program.precompute)),
         "kernels": {k.name: ([list(port) for port in _ports(k)], list(k.shape)) for k in _kernels(program)},
         "methods": list(METHODS) if _no_runs(program) == "" else [],
         "no_runs": _no_runs(program),

@@ -25,8 +25,6 @@ from ...base.picture_data import read_picture
 from ...elements.frames import GROUND
 from ...errors import EomgenError, ModelError, Problem, ToolchainError, bad_file, cannot, ill_typed
 from ...expr import vectors as vec
-from ...expr.core import Expr
-from ...expr.tensors import dot
 from ...expr.vectors import Vec3
 from ...mechanics import Kinematics
 from ...mechanics.methods import TreeEquations
@@ -49,9 +47,9 @@ from ...toolchain.compiler import run
 from ...toolchain.layer import read_layer
 from ..build import program_of
 from ..c import emit_c
-from ..factor import factorize, solve
 from ..files import own_file, read_template
 from ..program import Program
+from ..reactions import solve_multipliers
 from .fmu import refuse_impacts
 
 #: Functions that a page calls.
@@ -167,11 +165,7 @@ def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: Tr
     except EomgenError:
         return []
     rows = [constraints.jacobian[i] for i in mobility.independent_rows]
-    right = [-dot(row, tree.inverse_dynamics) for row in rows]
-    values: list[Expr] = []
-    if rows:
-        gram = [[dot(one, other) for other in rows] for one in rows]
-        values = solve(factorize(gram, range(-1, len(rows) - 1)), right)
+    values = solve_multipliers(rows, tree.inverse_dynamics)
     wrenches = JointWrenches(kinematics)
     labels = [constraints.labels[i] for i in mobility.independent_rows]
     every = joint_reactions(wrenches, dict(zip(labels, values, strict=True)))
