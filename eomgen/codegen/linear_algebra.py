@@ -161,14 +161,14 @@ def factorize(
     ``order`` of elimination it is one with little fill.
     """
     work = [dict(row) for row in matrix]
-    forward, order = order is None, minimum_degree(matrix)[0] if order is None else order
+    order, reverse = (minimum_degree(matrix)[0], False) if order is None else (order, True)
     columns: list[Row] = [{} for _ in work]
     pivots = [row[i] for i, row in enumerate(work)]
     reciprocals = list(pivots)
     for i in order:
         pivot = pivots[i] = work[i].pop(i)
         inverse = reciprocals[i] = 1.0 / pivot
-        below = sorted(work[i], reverse=not forward)
+        below = sorted(work[i], reverse=reverse)
         for k in below:
             columns[i][k] = work[i][k] * inverse
             del work[k][i]
