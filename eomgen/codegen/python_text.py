@@ -143,7 +143,8 @@ def print_block(program: Program, block: Block, lists: bool = False) -> str:
     ``lists``: on lists of numbers of any library that has ``np``, the last is ``block_<name>(t, x, u, c)`` -> list;
     where there are checks the text calls ``checked(out, good)``.
     """
-    pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
+    known = program.made_before(block)
+    pieces = cut(program.graph, block.outputs, block.checks, known, program.limits.statements)
     printer = _NumpyPrinter(program, references(program, block), traced=lists)
     start = [f"out = [0.0] * {block.n_out}" if lists else f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
     if not lists and program.time in symbols_of((*block.outputs, *block.checks)):
@@ -164,20 +165,6 @@ def print_table(function: Function, curve: str, surface: str) -> str:
     assert isinstance(table, Surface)
     nodes = table.nodes.reshape(-1, 4).tolist()
     return f"{head} = {surface}({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"
-
-
-def print_precompute(program: Program, lists: bool = False) -> str:
-    """``precompute(p)``: the constants c that the blocks read; ``constants(p)`` if these are ``lists``."""
-    graph, n = program.graph, len(program.hoisted)
-    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
-    printer = _NumpyPrinter(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
-    name, end, start = "constants", "return [*p, *out]", ["x = p", f"out = [0.0] * {n}"]
-    if not lists:
-        start = ["x = np.array(p, dtype=float)", f"result = np.concatenate([x, np.empty({n})])"]
-        name, end, start = "precompute", "return result", [*start, f"out = result[{len(program.parameters)}:]"]
-    start, doc = ["t = u = c = None", *start], "Constants c from the parameters p."
-    text = _print_pieces(printer, name, doc, pieces, start, [end], by_entry=lists)
-    return text.replace(f"def {name}(t, x, u, c):", f"def {name}(p):")
 
 
 def _print_pieces(

@@ -201,18 +201,19 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
 
 def open_functions(
     name: str, file: str, metadata: str, table: Mapping[str, Any], blocks: Mapping[str, tuple[Any, int, int]],
-    precompute: Callable[[Array], Array],
+    precompute: Callable[..., Array],
 ) -> Any:  # fmt: skip
     """The core of functions of NumPy arrays, of the module of this name and file; metadata is the text of model.json.
 
     The table holds name, sizes, kernels and equations, as ``eomgen._native.Functions`` takes them; blocks are
-    ``f(t, x, u, c) -> out`` with the lengths of x and out, and precompute is ``p -> c``.
+    ``f(t, x, u, c) -> out`` with the lengths of x and out, and precompute makes of the parameters what c has besides.
     """
 
     @wraps(precompute)
     def constants(p: Array) -> Array:
         try:
-            return quiet(precompute)(p)
+            x = np.array(p, dtype=float)
+            return np.concatenate([x, quiet(precompute)(0.0, x, None, None)])
         except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
             raise not_finite(f"the constants of the model cannot be computed; {TO_BE_FINITE}") from None
 

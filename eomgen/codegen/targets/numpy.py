@@ -17,7 +17,7 @@ from ..c_layout import describe_equations, work_areas
 from ..files import SourceSet, render
 from ..pair_sums import used_sums
 from ..program import Program
-from ..python_text import print_block, print_pair_sum, print_precompute, print_table
+from ..python_text import print_block, print_pair_sum, print_table
 
 #: Ports of directions along which blocks are derivatives.
 DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
@@ -74,8 +74,7 @@ def emit_numpy(program: Program) -> SourceSet:
         "imports": imports,
         "definitions": definitions,
         "functions": [
-            *(print_block(program, b) for b in program.blocks if b.name not in program.aliases),
-            print_precompute(program),
+            print_block(program, b) for b in (*program.blocks, program.precompute) if b.name not in program.aliases
         ],
         "blocks": [(b, sum(len(port.symbols) for port in b.ports if port.name in DIRECTIONS)) for b in program.blocks],
         "n_v": program.sizes.n_v,

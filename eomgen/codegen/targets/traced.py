@@ -24,7 +24,7 @@ from ..c_functions import used_calls
 from ..files import example_state, render
 from ..pair_sums import refuse_sums
 from ..program import Program
-from ..python_text import print_block, print_precompute, print_table
+from ..python_text import print_block, print_table
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
 LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}
@@ -103,9 +103,8 @@ def _context(program: Program, library: str) -> dict[str, Any]:
         "tables": [_source(f) for kind, used in TABLES.items() if kind in kinds for f in used],
         "definitions": [print_table(f, "curve", "surface") for f in functions],
         "functions": [
-            *(print_block(program, b, lists=True) for b in program.blocks if b.name not in aliases),
+            *(print_block(program, b, True) for b in (*program.blocks, program.precompute) if b.name not in aliases),
             *(f"block_{name} = block_{first}\n" for name, first in aliases.items()),
-            print_precompute(program, lists=True),
         ],
         "has_loops": has_loops,
         "n_h": sizes.n_h,
