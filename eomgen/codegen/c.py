@@ -193,25 +193,20 @@ def _printed_for_lanes(program: Program, printed: Mapping[str, Printed]) -> dict
 def _context(program: Program, printed: Mapping[str, Printed], work: int, apart: Collection[str]) -> dict[str, Any]:
     aliases, in_lanes = program.aliases, program.metadata["lanes"]
     areas, n_work = work_areas(program, work)
-    n_const = count_constants(program, printed.get("precompute"))
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
-    numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
-    numbers["closed_at"] = closed_at(program, areas)
+    numbers = {**sizes._asdict(), "n_const": count_constants(program, printed.get("precompute")), "n_work": n_work}
+    numbers |= {"n_step_work": n_work + 5 * sizes.n_x, "closed_at": closed_at(program, areas)}
     roots = [y for b in program.blocks for y in b.roots]
     straight = is_straight(program)
     stepping = (BY_SYSTEM[0], BY_MOTIONS[0]) if straight else ()  # parts of close_directly
     return {
         "name": program.name,
         "prefix": program.name.upper(),
-        "guard": f"EOMGEN_MODEL_{program.name.upper()}_H",
         "metadata": program.metadata,
         "sizes": sizes,
-        "numbers": [(key.upper(), value) for key, value in numbers.items()],
-        "n_const": n_const,
-        "n_work": n_work,
+        "numbers": {key.upper(): value for key, value in numbers.items()},
         "hoisted": len(program.hoisted),
-        "closed_at": numbers["closed_at"],
         "work_at": len(program.parameters) + len(program.hoisted),
         "helpers": used_helpers(program, roots),
         "declarations": [*declarations(program, used_calls(program)), *pair_declarations(program)],
@@ -220,8 +215,6 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "straight": straight,
         "shorter": BY_MOTIONS[0] in program.block_names,
         "starts": {name: start for name, start, _ in areas},
-        "n_states": program.n_states,
-        "quaternion_slots": program.quaternion_slots,
         "rates_are_velocities": not (program.quaternion_slots or program.general_rates or program.n_states),
         "has_loops": program.has_loops and program.projects,
         "held": contact_tables(program),
@@ -244,8 +237,6 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
             }
             for k in program.kernels
         ],
-        "lanes": in_lanes,
-        "series": program.metadata["series"],
         "layouts": describe_layouts(program),
         "metadata_literals": _literals(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }

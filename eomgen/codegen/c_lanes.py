@@ -94,7 +94,7 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
     for width, (tests, feature) in WIDTHS.items():
         shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": ensembles}
-        shown["series"] = ensembles and context["series"]
+        shown["series"] = ensembles and program.metadata["series"]
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
         if ensembles:
             fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": call}
