@@ -59,6 +59,7 @@ def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[
 
 
 Laws = Mapping[str, Sequence[Expr]]  #: the laws that depend on reactions, by force element
+PARTS = ("marker_loads", "coordinate_loads", "marker_remainder", "coordinate_remainder")  #: of the loads of a force
 PROBES = 3  #: states at which components are looked at
 _REMEDY = (
     "let the forces act in the plane of the loop, or give a joint of the loop more freedom (cylindrical, spherical); "
@@ -378,18 +379,17 @@ def _before_accelerations(mechanism: Mechanism) -> bool:
 
 
 def _loads(terms: ForceTerms) -> list[MarkerLoad | CoordinateLoad]:
-    return [*terms.marker_loads, *terms.coordinate_loads, *terms.marker_remainder, *terms.coordinate_remainder]
+    return [load for part in PARTS for load in getattr(terms, part)]
 
 
 def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematics:
     """Other parts of the entries of the loads."""
     flat = [e for terms in kinematics.forces for load in _loads(terms) for e in entries_of(load)]
     values = iter(substitute(flat, mapping) if mapping else flat)
-    parts = ("marker_loads", "coordinate_loads", "marker_remainder", "coordinate_remainder")  # as in _loads
     found = []
     for terms in kinematics.forces:
         new: dict[str, Any] = {
-            part: tuple(with_entries(load, values) for load in getattr(terms, part)) for part in parts
+            part: tuple(with_entries(load, values) for load in getattr(terms, part)) for part in PARTS
         }
         found.append(replace(terms, **new))
     return replace(kinematics, forces=tuple(found))

@@ -108,21 +108,16 @@ def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dic
 
 def _length(lengths: str, numbers: Mapping[str, str]) -> int:
     """Numbers in an array, each of its lengths of sums and products of names and whole numbers."""
-    return prod(_value(length, numbers) for length in re.findall(r"\[([^\]]+)\]", lengths))
+    return prod(_whole(length, numbers) for length in re.findall(r"\[([^\]]+)\]", lengths))
 
 
-def _value(text: str, numbers: Mapping[str, str]) -> int:
-    statement = ast.parse(text.strip()).body[0]
-    assert isinstance(statement, ast.Expr)
-    return _whole(statement.value, numbers)
-
-
-def _whole(node: ast.expr, numbers: Mapping[str, str]) -> int:
+def _whole(of: str | ast.expr, numbers: Mapping[str, str]) -> int:
     """The value of a sum or product of whole numbers and of names of such."""
+    node = ast.parse(of.strip(), mode="eval").body if isinstance(of, str) else of
     if isinstance(node, ast.BinOp):
         left, right = _whole(node.left, numbers), _whole(node.right, numbers)
         return left * right if isinstance(node.op, ast.Mult) else left + right
-    return _value(numbers[node.id], numbers) if isinstance(node, ast.Name) else int(ast.unparse(node))
+    return _whole(numbers[node.id], numbers) if isinstance(node, ast.Name) else int(ast.unparse(node))
 
 
 SINGLE_EPS = 2.0**-23  #: distance from 1 to the next number of single precision
