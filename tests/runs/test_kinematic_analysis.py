@@ -93,6 +93,15 @@ def test_twenty_turns_through_the_dead_centres(crank: eg.Module, offset: float) 
     assert np.minimum(np.abs(values - far), np.abs(values - near)).max() < 1e-6  # of cubics five degrees wide
 
 
+@pytest.mark.parametrize("rates", [[2.0, 1.0, 0.0, 0.0, -1.0, -2.0], [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]])
+def test_a_coordinate_turns_where_a_time_stands_twice(rates: list[float]) -> None:
+    m = eg.Model("turning")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    at = {"t": [0.0, 0.5, 1.0, 1.0, 1.5, 2.0], "s": [0.0, 0.5, 1.0, 1.0, 0.5, 0.0], "s_dot": rates}
+    found = m.compile(target="numpy").kinematic_analysis(**at)
+    assert found.turning_points("s") == [pytest.approx((1.0, 1.0), rel=1e-12)]
+
+
 def test_a_parallelogram_keeps_its_branch_through_its_change_points() -> None:
     """psi = theta, bend = -theta, the bar only translates: exact at the change points theta = k pi themselves too."""
     mod = parallelogram().compile(target="numpy")

@@ -18,7 +18,6 @@ from ...base.assembly import close
 from ...base.limits.constraints import CONTRADICTION, UNMOVED
 from ...base.limits.positions import SINGULAR, SLACK
 from ...base.scales import largest
-from ...base.splines import curve_coefficients
 from ...errors import (
     TO_BE_FINITE,
     AssemblyError,
@@ -134,11 +133,10 @@ class KinematicAnalysis(Trajectory):
         if len(self.t) < 2 or not np.diff(self.t).any():
             raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
         y, rate, found = self[name], self[name + "_dot"], []
-        with np.errstate(all="ignore"):
-            pieces = curve_coefficients(self.t, y, rate, False)[1:-1]
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):
-            h, d0, d1 = self.t[k + 1] - self.t[k], rate[k], rate[k + 1]
-            cubic = pieces[k] * (h**3, h**2, h, 1.0)
+            h = self.t[k + 1] - self.t[k]  # 0 where a time stands twice
+            d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
+            cubic = np.array([d0 + d1 - 2 * dy, 3 * dy - 2 * d0 - d1, d0, y[k]])
             roots = np.roots(np.polyder(cubic)) if cubic[:3].any() else np.zeros(1)
             inside = [
                 float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < SLACK and -SLACK <= r.real <= 1 + SLACK
@@ -146,7 +144,7 @@ class KinematicAnalysis(Trajectory):
             if inside:
                 x = min(inside, key=lambda r: abs(r - d0 / (d0 - d1)) if d0 != d1 else r)
                 found.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))
-        return found
+        return list(dict.fromkeys(found))
 
     def __repr__(self) -> str:
         over = (
