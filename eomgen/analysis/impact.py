@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.algebra import Array
 from ..base.limits.constraints import MEASURED
 from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
+from ..base.limits.runs import CROWDED
 from ..base.names import hint, joined
 from ..base.value_rules import read_count
 from ..errors import (
@@ -322,7 +323,8 @@ class ImpactRun(Trajectory):
 
 
 AT_REST = 0.1  #: part of the size at which gaps count as closed by which one that stays closed may fall
-IDLE = 50  #: events in a row without an impact
+IDLE = 50  #: closings of gaps in a row, each right after the one before, without an impact
+ENDLESS = 2**31 - 1  #: resets in a row for the loop, whose count is an int in C
 
 
 class GapEvents(Events):
@@ -356,10 +358,11 @@ class GapEvents(Events):
             self.functions.append(RunEvent(partial(self._value, i), name, 0, -1, WAIT))
             self.names.append(name)
         self._lift = np.zeros(len(gaps.names))
+        self._last, self._idle = np.nan, 0
 
     def begin(self, t: float, x: Array) -> Array:
         """The state (n_x,) at the start, after an impact of gaps that are closed there."""
-        values = self.gaps.values(t, x)
+        self._start, values = t, self.gaps.values(t, x)
         low = values < -np.maximum(self.limits, allowance(self.gaps.layout, self.gaps.names, BEYOND))
         for i in np.flatnonzero(low):
             raise off_range(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
@@ -375,7 +378,7 @@ class GapEvents(Events):
 
     def encode(self) -> dict[str, Any]:
         """As the loop takes them; impacts may follow each other as fast as they do."""
-        return {**(super().encode() or {}), "crowd": self.most + IDLE}
+        return {**(super().encode() or {}), "crowd": ENDLESS}
 
     def _value(self, i: int, t: float, x: Array) -> float:
         """A gap; all of them are asked for in turn."""
@@ -386,12 +389,17 @@ class GapEvents(Events):
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
         """The state after events at time t."""
-        own = [i for i in fired if i < self._first]
+        own, known = [i for i in fired if i < self._first], len(self.impacts)
         x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action != WAIT])
         closed = self.gaps.values(t, x) <= self.limits
         closed[[i - self._first for i in fired if i >= self._first]] = True
         x = self._impact_of(t, x, closed)  # before the model's own impact of the same gap, which then finds it opening
         x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
+        if len(own) < len(fired):
+            soon = t - self._last < CROWDED * (self.end - self._start) and len(self.impacts) == known
+            self._last, self._idle = t, self._idle + 1 if soon else 0
+            if self._idle > IDLE:
+                raise self.crowded(t, self._idle)
         if self.stays:
             self.arm(t, x)
         return x

@@ -252,6 +252,17 @@ def test_an_event_of_the_model_ends_a_run_with_impacts() -> None:
     refuses("EG-UNSUPPORTED often 2", lambda: m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5}))
 
 
+@pytest.mark.parametrize("most", [3, 2**31, 10**12])
+def test_resets_that_follow_each_other_at_once_are_no_impacts(most: int) -> None:
+    m = eg.Model("counter", gravity=(0, -10, 0))
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
+    m.state("n", "0")
+    m.event("tick", "t - 0.3 - (4e-8*n if n < 70 else 100)", direction=1, reset={"n": "n + 1"})
+    m.initial(h=1.0)
+    run = m.compile(target="numpy").simulate_impacts(60.0, {"h": 0.5}, most=most)
+    assert (run["n"][-1], run.ended) == (70.0, "impacts" if most == 3 else "rest")
+
+
 def held_rod() -> Any:
     """A rod that swings about a pin at its end, held there for a time, above a stop."""
     m = eg.Model("rod", gravity=(0, -9.81, 0))
