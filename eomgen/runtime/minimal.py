@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -86,11 +87,12 @@ class DependentMotion:
         rest = np.zeros(self.layout.n_states)  # states stand still
         return np.asarray(self.kernel(np.concatenate([y, rate, rest, np.zeros_like(rate), rest, guess]), t=t))
 
-    def _way(self, start: Array, y1: Array, t: float) -> Continuation:
-        """A continuation from a closed q in a direction of the independent coordinates; s is the scaled distance."""
+    def _way(self, start: Array, y1: Array, t: float) -> tuple[DependentMotion, Continuation]:
+        """The notes and the continuation from a closed q along independent coordinates; s is the scaled distance."""
         y, n_q = start[self.layout.independent_q], len(start)
-        self.drifts = bool(self._kinematics(t, y, np.zeros_like(y), start)[n_q : n_q + len(self.scales.q)].any())
-        return Continuation(StraightPath(self, t, y, 0.0, y1), start, fewest=1)
+        own = copy(self)  # notes of one path are neither another's nor another thread's
+        own.drifts = bool(self._kinematics(t, y, np.zeros_like(y), start)[n_q : n_q + len(self.scales.q)].any())
+        return own, Continuation(StraightPath(own, t, y, 0.0, y1), start, fewest=1)
 
     def follow(self, start: Array, target: Array, t: float) -> Array:
         """From a closed q along the straight line to independent values."""
@@ -100,11 +102,11 @@ class DependentMotion:
         length = float(np.abs((target - origin) / self.scales_i).max(initial=0.0))
         self._require_near(target, length)
         y1 = (target - origin) / (length or 1.0)
-        way = self._way(start, y1, t)
+        own, way = self._way(start, y1, t)
         self._go_on(way, target, length)
         found = way.reach(length)
         if found is None:
-            raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, self.failed))
+            raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, own.failed))
         return found.q
 
     def follow_all(self, start: Array, targets: Array) -> list[Array]:
@@ -123,7 +125,7 @@ class DependentMotion:
             chosen = np.flatnonzero((lengths >= 0.0) == (sense > 0.0))
             if not chosen.size:
                 continue
-            way = self._way(start, np.array([sense * unit]), 0.0)
+            _, way = self._way(start, np.array([sense * unit]), 0.0)
             farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
             while not way.blocked and way.points[-1].s <= farthest:
                 self._go_on(way, targets[:, chosen[0]], np.floor(way.points[-1].s) + 1.0)

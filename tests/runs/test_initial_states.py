@@ -122,6 +122,18 @@ def test_kinematics_is_pure_and_says_when_the_way_is_blocked(crank: eg.Module) -
     refuses("EG-PROJECTION s 0.7", lambda: model.compile(target="numpy").kinematics([0.7]))
 
 
+def test_a_leap_is_no_failure_of_an_earlier_path() -> None:
+    m = eg.Model("leap")
+    for axis in "xy":
+        m.prismatic(f"J{axis}", m.ground, m.body(axis + "_body", mass=1.0), axis=axis, coordinate=axis)
+    m.coupling("c", equation="y - (5 if x > 1 else 0) - sqrt(x + 2)")
+    m.independent = ["x"]
+    m.initial(x=0.0)
+    mod = m.compile(target="numpy")
+    refuses("EG-PROJECTION x = -2 finite", mod.kinematics, [-3.0])
+    refuses("EG-PROJECTION x = 1 another branch", mod.kinematics, [1.5])
+
+
 def test_the_minimal_form(crank: eg.Module) -> None:
     """It agrees with the tree's, follows far targets, and by the slider never crosses a dead centre silently."""
     x = crank.minimal.x0(theta=0.3, theta_dot=10.0)
