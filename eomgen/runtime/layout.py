@@ -135,7 +135,10 @@ class ModelInfo:
         names = type(self).__annotations__
         if odd := (names.keys() - vars(type(self)).keys() - entries.keys()) | (entries.keys() - names.keys()):
             raise bad_data(f"the model's metadata lacks entries, or has others: {', '.join(sorted(odd))}")
-        vars(self).update(entries)
+        vars(self).update({name: {} for name, value in vars(type(self)).items() if value == {}} | entries)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{name} of a model's metadata cannot be set: it is what model.json holds")
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> ModelInfo:
