@@ -37,6 +37,34 @@ from .scalars import (
     where_less,
 )
 
+__all__ = [
+    "PARAMETERS",
+    "angular_velocity",
+    "axis_angle_from_matrix",
+    "conjugate_quaternion",
+    "euler_angles_from_euler_parameters",
+    "euler_angles_from_matrix",
+    "euler_parameters_from_axis_angle",
+    "euler_parameters_from_euler_angles",
+    "euler_parameters_from_matrix",
+    "euler_parameters_from_modified_rodrigues",
+    "euler_parameters_from_rodrigues",
+    "euler_parameters_from_rotation_vector",
+    "matrix_from_axis_angle",
+    "matrix_from_euler_angles",
+    "matrix_from_euler_parameters",
+    "matrix_from_rotation_vector",
+    "modified_rodrigues_from_euler_parameters",
+    "multiply_quaternions",
+    "normalize_quaternion",
+    "rate_matrix",
+    "rodrigues_from_euler_parameters",
+    "rotation_vector_from_euler_parameters",
+    "rotation_vector_from_matrix",
+    "turn_vector",
+    "velocity_matrix",
+]
+
 SMALL = 1e-4  #: squares below which series replace quotients 0/0; the terms left out are below rounding
 
 
