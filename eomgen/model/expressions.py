@@ -143,7 +143,8 @@ def names_in(text: str) -> set[str]:
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         return set()
     called = {id(part.func) for part in parts if isinstance(part, ast.Call)}
-    return {part.id for part in parts if isinstance(part, ast.Name) and id(part) not in called} - {"pi"}
+    names = {part.id for part in parts if isinstance(part, ast.Name) and id(part) not in called and part.id.isascii()}
+    return names - {"pi"}
 
 
 @dataclass

@@ -197,6 +197,7 @@ def test_names_are_checked() -> None:
         ({"mass_matrix": [["a_dot", 0], [0, 1]]}, "EG-EXPRESSION mass_matrix: a_dot"),
         ({"forcing": ["a"]}, "EG-SHAPE forcing: 1 2"),
         ({"forcing": ["a_ddot", 0]}, "EG-REFERENCE forcing[0]: 'a_ddot'"),
+        ({"forcing": ["-θ*a", 0]}, "EG-EXPRESSION forcing[0]: column 2"),
         ({"velocities": ["u", "v", "w"]}, "EG-SHAPE rates: 3 2"),
         ({"velocities": ["u", "v"], "rates": {"a": "u", "b": "u*v"}}, "EG-EXPRESSION rates.b: linear"),
         ({"velocities": ["u", "v"], "rates": {"a": "u"}}, "EG-MISSING rates: 'b'"),
