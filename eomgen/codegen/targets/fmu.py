@@ -320,7 +320,7 @@ def model_context(program: Program, start: Sequence[float], token: str) -> dict[
             "N_DOF": len(free),
             "N_CONST": f"{prefix}_N_CONST",
             "N_WORK": f"{prefix}_N_WORK",
-            "N_VALUES": max(n_y + max(n_p + n_u, sizes.n_events), 3 * sizes.n_events),
+            "N_VALUES": max(n_p + n_u, n_y + sizes.n_events, 3 * sizes.n_events),
             "N_TRIAL": max(3 * len(free) + 2 * sizes.n_q + 2 * n_v, sizes.n_resets, n_x + n_v + width),
             "N_MATRIX": max(n_x * max(n_x, n_u, n_p), n_y * width),
         },

@@ -335,9 +335,10 @@ def at_next_samples(
             raise off_range(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
         if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
             found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
-            unit = np.eye(len(found))[place]
-            while found[place] >= 1.0 and _lateness(values, t, found - unit, event, place)[0] <= instant(t):
-                found[place] -= 1.0  # the period has been rounded
+            earlier = found.copy()
+            earlier[place] -= 1.0
+            while found[place] >= 1.0 and _lateness(values, t, earlier, event, place)[0] <= instant(t):
+                found[place], earlier[place] = earlier[place], earlier[place] - 1.0  # the period has been rounded
         while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
             found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
     return found
