@@ -49,7 +49,7 @@ class Entry:
         What is read of the model so far (:class:`~eomgen.model.values.Reader`).
     values : dict
         What the user gave, by key.
-    found : ElementType
+    element_type : ElementType
         Its type, and ``fields`` all keys of that.
     stand_in : Expr
         In place of an expression that is at fault.
@@ -59,7 +59,7 @@ class Entry:
         self.reader, self.name, self.path, self.values = reader, name, path, values
         self.graph: Graph = reader.graph
         self.stand_in: Expr = reader.stand_in
-        self.found, self.fields = ElementType("", "", {}), Fields()
+        self.element_type, self.fields = ElementType("", "", {}), Fields()
 
     # -- faults ---------------------------------------------------------------------------------------------------
     def _at(self, key: str) -> str:
@@ -142,7 +142,7 @@ class Entry:
 
     def states(self) -> tuple[Expr, ...]:
         """The symbols of its own first-order states, in the order in which its type names them."""
-        return tuple(self.graph.symbol(f"{self.name}_{suffix}") for suffix in self.found.states(self.values))
+        return tuple(self.graph.symbol(f"{self.name}_{suffix}") for suffix in self.element_type.states(self.values))
 
     def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
         """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""

@@ -96,8 +96,8 @@ class Joint(ABC):
     has_axes : whether ``axes=``, directions of x and y, is accepted instead
     options : further keys of this type: the fields that :func:`~eomgen.elements.element_type.key` marks
     coordinates : the coordinates, in order
-    held : axes of P along which the origin of S stays at that of P
-    kept : axes of S that stay parallel to those of P: '', 'z' or 'xyz'
+    fixed_axes : axes of P along which the origin of S stays at that of P
+    parallel_axes : axes of S that stay parallel to those of P: '', 'z' or 'xyz'
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
@@ -116,8 +116,8 @@ class Joint(ABC):
     counts_turns: ClassVar[bool] = False
     options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
-    held = ""
-    kept = ""
+    fixed_axes = ""
+    parallel_axes = ""
     quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
     look: ClassVar[JointLook] = JointLook()
 
@@ -151,9 +151,9 @@ class Joint(ABC):
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         """Equations that hold the relative pose to what the joint allows, when a loop is closed by it."""
-        rows = [Closure(f"r_{axis}", position[AXES[axis]], "length") for axis in self.held]
+        rows = [Closure(f"r_{axis}", position[AXES[axis]], "length") for axis in self.fixed_axes]
         turns = (("z.x", rotation[0][2]), ("z.y", rotation[1][2]), ("x.y", rotation[1][0]))
-        return rows + [Closure(*turn, "angle") for turn in turns[: {"": 0, "z": 2, "xyz": 3}[self.kept]]]
+        return rows + [Closure(*turn, "angle") for turn in turns[: {"": 0, "z": 2, "xyz": 3}[self.parallel_axes]]]
 
     @abstractmethod
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
@@ -165,7 +165,7 @@ class Joint(ABC):
 
     def aligned(self, rotation: Mat3) -> list[Expr]:
         """Expressions that must be positive: the closure equations alone also admit anti-parallel axes."""
-        return [rotation[axis][axis] for axis in {"": (), "z": (2,), "xyz": (0, 2)}[self.kept]]
+        return [rotation[axis][axis] for axis in {"": (), "z": (2,), "xyz": (0, 2)}[self.parallel_axes]]
 
 
 # -- rotation coordinates ----------------------------------------------------------------------------------------------
@@ -258,20 +258,20 @@ class AxisJoint(Joint):
     """
 
     def _free(self, three: Sequence[Vec3] | Vec3) -> list[Any]:
-        return [one for axis, one in zip("xyz", three, strict=True) if axis not in self.held]
+        return [one for axis, one in zip("xyz", three, strict=True) if axis not in self.fixed_axes]
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
         lengths = iter(q)
-        x, y, z = (graph.zero if axis in self.held else next(lengths) for axis in "xyz")
-        return about(graph, 2, q[-1]) if self.kept == "z" else vec.identity(graph), (x, y, z)
+        x, y, z = (graph.zero if axis in self.fixed_axes else next(lengths) for axis in "xyz")
+        return about(graph, 2, q[-1]) if self.parallel_axes == "z" else vec.identity(graph), (x, y, z)
 
     def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
         o = vec.zero(graph)
         columns = [(o, row) for row in self._free(self.pose(graph, q)[0])]  # R^T e_k is row k of R
-        return columns + [(unit(graph, 2), o)] * (self.kept == "z")
+        return columns + [(unit(graph, 2), o)] * (self.parallel_axes == "z")
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return self._free(position) + ([atan2(rotation[1][0], rotation[0][0])] if self.kept == "z" else [])
+        return self._free(position) + ([atan2(rotation[1][0], rotation[0][0])] if self.parallel_axes == "z" else [])
 
 
 # -- one degree of freedom ---------------------------------------------------------------------------------------------
@@ -286,8 +286,8 @@ class Revolute(AxisJoint):
     type_name = "revolute"
     look = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates = (Coordinate("", "angle"),)
-    held = "xyz"
-    kept = "z"
+    fixed_axes = "xyz"
+    parallel_axes = "z"
 
 
 @dataclass(frozen=True)
@@ -306,8 +306,8 @@ class Prismatic(AxisJoint):
     type_name = "prismatic"
     look = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
     coordinates = (Coordinate("", "length"),)
-    held = "xy"
-    kept = "xyz"
+    fixed_axes = "xy"
+    parallel_axes = "xyz"
 
 
 @dataclass(frozen=True)
@@ -323,8 +323,8 @@ class Screw(AxisJoint):
     look = JointLook((SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True)
     counts_turns = True
     coordinates = (Coordinate("", "angle"),)
-    held = "xy"
-    kept = "z"
+    fixed_axes = "xy"
+    parallel_axes = "z"
     pitch: Expr = key(
         Scalar(
             "advance of S per turn (m), negative for a left-handed thread",
@@ -372,8 +372,8 @@ class Cylindrical(AxisJoint):
     type_name = "cylindrical"
     look = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
     coordinates = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
-    held = "xy"
-    kept = "z"
+    fixed_axes = "xy"
+    parallel_axes = "z"
 
 
 @dataclass(frozen=True)
@@ -385,8 +385,8 @@ class Planar(AxisJoint):
     type_name = "planar"
     look = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
     coordinates = (Coordinate("_x", "length"), Coordinate("_y", "length"), Coordinate("_3", "angle"))
-    held = "z"
-    kept = "z"
+    fixed_axes = "z"
+    parallel_axes = "z"
 
 
 @dataclass(frozen=True)
@@ -399,7 +399,7 @@ class Translational(AxisJoint):
     look = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
     has_axis = False
     coordinates = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
-    kept = "xyz"
+    parallel_axes = "xyz"
 
 
 @dataclass(frozen=True)
@@ -411,8 +411,8 @@ class Weld(AxisJoint):
     type_name = "weld"
     look = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
     has_axis = False
-    held = "xyz"
-    kept = "xyz"
+    fixed_axes = "xyz"
+    parallel_axes = "xyz"
 
 
 # -- two angles between shafts -----------------------------------------------------------------------------------------
@@ -433,7 +433,7 @@ class Universal(Joint):
     type_name = "universal"
     look = JointLook((SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y")))
     coordinates = TWO_ANGLES
-    held = "xyz"
+    fixed_axes = "xyz"
     has_axes = True
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -464,7 +464,7 @@ class ConstantVelocity(Joint):
     type_name = "constant_velocity"
     look = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
     coordinates = TWO_ANGLES
-    held = "xyz"
+    fixed_axes = "xyz"
 
     def _angles(self, q: Sequence[Expr]) -> tuple[Expr, Expr, Expr]:
         return 0.5 * q[0], q[1], 0.5 * q[0]
@@ -559,7 +559,7 @@ class Spherical(RotatingJoint):
     type_name = "spherical"
     look = JointLook((SymbolPart("sphere", (1.0,)),))
     coordinates = ANGLES
-    held = "xyz"
+    fixed_axes = "xyz"
 
 
 @dataclass(frozen=True)
@@ -784,7 +784,7 @@ class RevoluteSpherical(RodJoint):
     type_name = "revolute_spherical"
     look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
     removes = 2
-    held = "z"
+    fixed_axes = "z"
     length: Expr = key(ROD_LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
@@ -800,7 +800,7 @@ class Inline(RodJoint):
     type_name = "inline"
     look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes = 2
-    held = "xy"
+    fixed_axes = "xy"
 
 
 @dataclass(frozen=True)
@@ -812,7 +812,7 @@ class Inplane(RodJoint):
     type_name = "inplane"
     look = JointLook((SymbolPart("sphere", (0.8,)),))
     removes = 1
-    held = "z"
+    fixed_axes = "z"
 
 
 @dataclass(frozen=True)
@@ -823,7 +823,7 @@ class Parallel(RodJoint):
     formula = r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
     type_name = "parallel"
     removes = 2
-    kept = "z"
+    parallel_axes = "z"
 
 
 @dataclass(frozen=True)
@@ -848,7 +848,7 @@ class Orientation(RodJoint):
     type_name = "orientation"
     has_axis = False
     removes = 3
-    kept = "xyz"
+    parallel_axes = "xyz"
 
 
 #: By their words, in the order of this file.

@@ -345,7 +345,7 @@ def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     found = types[given]
     if _misunderstood(e, found):
         return None
-    e.found, e.fields = found, found.fields(what, types)
+    e.element_type, e.fields = found, found.fields(what, types)
     if isinstance(found.keys.get("law"), Law) and not e.values.keys() & _keys_of_law(found):
         e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has", "EG-MISSING")
         return None

@@ -246,9 +246,9 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         ends = sorted((0.5 * value, 2.0 * value)) if value else [-1.0, 1.0]
         ranges[name] = [float(np.clip(end, low, high)) for end in ends]
     weight = float(9.81 * read_picture(module.metadata, module.p).mass.sum()) or 10.0
-    usual = {"N": weight, "N*m": weight * size, "m": 0.5 * size, "rad": np.pi, "m/s": size, "Pa": 1e7}
+    default_range = {"N": weight, "N*m": weight * size, "m": 0.5 * size, "rad": np.pi, "m/s": size, "Pa": 1e7}
     for name, value in inputs.items():  # of 0: what such a mechanism notices, of one digit
-        most = 10.0 * abs(value) or float(f"{usual.get(layout.unit(name), 10.0):.0e}")
+        most = 10.0 * abs(value) or float(f"{default_range.get(layout.unit(name), 10.0):.0e}")
         ranges[name] = [-most, most]
     for k in places:
         limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
