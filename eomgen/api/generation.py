@@ -14,7 +14,7 @@ from ..errors import EomgenError, cannot
 from ..pipeline import build, compile_core, derive_as, with_start
 from ..runtime.bound_model import BoundModel
 from ..toolchain.targets import find_function, find_target
-from ..verify.cases import RECORDED, record_calls
+from ..verify.random_states import RECORDED, record_calls
 from .equations import Equations
 
 if TYPE_CHECKING:

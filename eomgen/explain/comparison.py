@@ -17,8 +17,8 @@ from ..errors import EomgenError
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate as of_graph
 from ..expr.identity import with_bounds
-from ..verify.cases import Case, called, random_cases
 from ..verify.finding import Comparison
+from ..verify.random_states import SystemState, called, random_states
 from .author import Author
 
 # -- formulas at numbers -----------------------------------------------------------------------------------------------
@@ -61,7 +61,7 @@ def value_of(expression: Any, known: dict[Any, Any]) -> Any:
     return value
 
 
-def state_values(module: Any, case: Case) -> dict[str, float]:
+def state_values(module: Any, case: SystemState) -> dict[str, float]:
     """Numbers of all symbols at a state: coordinates, velocities, accelerations, parameters, inputs, time."""
     rates = called(module, "rhs", case)[module.n_q :]
     names = (*module.x_names, *map(acceleration_name, module.layout.v), *module.p_names, *module.u_names, "t")
@@ -95,7 +95,7 @@ def moving_state(module: Any, velocities: Sequence[str]) -> tuple[np.ndarray, bo
 
 def state_numbers(module: Any, x: np.ndarray) -> dict[str, float]:
     """Numbers of all symbols at a state, in which 0 stands for what rounding left of it."""
-    case = Case(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
+    case = SystemState(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
     values, layout = state_values(module, case), module.layout
     places = np.ones(module.n_q) if layout.info.quaternion_slots else layout.place_scales.q[: module.n_q]
     known = [(module.x_names[: module.n_q], places, 1.0)]
@@ -160,7 +160,7 @@ def compare(author: Author, module: Any) -> Difference:
     each = {row.name for row in equations.rows() if row.by_name}
     others = sorted((key for key in shown if key[0] not in COMPARED), key=str)
     moves = bool(equations.mobility.n_dof)
-    for case in random_cases(module, STATES, at_values=True):
+    for case in random_states(module, STATES, at_values=True):
         values = state_values(module, case)
         wanted = Wanted(module, case)
         for name, part in sorted(shown, key=str):
@@ -183,7 +183,7 @@ class Wanted(NamedTuple):
     """What a module gives at a state, as numbers of a size: (flat array, size of the terms that it is a sum of)."""
 
     module: Any
-    case: Case
+    case: SystemState
 
     def of(self, name: str) -> Any:
         """The result of a call."""

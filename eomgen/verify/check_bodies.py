@@ -19,7 +19,7 @@ from ..expr.core import Expr, substitute, symbols_of
 from ..mechanics import Kinematics
 from ..model.mechanism import JointSpec
 from . import bodies
-from .bench import Bench, numbers
+from .checked import CheckedModel, numbers
 from .digits import FOLDED, UNIT, Number
 from .finding import Comparison, Finding, pairs, size_of
 from .truth import Truth
@@ -30,25 +30,25 @@ from .truth import Truth
 PARTS = ("x", "y", "z", *["rotation"] * 9)  #: of a relative pose
 
 
-def check_joints(bench: Bench) -> list[Finding]:
+def check_joints(model: CheckedModel) -> list[Finding]:
     """Rotations, placements at the joints, relative velocities."""
-    return [_rigid(bench), _joints(bench), _freedoms(bench)]
+    return [_rigid(model), _joints(model), _freedoms(model)]
 
 
-def _rigid(bench: Bench) -> Finding:
+def _rigid(model: CheckedModel) -> Finding:
     """R^T R = 1 and det R = 1 for every body."""
     check = "poses: rotation matrices are orthonormal"
-    if not bench.layout.n_bodies:
+    if not model.layout.n_bodies:
         return Finding.skipped(check, "there are no bodies")
     found = Comparison(check)
-    bounds = bench.bounds("poses", lambda: bench.terms.poses)[1]
-    for k, case in enumerate(bench.cases):
-        poses = bench.call("poses", case)
+    bounds = model.bounds("poses", lambda: model.terms.poses)[1]
+    for k, case in enumerate(model.states):
+        poses = model.call("poses", case)
         error = 8.0 * bounds[:, k].reshape(-1, 4, 4)[:, :3, :3].max(axis=(1, 2)) + 8.0 * UNIT
         R = poses[:, :3, :3]
         gap = np.abs(np.einsum("bij,bik->bjk", R, R) - np.eye(3)).max(axis=(1, 2))
         gap = np.maximum(gap, np.abs(np.linalg.det(R) - 1.0))
-        found.add(k, gap, error, 1.0, bench.layout.bodies)
+        found.add(k, gap, error, 1.0, model.layout.bodies)
     return found.finding()
 
 
@@ -67,27 +67,27 @@ def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
     )
 
 
-def _joints(bench: Bench) -> Finding:
+def _joints(model: CheckedModel) -> Finding:
     """At every joint the successor stands, seen from the predecessor, where the joint's coordinates say.
 
     Joints of the tree and cut ones alike, which tells whether loops have all the equations they need; joints without
     coordinates by their own equations.
     """
     check = "joints: poses match their coordinates"
-    if not bench.mechanism.joints:
+    if not model.mechanism.joints:
         return Finding.skipped(check, "there are no joints")
-    found, graph = Comparison(check), bench.kinematics.graph
-    cut = bench.kinematics.loop_coordinates
-    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    found, graph = Comparison(check), model.kinematics.graph
+    cut = model.kinematics.loop_coordinates
+    limits = model.bounds("poses", lambda: model.terms.poses)[1]
     held = (
-        bench.bounds("constraints", lambda: bench.terms.constraints)[1]
-        if bench.terms.constraints
-        else np.zeros((0, len(bench.cases)))
+        model.bounds("constraints", lambda: model.terms.constraints)[1]
+        if model.terms.constraints
+        else np.zeros((0, len(model.states)))
     )
-    for k, truth in enumerate(bench.truths):
+    for k, truth in enumerate(model.truths):
         measured = dict(zip(cut.names, truth.measured(truth.values), strict=True)) if cut.names else {}
         gaps, labels = [], []
-        for spec in bench.mechanism.joints:
+        for spec in model.mechanism.joints:
             if not spec.joint.coordinates and spec.joint.role == "loop":
                 continue
             outer = placed(truth, spec.predecessor, f"{spec.name} P")
@@ -108,9 +108,9 @@ def _joints(bench: Bench) -> Finding:
                 flat = [*plain.position, *(x for row in plain.rotation for x in row)]
                 gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
                 labels += [f"{spec.name} {what}" for what in PARTS]
-        C = bench.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
+        C = model.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
-        length = max(1.0, bench.layout.length)
+        length = max(1.0, model.layout.length)
         rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
             np.abs(C).max(initial=0.0)
         )
@@ -131,20 +131,20 @@ def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
     return bodies.Pose([[c, -s, o], [s, c, o], [o, o, one]], [o, o, o])
 
 
-def _freedoms(bench: Bench) -> Finding:
+def _freedoms(model: CheckedModel) -> Finding:
     """In a unit of one velocity, and q' = N v, the successor moves by the joint's column of it, all else at rest.
 
     An angular velocity of a joint in Euler parameters is the relative one, in the successor's axes.
     """
     check = "joints: relative velocities"
-    if not bench.mechanism.joints or bench.mechanism.bare:
+    if not model.mechanism.joints or model.mechanism.bare:
         return Finding.skipped(check, "there are no joints")
-    found, graph = Comparison(check), bench.kinematics.graph
-    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
-    names = bench.layout.v
-    for k, truth in enumerate(bench.truths):
+    found, graph = Comparison(check), model.kinematics.graph
+    limits = model.bounds("poses", lambda: model.terms.poses)[1]
+    names = model.layout.v
+    for k, truth in enumerate(model.truths):
         gaps, labels = [], []
-        for spec in (bench.mechanism.joints[b.joint] for b in bench.kinematics.topology.branches):
+        for spec in (model.mechanism.joints[b.joint] for b in model.kinematics.topology.branches):
             columns = spec.joint.subspace(graph, [graph.symbol(name) for name in spec.coordinates])
             inner = placed(truth, spec.successor, f"{spec.name} S")
             for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
@@ -153,7 +153,7 @@ def _freedoms(bench: Bench) -> Finding:
                 own = _relative(truth, spec, names.index(name), inner)
                 gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
                 labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
-        limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, bench.layout.length)
+        limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, model.layout.length)
         found.add(k, gaps, limit, 1.0, labels)
     return found.finding()
 
@@ -177,18 +177,18 @@ def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodi
 # what the force elements exert.
 
 
-def check_bodies(bench: Bench) -> list[Finding]:
+def check_bodies(model: CheckedModel) -> list[Finding]:
     """Equations of the tree, accelerations, energies, momenta and power."""
-    found = [_tree(bench, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
-    found += [_accelerations(bench), _energy(bench), _momentum(bench), _power(bench)]
+    found = [_tree(model, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
+    found += [_accelerations(model), _energy(model), _momentum(model), _power(model)]
     return found
 
 
-def source(bench: Bench) -> str:
+def source(model: CheckedModel) -> str:
     """What the equations are judged by."""
-    if bench.mechanism.lagrangian is not None:
+    if model.mechanism.lagrangian is not None:
         return "Lagrange's equations by differences of L"
-    return "equations as they were given" if bench.mechanism.given is not None else "free bodies"
+    return "equations as they were given" if model.mechanism.given is not None else "free bodies"
 
 
 def _inertia_sizes(truth: Truth) -> Array:
@@ -209,21 +209,21 @@ def _inertia_sizes(truth: Truth) -> Array:
     return sizes
 
 
-def _tree(bench: Bench, name: str) -> Finding:
-    found, layout = Comparison(f"{name}: {source(bench)}"), bench.layout
+def _tree(model: CheckedModel, name: str) -> Finding:
+    found, layout = Comparison(f"{name}: {source(model)}"), model.layout
     labels = pairs(layout.v, layout.v) if name == "mass_matrix" else list(layout.v)
-    for k, truth in enumerate(bench.truths):
-        actual = bench.call(name, truth.case).ravel()
+    for k, truth in enumerate(model.truths):
+        actual = model.call(name, truth.case).ravel()
         if name == "mass_matrix":
             expected = numbers([x for row in truth.mass_matrix for x in row])
         elif name == "bias":
             expected = numbers(truth.bias)
         else:
             expected = numbers(truth.inverse_dynamics([truth.mp.mpf(float(x)) for x in truth.case.a]))
-        if name in bench.graph_kernels:
-            bound = bench.bounds(name, bench.graph_kernels[name])[1][:, k]
+        if name in model.graph_kernels:
+            bound = model.bounds(name, model.graph_kernels[name])[1][:, k]
         else:
-            bound = layout.n_v * bench.bounds("inverse_dynamics", lambda: bench.terms.inverse_dynamics)[1][:, k].max()
+            bound = layout.n_v * model.bounds("inverse_dynamics", lambda: model.terms.inverse_dynamics)[1][:, k].max()
         size = size_of(expected)
         if name == "bias":
             size = max(size, size_of(_inertia_sizes(truth)))
@@ -235,7 +235,7 @@ def _tree(bench: Bench, name: str) -> Finding:
     return found.finding()
 
 
-def true_accelerations(bench: Bench, k: int) -> tuple[Array, Array, float]:
+def true_accelerations(model: CheckedModel, k: int) -> tuple[Array, Array, float]:
     """v' at a state in many digits, of M a + h + C_q^T l = 0 and C_q a + gamma = 0; what rounding allows, and the size.
 
     Raises
@@ -243,22 +243,22 @@ def true_accelerations(bench: Bench, k: int) -> tuple[Array, Array, float]:
     ZeroDivisionError
         The system is singular.
     """
-    truth = bench.truths[k]
-    a, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    truth = model.truths[k]
+    a, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
     mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
     own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
-    limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
+    limit = model.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
     return a, limit, max(size_of(a), size_of(own))
 
 
-def _accelerations(bench: Bench) -> Finding:
-    found, n_q = Comparison(f"accelerations: {source(bench)}"), bench.module.n_q
-    for k, truth in enumerate(bench.truths):
+def _accelerations(model: CheckedModel) -> Finding:
+    found, n_q = Comparison(f"accelerations: {source(model)}"), model.module.n_q
+    for k, truth in enumerate(model.truths):
         try:
-            a, limit, size = true_accelerations(bench, k)
+            a, limit, size = true_accelerations(model, k)
         except ZeroDivisionError:
             return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
-        found.add(k, bench.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in bench.layout.v])
+        found.add(k, model.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in model.layout.v])
     return found.finding()
 
 
@@ -283,30 +283,30 @@ def potential(truth: Truth, poses: list[bodies.Pose], values: dict[str, Number])
     return total + sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)
 
 
-def _energy(bench: Bench) -> Finding:
+def _energy(model: CheckedModel) -> Finding:
     check = "energy: of the bodies"
-    if bench.mechanism.bare or "energy" not in bench.graph_kernels:
+    if model.mechanism.bare or "energy" not in model.graph_kernels:
         return Finding.skipped(check, "there are no bodies; T and V are those of the given equations")
     found = Comparison(check)
-    bounds = bench.bounds("energy", bench.graph_kernels["energy"])[1]
-    for k, truth in enumerate(bench.truths):
+    bounds = model.bounds("energy", model.graph_kernels["energy"])[1]
+    for k, truth in enumerate(model.truths):
         expected = numbers([kinetic(truth), potential(truth, truth.here, truth.values)])
-        actual = bench.call("energy", truth.case)
+        actual = model.call("energy", truth.case)
         limit = bounds[:, k] + UNIT * np.abs(expected) + FOLDED * size_of(expected)
-        found.add(k, actual - expected, limit, size_of(expected), bench.labels("energy"))
+        found.add(k, actual - expected, limit, size_of(expected), model.labels("energy"))
     return found.finding()
 
 
-def _momentum(bench: Bench) -> Finding:
+def _momentum(model: CheckedModel) -> Finding:
     """Linear and angular momentum, and that external forces are what changes them."""
     check = "momentum: of the bodies"
-    if "centroidal" not in bench.graph_kernels:
+    if "centroidal" not in model.graph_kernels:
         return Finding.skipped(check, "no body has a mass")
-    found, n = Comparison(check), 3 + 3 * bench.layout.n_v
-    bounds = bench.bounds("centroidal", bench.graph_kernels["centroidal"])[1]
-    for k, truth in enumerate(bench.truths):
+    found, n = Comparison(check), 3 + 3 * model.layout.n_v
+    bounds = model.bounds("centroidal", model.graph_kernels["centroidal"])[1]
+    for k, truth in enumerate(model.truths):
         expected = numbers([*_centre(truth), *_momenta(truth)])
-        every = bench.call("centroidal", truth.case)
+        every = model.call("centroidal", truth.case)
         actual, limit = (np.concatenate([y[:3], y[n : n + 6]]) for y in (every, bounds[:, k]))
         labels = [f"{what} {axis}" for what in ("centre", "linear", "angular") for axis in "xyz"]
         size = size_of(expected)
@@ -332,24 +332,24 @@ def _momenta(truth: Truth) -> list[Number]:
     return [*linear, *angular]
 
 
-def _power(bench: Bench) -> Finding:
+def _power(model: CheckedModel) -> Finding:
     """dE/dt along the motion, time and inputs held, against the power of forces without a potential and of drivers.
 
     E is the sum that the module reports, differentiated along x' = rhs in many digits.  The reactions of rows
     C' = C_q v + C_t do the power l . C_t.
     """
     check = "power: rate of energy, forces and drivers"
-    if bench.mechanism.bare or "energy" not in bench.graph_kernels:
+    if model.mechanism.bare or "energy" not in model.graph_kernels:
         return Finding.skipped(check, "there are no bodies, so it is not known which forces have a potential")
-    found, layout = Comparison(check), bench.layout
-    for k, truth in enumerate(bench.truths):
-        a = bench.rhs(truth.case)[bench.module.n_q :]
+    found, layout = Comparison(check), model.layout
+    for k, truth in enumerate(model.truths):
+        a = model.rhs(truth.case)[model.module.n_q :]
         try:
             exact, multipliers = truth.solve(list(layout.rows))
         except ZeroDivisionError:
             return Finding.skipped(check, "the system of accelerations and multipliers is singular")
-        rate = _energy_rate(bench, truth, a)
-        v = [truth.values[name] for name in bench.terms.v]
+        rate = _energy_rate(model, truth, a)
+        v = [truth.values[name] for name in model.terms.v]
         parts = [f * x for f, x in zip(truth.applied(remainder=True), v, strict=True)]
         C, rows = truth.constraint_jacobian, truth.velocity_rows
         for row, l in zip(layout.rows, multipliers, strict=True):
@@ -358,7 +358,7 @@ def _power(bench: Bench) -> Finding:
         momentum = np.abs(
             numbers([sum((m * x for m, x in zip(row, v, strict=True)), truth.zero) for row in truth.mass_matrix])
         )
-        slack = bench.acceleration_limit(k, numbers(exact), numbers(multipliers))
+        slack = model.acceleration_limit(k, numbers(exact), numbers(multipliers))
         gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
         limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
         size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), TINY)
@@ -366,11 +366,11 @@ def _power(bench: Bench) -> Finding:
     return found.finding()
 
 
-def _energy_rate(bench: Bench, truth: Truth, a: Array) -> Number:
+def _energy_rate(model: CheckedModel, truth: Truth, a: Array) -> Number:
     """d(T + V)/dt along q' = N v, v' = a at a held time."""
-    energies, many = bench.graph_kernels["energy"], [truth.mp.mpf(float(x)) for x in a]
+    energies, many = model.graph_kernels["energy"], [truth.mp.mpf(float(x)) for x in a]
     return truth.slope(
-        lambda values: [sum(bench.system.evaluate("kernel energy", energies, values), truth.zero)],
+        lambda values: [sum(model.system.evaluate("kernel energy", energies, values), truth.zero)],
         lambda s: truth.later(s, many, frozen=True),
     )[0]
 
@@ -384,62 +384,62 @@ def _energy_rate(bench: Bench, truth: Truth, a: Array) -> Number:
 TURNING = (Revolute, Continuous)
 
 
-def check_reactions(bench: Bench) -> list[Finding]:
+def check_reactions(model: CheckedModel) -> list[Finding]:
     """One finding."""
-    return [_reactions(bench)]
+    return [_reactions(model)]
 
 
-def _inapplicable(bench: Bench) -> str:
+def _inapplicable(model: CheckedModel) -> str:
     """Why the balance cannot be made up here, empty if it can."""
-    table = bench.layout.info.wrenches
+    table = model.layout.info.wrenches
     if table is None:
         return "there are no joints between bodies"
-    if not bench.layout.projects:
+    if not model.layout.projects:
         return "derived with baumgarte="
-    if bench.mechanism.constraints:
+    if model.mechanism.constraints:
         return "constraint elements act on bodies too, and reactions contain only the joints"
-    plain = {s.coordinates[0] for s in bench.mechanism.joints if isinstance(s.joint, (*TURNING, Prismatic))}
-    loaded = {load.coordinate for terms in bench.kinematics.forces for load in terms.coordinate_loads}
-    loaded |= {s.coordinates[0] for s in bench.mechanism.joints if s.armature is not None}
+    plain = {s.coordinates[0] for s in model.mechanism.joints if isinstance(s.joint, (*TURNING, Prismatic))}
+    loaded = {load.coordinate for terms in model.kinematics.forces for load in terms.coordinate_loads}
+    loaded |= {s.coordinates[0] for s in model.mechanism.joints if s.armature is not None}
     if not loaded <= plain:
         return f"forces act along {', '.join(sorted(loaded - plain))}, not about or along one fixed axis"
     return ""
 
 
-def _reactions(bench: Bench) -> Finding:
+def _reactions(model: CheckedModel) -> Finding:
     """m a and the rate of angular momentum of each body against gravity, loads and what its joints exert on it."""
-    check, module = "reactions: every body in balance", bench.module
-    why = _inapplicable(bench)
+    check, module = "reactions: every body in balance", model.module
+    why = _inapplicable(model)
     if why:
         return Finding.skipped(check, why)
     found = Comparison(check)
-    labels = [f"{body} {part}" for body in bench.layout.bodies for part in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
-    for k, truth in enumerate(bench.truths):
+    labels = [f"{body} {part}" for body in model.layout.bodies for part in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    for k, truth in enumerate(model.truths):
         case = truth.case
-        a = bench.rhs(case)[module.n_q :]
+        a = model.rhs(case)[module.n_q :]
         wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
-        missing, size = _unbalanced(bench, truth, a, wrenches)
-        found.add(k, missing, _limit(bench, k, truth, wrenches, size), size_of(size), labels)
+        missing, size = _unbalanced(model, truth, a, wrenches)
+        found.add(k, missing, _limit(model, k, truth, wrenches, size), size_of(size), labels)
     return found.finding()
 
 
-def _limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
+def _limit(model: CheckedModel, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
     """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
-    case, module = truth.case, bench.module
+    case, module = truth.case, model.module
     loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[bench.layout.rows]
-    exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
-    slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
-    grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)
-    limit = _inertia(truth) @ slack + grown * (size + np.repeat(loads, len(bench.layout.bodies), axis=0).ravel())
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
+    exact, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
+    slack = model.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
+    grown = (1.0 + model.dependence(C)) * UNIT * 6 * len(model.layout.bodies)
+    limit = _inertia(truth) @ slack + grown * (size + np.repeat(loads, len(model.layout.bodies), axis=0).ravel())
     return np.asarray(limit)
 
 
-def force_limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray) -> float:
+def force_limit(model: CheckedModel, k: int, truth: Truth, wrenches: np.ndarray) -> float:
     """What rounding allows the force in a joint at state k to be off by: it carries all bodies beyond it."""
-    a = bench.rhs(truth.case)[bench.module.n_q :]
-    _, size = _unbalanced(bench, truth, a, wrenches)
-    return float(_limit(bench, k, truth, wrenches, size).reshape(-1, 2, 3)[:, 0].sum())
+    a = model.rhs(truth.case)[model.module.n_q :]
+    _, size = _unbalanced(model, truth, a, wrenches)
+    return float(_limit(model, k, truth, wrenches, size).reshape(-1, 2, 3)[:, 0].sum())
 
 
 def _inertia(truth: Truth) -> np.ndarray:
@@ -455,7 +455,9 @@ def _inertia(truth: Truth) -> np.ndarray:
     return np.array(columns).T.reshape(6 * len(truth.bodies), len(truth.virtual))
 
 
-def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _unbalanced(
+    model: CheckedModel, truth: Truth, a: np.ndarray, wrenches: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment about its origin that each body lacks (6 n_bodies,), and the size of the terms."""
     rates = truth.body_rates([truth.mp.mpf(float(x)) for x in a])
     total, size = np.zeros((len(truth.bodies), 6)), np.zeros((len(truth.bodies), 6))
@@ -475,7 +477,7 @@ def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray)
     for body_index, arm, force, torque in truth.marker_loads():
         take(body_index, bodies.scale(-1, force), bodies.scale(-1, torque), arm)
     along = _along(truth, a)
-    for spec, wrench in zip(bench.mechanism.joints, wrenches, strict=True):
+    for spec, wrench in zip(model.mechanism.joints, wrenches, strict=True):
         point = placed(truth, spec.successor, f"{spec.name} S").position
         many = [truth.mp.mpf(float(x)) for x in wrench]
         if spec.coordinates and spec.coordinates[0] in along:
@@ -522,23 +524,23 @@ def _along(truth: Truth, a: Array) -> dict[str, Number]:
 # reactions of :func:`~eomgen.analysis.reactions.reactions`, which are found from numbers, joint by joint.
 
 
-def check_reaction_laws(bench: Bench) -> list[Finding]:
+def check_reaction_laws(model: CheckedModel) -> list[Finding]:
     """One finding, of models with such friction."""
-    laws = [terms for terms in bench.kinematics.forces if isinstance(terms.force, ReactionFriction)]
-    if not laws or bench.layout.info.wrenches is None or not bench.layout.projects:
+    laws = [terms for terms in model.kinematics.forces if isinstance(terms.force, ReactionFriction)]
+    if not laws or model.layout.info.wrenches is None or not model.layout.projects:
         return []
     found = Comparison("friction: laws at the joints' reactions")
-    specs = {spec.name: spec for spec in bench.mechanism.joints}
+    specs = {spec.name: spec for spec in model.mechanism.joints}
     forces = [terms.force for terms in laws if isinstance(terms.force, ReactionFriction)]
     loads = [load.value for terms in laws for load in terms.coordinate_loads]
-    for k, truth in enumerate(bench.truths):
+    for k, truth in enumerate(model.truths):
         case = truth.case
-        wrenches = reactions(bench.module, case.t, case.x, p=case.p, u=case.u)
-        carried = dict(zip(bench.layout.info.joint_names, wrenches, strict=True))
-        loose = force_limit(bench, k, truth, wrenches)
+        wrenches = reactions(model.module, case.t, case.x, p=case.p, u=case.u)
+        carried = dict(zip(model.layout.info.joint_names, wrenches, strict=True))
+        loose = force_limit(model, k, truth, wrenches)
         acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
         expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
-        limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(bench.layout.bodies)
+        limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(model.layout.bodies)
         found.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
     return [found.finding()]
 

@@ -25,10 +25,10 @@ from ..runtime.runs.compiled import step
 from ..runtime.runs.events import Events
 from ..runtime.runs.integrator import integrator
 from ..runtime.runs.simulate import simulate
-from .bench import Bench
-from .cases import Case
+from .checked import CheckedModel
 from .finding import RIGID, Comparison, Finding, size_of
 from .limits import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
+from .random_states import SystemState
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -47,76 +47,76 @@ SMALLEST = 14  #: halvings of the step
 Reference = Callable[[float], Array]  #: h -> the state a time h later
 
 
-def check_runs(bench: Bench) -> list[Finding]:
+def check_runs(model: CheckedModel) -> list[Finding]:
     """Orders of the steppers, methods against each other, energy and loops of a short run."""
-    why = _inapplicable(bench)
+    why = _inapplicable(model)
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
-    kinked = _kinked(bench)
-    references = [(case, cache(_reference(bench, case))) for case in _held(bench)[:TRIED]]
-    found = [_order(bench, method, references) for method in ORDERS if method in _methods(bench)]
-    end = _far(bench, *references[0])
-    found += [_agreement(bench, *end), _energy(bench, end[0])]
+    kinked = _kinked(model)
+    references = [(case, cache(_reference(model, case))) for case in _held(model)[:TRIED]]
+    found = [_order(model, method, references) for method in ORDERS if method in _methods(model)]
+    end = _far(model, *references[0])
+    found += [_agreement(model, *end), _energy(model, end[0])]
     why = "its forces have corners or tables, and no method keeps its order there"
     return [
         f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in found
     ]
 
 
-def _inapplicable(bench: Bench) -> str:
-    if not bench.module.layout.n_dof:
+def _inapplicable(model: CheckedModel) -> str:
+    if not model.module.layout.n_dof:
         return "drivers move the whole mechanism, so nothing is integrated"
-    if bench.layout.info.rigid_only:
+    if model.layout.info.rigid_only:
         return RIGID
-    if Events(bench.layout, None).resets:
+    if Events(model.layout, None).resets:
         return "events reset its state, and an integrator finds no events"
-    if not bench.layout.projects:
+    if not model.layout.projects:
         return "derived with baumgarte="
     return ""
 
 
-def _kinked(bench: Bench) -> bool:
+def _kinked(model: CheckedModel) -> bool:
     """Whether right-hand sides may have kinks, where methods need not keep their order."""
-    terms = bench.terms
+    terms = model.terms
     nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
     kinked = operations_with(lambda row: row.bends).union(terms.graph.calls)
     return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
-def _methods(bench: Bench) -> tuple[str, ...]:
+def _methods(model: CheckedModel) -> tuple[str, ...]:
     from ..runtime.kernels import eager
 
-    return (*eager(bench.module.core).methods, "RK4")
+    return (*eager(model.module.core).methods, "RK4")
 
 
-def _held(bench: Bench) -> list[Case]:
+def _held(model: CheckedModel) -> list[SystemState]:
     """The states as runs with held inputs have them: rates of inputs are 0, and the state is on the constraints."""
-    rates = [bench.layout.u.index(rate) for of in bench.layout.input_rates.values() for rate, _ in of]
+    rates = [model.layout.u.index(rate) for of in model.layout.input_rates.values() for rate, _ in of]
     if not rates:
-        return list(bench.cases)
+        return list(model.states)
     found = []
-    for case in bench.cases:
+    for case in model.states:
         u = np.array(case.u)
         u[rates] = 0.0
-        found.append(case._replace(u=u, x=bench.module.project(case.x, t=case.t, p=case.p, u=u)))
+        found.append(case._replace(u=u, x=model.module.project(case.x, t=case.t, p=case.p, u=u)))
     return found
 
 
-def _time_scale(bench: Bench, case: Case) -> float:
+def _time_scale(model: CheckedModel, case: SystemState) -> float:
     """A time in which the state changes by about its own size (s): 1 / |eigenvalue of largest size|."""
-    J = bench.slopes(case)
+    J = model.slopes(case)
     fastest = float(np.abs(algebra.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
-    speed = bench.layout.scales.speed(case.v)
+    speed = model.layout.scales.speed(case.v)
     return 1.0 / max(fastest, speed, SLOWEST)
 
 
-def _reference(bench: Bench, case: Case) -> Reference:
+def _reference(model: CheckedModel, case: SystemState) -> Reference:
     """The state a time after the case, by SciPy; on the constraints.
 
     Runs of all lengths take the same steps but for their last: what stops one stops all that come that far.
     """
     integrate = require("scipy.integrate", "scipy", "verify")
-    bound = bench.module.bind(case.p, case.u)
+    bound = model.module.bind(case.p, case.u)
     stopped = np.inf
 
     def at(h: float) -> Array:
@@ -149,7 +149,7 @@ def _reference(bench: Bench, case: Case) -> Reference:
     return at
 
 
-def _far(bench: Bench, case: Case, reference: Reference) -> tuple[float, Array]:
+def _far(model: CheckedModel, case: SystemState, reference: Reference) -> tuple[float, Array]:
     """How long a smooth run from the case can be (s), and where it ends.
 
     Raises
@@ -157,7 +157,7 @@ def _far(bench: Bench, case: Case, reference: Reference) -> tuple[float, Array]:
     SimulationError
         None is possible.
     """
-    h = LONG * _time_scale(bench, case)
+    h = LONG * _time_scale(model, case)
     for _ in range(SMALLEST):
         try:
             return h, reference(h)
@@ -166,7 +166,7 @@ def _far(bench: Bench, case: Case, reference: Reference) -> tuple[float, Array]:
     raise SimulationError(f"no run from state {case.number} succeeds, however short")
 
 
-def _order(bench: Bench, method: str, references: Sequence[tuple[Case, Reference]]) -> Finding:
+def _order(model: CheckedModel, method: str, references: Sequence[tuple[SystemState, Reference]]) -> Finding:
     """Between a step h and h/2 the error falls by 2^(p + 1), until it is lost in rounding.
 
     The mean over three halvings counts, and the best of three states: a fault of the method shows at each, an error
@@ -177,12 +177,12 @@ def _order(bench: Bench, method: str, references: Sequence[tuple[Case, Reference
     found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
     observed: list[tuple[float, int]] = []
     for case, reference in references:
-        bound = bench.module.bind(case.p, case.u)
-        size = size_of(case.x) + size_of(bench.rhs(case)) * _time_scale(bench, case)
+        bound = model.module.bind(case.p, case.u)
+        size = size_of(case.x) + size_of(model.rhs(case)) * _time_scale(model, case)
         lost = 30.0 * TIGHT * size
         errors: list[float] = []
         ends: list[tuple[float, Array]] = []
-        h = FIRST * _time_scale(bench, case)
+        h = FIRST * _time_scale(model, case)
         for _ in range(SMALLEST):
             try:
                 if method == "RK4":
@@ -213,7 +213,7 @@ def _order(bench: Bench, method: str, references: Sequence[tuple[Case, Reference
     return found.finding()
 
 
-def _as_scipy(bound: BoundModel, case: Case, method: str, h: float, end: Array, error: float) -> bool:
+def _as_scipy(bound: BoundModel, case: SystemState, method: str, h: float, end: Array, error: float) -> bool:
     """Whether one step of a method ends where SciPy's of the same method does, within a part of its error."""
     solver = getattr(require("scipy.integrate", "scipy", "verify"), method, None)
     if solver is None or not np.isfinite(error):
@@ -227,24 +227,24 @@ def _as_scipy(bound: BoundModel, case: Case, method: str, h: float, end: Array, 
     return bool(run.t == case.t + h) and float(np.abs(end - found).max()) < SAME_STEP * error
 
 
-def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
+def _agreement(model: CheckedModel, h: float, expected: Array) -> Finding:
     """DOP853, RK45 and Radau at tight tolerances end where SciPy's DOP853 does."""
-    check, case = "runs: methods agree", _held(bench)[0]
-    methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(bench)] or ["DOP853"]
-    bound = bench.module.bind(case.p, case.u)
+    check, case = "runs: methods agree", _held(model)[0]
+    methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(model)] or ["DOP853"]
+    bound = model.module.bind(case.p, case.u)
     found = Comparison(check, ", ".join(methods))
     size = size_of(expected)
     for method in methods:
         tolerances = {"rtol": COMPARED, "atol": ABSOLUTE * COMPARED * size}
         end = integrator(bound, method=method, **tolerances)(case.t, case.x, h)
-        found.add(0, end - expected, COLLECTED * COMPARED * size, size, [f"{method} {name}" for name in bench.layout.x])
+        found.add(0, end - expected, COLLECTED * COMPARED * size, size, [f"{method} {name}" for name in model.layout.x])
     found.cases = 1
     return found.finding()
 
 
-def _energy(bench: Bench, h: float) -> Finding:
+def _energy(model: CheckedModel, h: float) -> Finding:
     """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
-    module, case = bench.module, _held(bench)[0]
+    module, case = model.module, _held(model)[0]
     found = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
     rtol, atol = COMPARED, ABSOLUTE * COMPARED
@@ -252,7 +252,7 @@ def _energy(bench: Bench, h: float) -> Finding:
     residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))
                  for t, x in zip(run.t, run.x.T, strict=True)]  # fmt: skip
     found.add(0, [max(residuals, default=0.0)], [ACCEPTED], 1.0, ["loops"])
-    if _conservative(bench):
+    if _conservative(model):
         E = np.array([bound.energy(x, t=t) for t, x in zip(run.t, run.x.T, strict=True)])
         size = float(np.abs(E[:, 0]).max() + np.abs(E[:, 1] - E[0, 1]).max()) or 1.0
         found.add(0, [np.abs(E.sum(axis=1) - E[0].sum()).max()], [1e3 * rtol * size], size, ["energy"])
@@ -263,16 +263,16 @@ def _energy(bench: Bench, h: float) -> Finding:
     return found.finding()
 
 
-def _conservative(bench: Bench) -> bool:
-    kinematics, terms = bench.kinematics, bench.terms
-    if bench.mechanism.bare or any(f.marker_remainder or f.coordinate_remainder for f in kinematics.forces):
+def _conservative(model: CheckedModel) -> bool:
+    kinematics, terms = model.kinematics, model.terms
+    if model.mechanism.bare or any(f.marker_remainder or f.coordinate_remainder for f in kinematics.forces):
         return False
     moving = [x for x in terms.constraint_rate if not x.is_zero]
-    return not moving and terms.t not in _symbols(bench) and not set(terms.u) & _symbols(bench)
+    return not moving and terms.t not in _symbols(model) and not set(terms.u) & _symbols(model)
 
 
-def _symbols(bench: Bench) -> set[str]:
+def _symbols(model: CheckedModel) -> set[str]:
     from ..expr.core import symbols_of
 
-    terms = bench.terms
+    terms = model.terms
     return symbols_of([terms.kinetic, terms.potential, *terms.bias])

@@ -16,9 +16,9 @@ from ..base.limits.numbers import TINY
 from ..codegen.kernels import EXPRESSIONS
 from ..codegen.terms import SystemTerms
 from ..expr.core import Expr
-from .cases import Case
 from .digits import FOLDED, UNIT, bounded
 from .limits import NUDGE
+from .random_states import SystemState
 from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:
@@ -34,18 +34,18 @@ GRAPH_KERNELS = (
 DEEP = 3  #: states that are looked at in many digits
 
 
-class Bench:
+class CheckedModel:
     """What the checks of one model share.
 
     Parameters
     ----------
     equations : Derivation
         What it was made from.
-    cases : sequence of Case
+    states : sequence of SystemState
     """
 
-    def __init__(self, module: BoundModel, equations: Derivation, cases: Sequence[Case]) -> None:
-        self.module, self.equations, self.cases = module, equations, list(cases)
+    def __init__(self, module: BoundModel, equations: Derivation, states: Sequence[SystemState]) -> None:
+        self.module, self.equations, self.states = module, equations, list(states)
         self.layout = module.layout
         self.kinematics = equations.kinematics
         self.mechanism = equations.kinematics.mechanism
@@ -56,23 +56,23 @@ class Bench:
     @cached_property
     def truths(self) -> list[Truth]:
         """The first states, in many digits."""
-        return [Truth(self.system, case) for case in self.cases[:DEEP]]
+        return [Truth(self.system, case) for case in self.states[:DEEP]]
 
     @cached_property
     def symbols(self) -> dict[str, Array]:
         """Values of all symbols at all states."""
-        terms, cases = self.terms, self.cases
+        terms, states = self.terms, self.states
         names = (*terms.q, *terms.v, *terms.a, *terms.p, *terms.u, terms.t)
-        rows = np.array([[*c.x, *c.a, *c.p, *c.u, c.t] for c in cases])
+        rows = np.array([[*c.x, *c.a, *c.p, *c.u, c.t] for c in states])
         return {name: rows[:, k] for k, name in enumerate(names)}
 
     def bounds(self, name: str, outputs: Callable[[], Sequence[Expr]]) -> tuple[Array, Array]:
         """Values (n, k) of expressions on the graph in double arithmetic, and the bounds of their rounding."""
         if name not in self._bounds:
-            self._bounds[name] = bounded(list(outputs()), self.symbols, len(self.cases))
+            self._bounds[name] = bounded(list(outputs()), self.symbols, len(self.states))
         return self._bounds[name]
 
-    def call(self, kernel: str, case: Case) -> Array:
+    def call(self, kernel: str, case: SystemState) -> Array:
         """A compiled kernel at a case; its result for one state."""
         kernels, given = self.module.kernels, {"p": case.p, "u": case.u}
         takes = NAMED[kernel].inputs
@@ -82,7 +82,7 @@ class Bench:
             kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **given, t=case.t)
         )
 
-    def rhs(self, case: Case) -> Array:
+    def rhs(self, case: SystemState) -> Array:
         """x'."""
         return self.module.rhs(case.t, case.x, p=case.p, u=case.u)
 
@@ -127,7 +127,7 @@ class Bench:
         dependent coordinates first as many as their own system is ill-conditioned.  The state itself is projected by
         the right-hand side, which moves it by what rounding makes of the constraints.
         """
-        module, layout, case, n = self.module, self.layout, self.cases[k], self.layout.n_v
+        module, layout, case, n = self.module, self.layout, self.states[k], self.layout.n_v
         M, E_M = self._at("mass_matrix", k, (n, n))
         C, E_C = (y[layout.rows] for y in self._at("constraint_jacobian", k, (layout.n_c, n)))
         E_h = self.bounds("bias", lambda: self.terms.bias)[1][:, k]
@@ -164,7 +164,7 @@ class Bench:
 
     def shift(self, k: int, C: Array) -> Array:
         """By how much the projection may move a state (n_x,) on the constraints."""
-        layout, case = self.layout, self.cases[k]
+        layout, case = self.layout, self.states[k]
         x = self.module.project(case.x, t=case.t, p=case.p, u=case.u)
         moved = np.abs(x - case.x) + UNIT * np.abs(case.x)
         if len(C):
@@ -186,11 +186,11 @@ class Bench:
 
     def moved(self, k: int, C: Array) -> Array:
         """By how much the projection may move accelerations (n_v,)."""
-        case = self.cases[k]
+        case = self.states[k]
         J = np.abs(self.slopes(case))
         return np.asarray((J @ self.shift(k, C))[self.layout.n_q :])
 
-    def slopes(self, case: Case) -> Array:
+    def slopes(self, case: SystemState) -> Array:
         """dx'/dx (n_x, n_x), by plain differences: only its size matters here."""
         columns, base = [], self.rhs(case)
         for k in range(self.layout.n_x):

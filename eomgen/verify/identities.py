@@ -13,9 +13,9 @@ from ..base.limits.numbers import EPS
 from ..errors import EomgenError
 from ..runtime.inputs import moving_inputs
 from ..runtime.minimal import Minimal
-from .cases import Case
 from .finding import FIRST_STEP, SHORTER, Comparison, Finding, extrapolate, failed, pairs, size_of
 from .limits import CLOSED
+from .random_states import SystemState
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 #: hundred products.  Checks that know the graph have bounds of their own.
 KERNEL = 256.0 * EPS
 
-Check = Callable[["BoundModel", Sequence[Case]], Finding]
+Check = Callable[["BoundModel", Sequence[SystemState]], Finding]
 
 
-def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
+def identities(module: BoundModel, states: Sequence[SystemState]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
     found = []
     for name, check in CHECKS.items():
@@ -40,21 +40,21 @@ def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
             found.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
-            found.append(check(module, cases))
+            found.append(check(module, states))
         except EomgenError as error:
             found.append(failed(name, error))
     return found
 
 
-def _mass(module: BoundModel, c: Case) -> Array:
+def _mass(module: BoundModel, c: SystemState) -> Array:
     return module.kernels.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
 
 
-def _jacobian(module: BoundModel, c: Case) -> Array:
+def _jacobian(module: BoundModel, c: SystemState) -> Array:
     return module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[module.layout.rows]
 
 
-def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
     check = "embedded_mass_matrix: symmetric, positive definite"
     if not module.layout.n_dof or module.layout.general_rates:
@@ -64,7 +64,7 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     if module.info.indefinite:
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
-    for c in cases:
+    for c in states:
         M = module.kernels.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
         found.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
         smallest = float(algebra.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
@@ -72,12 +72,12 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     check = "energy: T = v M v / 2"
     if not module.n_bodies:
         return Finding.skipped(check, "there are no bodies")
     found = Comparison(check)
-    for c in cases:
+    for c in states:
         v, M = c.v[: module.n_v], module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
         T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(v @ M @ v) / 2.0
         size = float(np.abs(v) @ np.abs(M) @ np.abs(v)) / 2.0
@@ -85,9 +85,9 @@ def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _inverse(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _inverse(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     found = Comparison("inverse_dynamics: M a + h")
-    for c in cases:
+    for c in states:
         M, h = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u)
         expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
         size = size_of(np.abs(M) @ np.abs(c.a) + np.abs(h))
@@ -100,45 +100,45 @@ def _rates(module: BoundModel, q: Array, v: Array) -> Array:
     return v if space is None else space.rates(q, v)
 
 
-def _slopes(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _slopes(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """C_q N of each velocity; C of Euler parameters off their unit length is a function like any other."""
     check = "constraint_jacobian: extrapolated differences"
     if not module.n_rows or module.layout.general_rates:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     found, n_h = Comparison(check), module.layout.n_h
-    for c in cases:
+    for c in states:
         C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[:n_h]
         for j, scale in enumerate(module.layout.scales.q):
             way = _rates(module, c.q, np.eye(module.layout.n_v)[j]) * scale
             slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))
             size = size_of(C) * scale
             found.add(c.number, slope - C[:, j] * scale, error + KERNEL * size, size, module.constraint_labels[:n_h])
-    found.cases = len(cases)
+    found.cases = len(states)
     return found.finding()
 
 
-def _along_q(module: BoundModel, c: Case, way: Array) -> Callable[[float], Array]:
+def _along_q(module: BoundModel, c: SystemState, way: Array) -> Callable[[float], Array]:
     return lambda s: module.constraints(c.q + s * way, p=c.p, u=c.u, t=c.t, rows="all")
 
 
-def _projection(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _projection(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
     found, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
-    for c in cases:
+    for c in states:
         x = module.project(c.x, t=c.t, p=c.p, u=c.u)
         again = module.project(x, t=c.t, p=c.p, u=c.u)
         found.add(c.number, again - x, CLOSED * size_of(x), size_of(x), module.x_names)
         for state, t, p, u in ((x, c.t, c.p, c.u), (module.x0(), 0.0, module.p, module.u)):
             gap = scales.residual(module.constraints(state[: module.n_q], t=t, p=p, u=u, rows="all"))
             found.add(c.number, gap, CLOSED, 1.0, module.constraint_labels[: module.layout.n_h])
-    found.cases = len(cases)
+    found.cases = len(states)
     return found.finding()
 
 
-def _balance(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _balance(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
     found = Comparison("rhs: forces in balance along free motions")
-    for c in cases:
+    for c in states:
         a = module.rhs(c.t, c.x, p=c.p, u=c.u)[module.n_q :]
         M, h, C = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
         scale = module.layout.scales.q
@@ -165,18 +165,18 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
-def condition_at(module: BoundModel, c: Case) -> float:
+def condition_at(module: BoundModel, c: SystemState) -> float:
     """By how much solving for accelerations at a case magnifies rounding."""
     return _condition(_mass(module, c), _jacobian(module, c), module.layout.scales.q)
 
 
-def _holding(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
     check = "rhs: constraints stay satisfied"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
     found = Comparison(check)
-    for c in cases:
+    for c in states:
         rate = module.rhs(c.t, c.x, p=c.p, u=c.u)
         time_scale = 1.0 / max(size_of(rate), 1.0)
         C = _jacobian(module, c)
@@ -188,7 +188,7 @@ def _holding(module: BoundModel, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _along_x(module: BoundModel, c: Case, rate: Array, time_scale: float) -> Callable[[float], Array]:
+def _along_x(module: BoundModel, c: SystemState, rate: Array, time_scale: float) -> Callable[[float], Array]:
     u_rate = moving_inputs(module.layout, c.u)
 
     def f(s: float) -> Array:
@@ -198,7 +198,7 @@ def _along_x(module: BoundModel, c: Case, rate: Array, time_scale: float) -> Cal
     return f
 
 
-def _minimal(module: BoundModel, cases: Sequence[Case]) -> Finding:
+def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     check, layout = "minimal: the same accelerations", module.layout
     try:
         layout.require_minimal_form()
@@ -209,7 +209,7 @@ def _minimal(module: BoundModel, cases: Sequence[Case]) -> Finding:
             check, "there is no degree of freedom" if not module.layout.n_dof else "derived with baumgarte="
         )
     found = Comparison(check)
-    for c in cases:
+    for c in states:
         bound = module.bind(c.p, c.u)
         minimal = Minimal(bound)
         minimal.reset(c.q)
@@ -241,12 +241,12 @@ KINEMATIC = (_slopes, _projection)
 # For modules without equations, such as those of exported packages: nothing but NumPy is needed.
 
 
-CASES = 2  #: states that are tried
+STATES = 2  #: states that are tried
 STEPS = (FIRST_STEP, SHORTER * FIRST_STEP)
 NAMES = {"jacobian": "x", "input_jacobian": "u", "parameter_jacobian": "p"}  #: kernel -> what it differentiates by
 
 
-def jacobians(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
+def jacobians(module: BoundModel, states: Sequence[SystemState]) -> list[Finding]:
     """One finding for each Jacobian of the complete right-hand side that the module has."""
     found = []
     for name, by in NAMES.items():
@@ -255,17 +255,17 @@ def jacobians(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
         if size and exact and name in module.core.names:
             check = f"{name}: extrapolated differences of rhs"
             try:
-                found.append(_compare(module, check, name, by, cases[:CASES]))
+                found.append(_compare(module, check, name, by, states[:STATES]))
             except EomgenError as error:
                 found.append(failed(check, error))
     return found
 
 
-def _compare(module: BoundModel, check: str, name: str, by: str, cases: Sequence[Case]) -> Finding:
+def _compare(module: BoundModel, check: str, name: str, by: str, states: Sequence[SystemState]) -> Finding:
     found, layout = Comparison(check), module.layout
     names = {"x": layout.x, "u": module.u_names, "p": module.p_names}[by]
     left_out: set[str] = set()
-    for c in cases:
+    for c in states:
         J, rate = getattr(module, name)(c.t, c.x, p=c.p, u=c.u), module.rhs(c.t, c.x, p=c.p, u=c.u)
         scales, condition = _scales(module, c, by), condition_at(module, c)
         noise = KERNEL * condition * max(size_of(rate), size_of(layout.scales.q))
@@ -284,13 +284,13 @@ def _compare(module: BoundModel, check: str, name: str, by: str, cases: Sequence
                 left_out.add(label)
                 continue
             found.add(c.number, *compared, size, pairs([f"{n}'" for n in layout.x], [label]))
-    found.cases = len(cases)
+    found.cases = len(states)
     if left_out:
         found.note = f"without {', '.join(sorted(left_out))}: no consistent state was found nearby"
     return found.finding()
 
 
-def _scales(module: BoundModel, c: Case, by: str) -> Array:
+def _scales(module: BoundModel, c: SystemState, by: str) -> Array:
     """Sizes of the variables, over which differences are taken."""
     layout = module.layout
     if by == "x":
@@ -301,7 +301,7 @@ def _scales(module: BoundModel, c: Case, by: str) -> Array:
     return np.where(values != 0.0, np.abs(values), 1.0) * (1.0 if by == "u" else 0.2)
 
 
-def _along(module: BoundModel, c: Case, by: str, j: int, scale: float) -> Callable[[float], Array]:
+def _along(module: BoundModel, c: SystemState, by: str, j: int, scale: float) -> Callable[[float], Array]:
     def f(s: float) -> Array:
         given = {"x": np.array(c.x), "u": np.array(c.u), "p": np.array(c.p)}
         given[by][j] += s * scale

@@ -14,7 +14,7 @@ from .digits import FIRST, SECOND, Digits, Number, Numbers, context
 if TYPE_CHECKING:
     from ..codegen.terms import SystemTerms
     from ..reading.derivation import Derivation
-    from .cases import Case
+    from .random_states import SystemState
 
 Values = dict[str, Number]
 
@@ -41,7 +41,7 @@ class PreciseSystem:
             self._ready[name] = Digits(self.mp, list(outputs()))
         return self._ready[name](values)
 
-    def values(self, case: Case) -> Values:
+    def values(self, case: SystemState) -> Values:
         """All symbols at a case, exactly as the doubles are."""
         terms, number = self.terms, self.mp.mpf
         names = (*terms.q, *terms.v, *terms.a, *terms.p, *terms.u, terms.t)
@@ -55,10 +55,10 @@ class PreciseState:
     Parameters
     ----------
     system : PreciseSystem
-    case : Case
+    case : SystemState
     """
 
-    def __init__(self, system: PreciseSystem, case: Case) -> None:
+    def __init__(self, system: PreciseSystem, case: SystemState) -> None:
         self.system, self.case, self.mp = system, case, system.mp
         self.values = system.values(case)
         self.n = len(system.terms.v)

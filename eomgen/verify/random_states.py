@@ -32,7 +32,7 @@ LATEST = 0.5  #: latest time (s)
 HALVINGS = 8  #: of the way from the reference position, until it closes
 
 
-class Case(NamedTuple):
+class SystemState(NamedTuple):
     """One state with everything that kernels take."""
 
     number: int
@@ -54,7 +54,7 @@ class Case(NamedTuple):
         return self.x[self.n_q :]
 
 
-def random_cases(module: BoundModel, count: int, seed: int = 0, at_values: bool = False) -> list[Case]:
+def random_states(module: BoundModel, count: int, seed: int = 0, at_values: bool = False) -> list[SystemState]:
     """States that move, on the constraints.
 
     Parameters
@@ -72,7 +72,7 @@ def random_cases(module: BoundModel, count: int, seed: int = 0, at_values: bool 
     return [draw(module, rng, geometric, k) for k in range(count)]
 
 
-def draw(module: BoundModel, rng: np.random.Generator, geometric: Array | None, number: int) -> Case:
+def draw(module: BoundModel, rng: np.random.Generator, geometric: Array | None, number: int) -> SystemState:
     """One state; parameters that keep the loops closed are tried first, then those that do not touch them."""
     t = float(rng.uniform(0.0, LATEST))
     spread = 1.0 + SPREAD * rng.standard_normal(module.n_p).clip(-2.0, 2.0)
@@ -86,10 +86,10 @@ def draw(module: BoundModel, rng: np.random.Generator, geometric: Array | None, 
             x = _state(module, rng, t, p, inputs)
             if x is not None:
                 a = rng.standard_normal(module.layout.n_v) * _sizes(module, module.layout.velocity_kinds)
-                return Case(number, t, x, a, p, inputs, module.n_q)
+                return SystemState(number, t, x, a, p, inputs, module.n_q)
     x = module.x0(t=0.0)
     a = rng.standard_normal(module.layout.n_v) * _sizes(module, module.layout.velocity_kinds)
-    return Case(number, 0.0, module.project(x, t=0.0), a, module.p, module.u, module.n_q)
+    return SystemState(number, 0.0, module.project(x, t=0.0), a, module.p, module.u, module.n_q)
 
 
 def _sizes(module: BoundModel, kinds: tuple[str, ...]) -> Array:
@@ -171,7 +171,7 @@ STATES = 2
 NUDGES = 4  #: states beside each, by which the effect of rounding is estimated
 
 #: Calls that every package has, and their arguments.
-CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
+CALLS: dict[str, Callable[[SystemState], tuple[Any, ...]]] = {
     "rhs": lambda c: (c.t, c.x),
     "jacobian": lambda c: (c.t, c.x),
     "outputs": lambda c: (c.t, c.x),
@@ -188,7 +188,7 @@ CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
 }
 
 
-def called(module: BoundModel, call: str, case: Case) -> Array:
+def called(module: BoundModel, call: str, case: SystemState) -> Array:
     """What a call of a module gives at a state; of one that is not in the table at its position."""
     arguments = CALLS[call](case) if call in CALLS else (case.q,)
     given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
@@ -212,9 +212,9 @@ def record_calls(name: str, module: BoundModel | None) -> str:
     if module is not None:
         try:
             x = np.asarray(module.x0(), dtype=float)
-            start = Case(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
+            start = SystemState(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
             found.append({"id": "x0", "call": "x0", "arguments": [], "given": {}, **_judged(x, [])})
-            cases = [start, *random_cases(module, STATES - 1, SEED)] if module.n_x else [start]
+            cases = [start, *random_states(module, STATES - 1, SEED)] if module.n_x else [start]
         except EomgenError:  # no state can be assembled: the package says so when it is called
             cases = []
         for number, case in enumerate(cases):
@@ -223,14 +223,14 @@ def record_calls(name: str, module: BoundModel | None) -> str:
     return json.dumps({"name": name, "cases": found}, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-def _record(module: BoundModel, call: str, case: Case, number: int) -> dict[str, Any] | None:
+def _record(module: BoundModel, call: str, case: SystemState, number: int) -> dict[str, Any] | None:
     """One call at one state; None where the model has no such result, or none that is finite."""
     given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
     rng = np.random.default_rng(SEED)
     try:
         values = [called(module, call, case)]
         for _ in range(NUDGES):
-            nudged = Case(0, case.t, _nudge(case.x, rng), _nudge(case.a, rng), case.p, case.u, case.n_q)
+            nudged = SystemState(0, case.t, _nudge(case.x, rng), _nudge(case.a, rng), case.p, case.u, case.n_q)
             values.append(called(module, call, nudged))
     except EomgenError:
         return None

@@ -31,8 +31,8 @@ from .finding import NOT_REACHED, Comparison, Finding, failed
 
 if TYPE_CHECKING:
     from ..base.algebra import Array
-    from .bench import Bench
-    from .cases import Case
+    from .checked import CheckedModel
+    from .random_states import SystemState
 
 SHIFT = 0.5  #: of the frames of bodies, in lengths of the model
 
@@ -41,7 +41,7 @@ class NotApplicable(Exception):
     """The change has no meaning for this model; the text says why."""
 
 
-def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Finding]:
+def variant_findings(model: CheckedModel, seconds: float, seed: int = 0) -> list[Finding]:
     """Every change that applies to a model, one finding each.
 
     Parameters
@@ -52,12 +52,12 @@ def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Findin
         Of the turns of frames, and of which joint is cut.
     """
     end = perf_counter() + seconds
-    target = bench.module.info.target
+    target = model.module.info.target
     changes: dict[str, Callable[[], BoundModel]] = {
-        "body frames turned": partial(_turned, bench, seed),
-        "another joint cut": partial(_cut_another, bench, seed),
-        **{f"method {name}": partial(_derived, bench, name) for name in METHODS if name != bench.equations.method},
-        "target numpy": partial(_interpreted, bench, target),
+        "body frames turned": partial(_turned, model, seed),
+        "another joint cut": partial(_cut_another, model, seed),
+        **{f"method {name}": partial(_derived, model, name) for name in METHODS if name != model.equations.method},
+        "target numpy": partial(_interpreted, model, target),
     }
     found = []
     for name, change in changes.items():
@@ -66,7 +66,7 @@ def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Findin
             found.append(Finding.skipped(check, f"{NOT_REACHED} in {seconds:g} s"))
             continue
         try:
-            found.append(_compared(bench, check, change()))
+            found.append(_compared(model, check, change()))
         except (NotApplicable, ToolchainError) as why:
             found.append(Finding.skipped(check, str(why)))
         except (EomgenError, ArithmeticError, LookupError) as error:  # though the model itself was not refused
@@ -74,19 +74,19 @@ def variant_findings(bench: Bench, seconds: float, seed: int = 0) -> list[Findin
     return found
 
 
-def _compared(bench: Bench, check: str, other: BoundModel) -> Finding:
+def _compared(model: CheckedModel, check: str, other: BoundModel) -> Finding:
     """Accelerations of another module at the states of this one, against those found in many digits."""
     found = Comparison(check)
-    if other.n_dof != bench.module.n_dof:
-        note = f"{other.n_dof} degrees of freedom instead of {bench.module.n_dof}"
+    if other.n_dof != model.module.n_dof:
+        note = f"{other.n_dof} degrees of freedom instead of {model.module.n_dof}"
         return Finding(check, np.inf, 0.0, note=note)
-    for k, truth in enumerate(bench.truths):
+    for k, truth in enumerate(model.truths):
         try:
-            a, limit, size = true_accelerations(bench, k)
+            a, limit, size = true_accelerations(model, k)
         except ZeroDivisionError:
             return Finding.skipped(check, "the system of accelerations and multipliers is singular")
-        case, names = truth.case, bench.layout.v
-        x = _state_of(bench, case, other)
+        case, names = truth.case, model.layout.v
+        x = _state_of(model, case, other)
         rates = dict(zip(other.layout.v, other.rhs(case.t, x, p=case.p, u=case.u)[other.n_q :], strict=True))
         shared = [i for i, name in enumerate(names) if name in rates]
         actual = np.array([rates[names[i]] for i in shared])
@@ -94,12 +94,12 @@ def _compared(bench: Bench, check: str, other: BoundModel) -> Finding:
     return found.finding()
 
 
-def _state_of(bench: Bench, case: Case, other: BoundModel) -> Array:
+def _state_of(model: CheckedModel, case: SystemState, other: BoundModel) -> Array:
     """A state in the coordinates of another module, those of joints that are cut here among them."""
-    values = dict(zip(bench.module.x_names, case.x.tolist(), strict=True))
-    loops = bench.layout.loops
+    values = dict(zip(model.module.x_names, case.x.tolist(), strict=True))
+    loops = model.layout.loops
     if loops:
-        cut = bench.call("loop_coordinates", case).reshape(3, -1)
+        cut = model.call("loop_coordinates", case).reshape(3, -1)
         for name, place, rate in zip(loops, *cut[:2].tolist(), strict=True):
             values |= {name: place, f"{name}_dot": rate}
     if lacking := [name for name in other.x_names if name not in values]:
@@ -112,30 +112,30 @@ def _made(mechanism: Mechanism, method: str) -> BoundModel:
     return BoundModel(pipeline.compile_core(derived, "numpy", ["rhs"]))
 
 
-def _own(bench: Bench) -> Mechanism:
+def _own(model: CheckedModel) -> Mechanism:
     """The mechanism in a graph of its own."""
-    return copied(bench.mechanism)
+    return copied(model.mechanism)
 
 
-def _derived(bench: Bench, method: str) -> BoundModel:
-    if bench.mechanism.bare:
+def _derived(model: CheckedModel, method: str) -> BoundModel:
+    if model.mechanism.bare:
         raise NotApplicable("the equations are given")
-    return _made(_own(bench), method)
+    return _made(_own(model), method)
 
 
-def _interpreted(bench: Bench, target: str) -> BoundModel:
+def _interpreted(model: CheckedModel, target: str) -> BoundModel:
     if target == "numpy":
         raise NotApplicable("the module is of target numpy itself; verify one of target cython")
-    return _made(_own(bench), bench.equations.method)
+    return _made(_own(model), model.equations.method)
 
 
 # -- frames of bodies --------------------------------------------------------------------------------------------------
-def _turned(bench: Bench, seed: int) -> BoundModel:
+def _turned(model: CheckedModel, seed: int) -> BoundModel:
     """Every body's frame turned by any angle about any axis, and shifted."""
-    mechanism, random = _own(bench), np.random.default_rng(seed)
+    mechanism, random = _own(model), np.random.default_rng(seed)
     if not mechanism.bodies:
         raise NotApplicable("there are no bodies")
-    graph, size = mechanism.graph, SHIFT * float(bench.module.info.length_scale or 1.0)
+    graph, size = mechanism.graph, SHIFT * float(model.module.info.length_scale or 1.0)
     places = {
         k: Frame(
             vec.matrix(graph, from_quaternion(*random.normal(size=4)).tolist()),
@@ -145,7 +145,7 @@ def _turned(bench: Bench, seed: int) -> BoundModel:
     }
     bodies = tuple(_described_in(body, places[k]) for k, body in enumerate(mechanism.bodies))
     made = _Moved(places).of(replace(mechanism, bodies=(), body_shapes=()))
-    return _made(replace(made, bodies=bodies), bench.equations.method)
+    return _made(replace(made, bodies=bodies), model.equations.method)
 
 
 def _point(place: Frame, at: Vec3) -> Vec3:
@@ -200,16 +200,16 @@ class _Moved:
 
 
 # -- cuts --------------------------------------------------------------------------------------------------------------
-def _cut_another(bench: Bench, seed: int) -> BoundModel:
+def _cut_another(model: CheckedModel, seed: int) -> BoundModel:
     """Of a loop another joint is cut: the only one of it whose coordinates the user did not name."""
-    mechanism, topology = _own(bench), bench.kinematics.topology
+    mechanism, topology = _own(model), model.kinematics.topology
     joints = mechanism.joints
     able = [k for cut in topology.cut for k in _way_round(mechanism, topology, cut) if joints[k].joint.role == "either"]
     for chosen in np.random.default_rng(seed).permutation(able).astype(int).tolist():
         named = tuple(replace(joint, named=k != chosen) for k, joint in enumerate(joints))
         made = replace(mechanism, joints=named, independent=())
         if chosen in find_topology(made).cut:
-            return _made(made, bench.equations.method)
+            return _made(made, model.equations.method)
     raise NotApplicable("no loop has another joint that can be cut")
 
 

@@ -18,18 +18,18 @@ from ..base.texts import shown
 from ..base.value_rules import read_count
 from ..errors import EomgenError, off_range
 from ..runtime.runs.events import inner_run
-from .cases import random_cases
 from .finding import Finding, Verification, failed
 from .identities import identities, jacobians
+from .random_states import random_states
 
 if TYPE_CHECKING:
     from ..reading.derivation import Derivation
     from ..runtime.bound_model import BoundModel
-    from .cases import Case
+    from .random_states import SystemState
 
 STATES = 6  #: random states
 SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
-#: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
+#: Files of checks that need the equations, in the order of the table; each has ``check(model)``.
 GROUPS = (  #: group of checks -> the file with its function
     dict.fromkeys(("kernels",), "check_kernels")
     | dict.fromkeys(("bodies", "joints", "reactions", "reaction_laws"), "check_bodies")
@@ -96,15 +96,15 @@ def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[F
     """What the module says of itself, and what follows from its equations."""
     if not module.n_x:
         return _of_fixed_bodies(module)
-    cases = random_cases(module, states, seed)
-    found = identities(module, cases)
+    random = random_states(module, states, seed)
+    found = identities(module, random)
     equations = getattr(module, "equations", None)
     if equations is None:
-        found += jacobians(module, cases)
+        found += jacobians(module, random)
         why = "they need the equations, and a package does not contain them: verify the model that it was made from"
         found.append(Finding.skipped("graph, free bodies, derivatives, runs, variants", why))
     else:
-        found += _with_equations(module, equations, cases, seed, end)
+        found += _with_equations(module, equations, random, seed, end)
     return found
 
 
@@ -127,16 +127,16 @@ def _only_in_c(equations: Derivation | None) -> str:
 
 
 def _with_equations(
-    module: BoundModel, equations: Derivation, cases: list[Case], seed: int, end: float
+    module: BoundModel, equations: Derivation, random: list[SystemState], seed: int, end: float
 ) -> list[Finding]:
     """All groups, and variants until a time; one that cannot be carried out fails."""
     why = _only_in_c(equations)
     if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs, variants", why)]
     from ..mechanics.methods.positive import FREE, note_lost_digits, smallest_share
-    from .bench import Bench
+    from .checked import CheckedModel
 
-    bench, found = Bench(module, equations, cases), []
+    model, found = CheckedModel(module, equations, random), []
     parts = equations.kinematics, equations.mobility, equations.tree
     idle = module.info.no_inertia
     if idle:
@@ -148,11 +148,11 @@ def _with_equations(
     for group in KINEMATIC if idle else GROUPS:
         check = getattr(import_module(f"{__package__}.{GROUPS[group]}"), f"check_{group}")
         try:
-            found += check(bench)
+            found += check(model)
         except (EomgenError, ArithmeticError) as error:
             found.append(failed(f"checks of {group}", error))
     if not idle:
         from .variants import variant_findings
 
-        found += variant_findings(bench, max(LEAST, end - perf_counter()), seed)
+        found += variant_findings(model, max(LEAST, end - perf_counter()), seed)
     return found
