@@ -67,6 +67,20 @@ def test_public_names() -> None:
         _ = eg.nothing
 
 
+def test_names_of_rotations() -> None:
+    assert {"cos", "dot", "Any"}.isdisjoint(eg.rotations.__all__)
+    assert all(getattr(eg.rotations, name) for name in eg.rotations.__all__)
+
+
+def test_metadata_cannot_be_changed() -> None:
+    m = eg.Model("mass")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    info = m.compile(target="numpy").layout.info
+    with pytest.raises(AttributeError, match="method"):
+        info.method = "x"
+    assert info.latex is not type(info).latex
+
+
 def test_import_is_cheap() -> None:
     runs = []
     for _ in range(8):  # the fastest of several: other processes share this machine
