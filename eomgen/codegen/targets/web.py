@@ -119,9 +119,10 @@ def refuse(program: Program) -> None:
 
 @contextmanager
 def _phase(what: str) -> Iterator[None]:
-    """Say on stderr what is being done, once it takes longer than a second."""
+    """Say on a terminal what is being done, once it takes longer than a second."""
     timer = Timer(1.0, lambda: print(f"{what} ...", file=sys.stderr, flush=True))
-    timer.start()
+    if sys.stderr.isatty():
+        timer.start()
     try:
         yield
     finally:
