@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from math import floor, log, log2, prod
+from typing import cast
 
 from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..base.operations import FUNCTION, OPERATIONS
@@ -113,7 +114,7 @@ def _length(lengths: str, numbers: Mapping[str, str]) -> int:
 
 def _whole(of: str | ast.expr, numbers: Mapping[str, str]) -> int:
     """The value of a sum or product of whole numbers and of names of such."""
-    node = ast.parse(of.strip(), mode="eval").body if isinstance(of, str) else of
+    node = cast(ast.Expr, ast.parse(of.strip()).body[0]).value if isinstance(of, str) else of
     if isinstance(node, ast.BinOp):
         left, right = _whole(node.left, numbers), _whole(node.right, numbers)
         return left * right if isinstance(node.op, ast.Mult) else left + right
