@@ -60,6 +60,6 @@ ROUNDED_COEFFICIENT = 1e-11
 #: By which forces may miss a straight line in a parameter that linear least squares find, over the largest force:
 #: differences of three evaluations keep 14 digits, and what is not linear misses by a part of its own size.
 LINEAR = 1e-10
-#: Relative tolerances of a run by which Gauss's formula may miss it over one of its steps, over the largest state, for
-#: its nodes to carry the derivatives too: a law that bends within a step misses by the step times the bend.
-QUADRATURE = 10.0
+#: Relative part of each state by which Gauss's formula may miss a run over one of its steps, for its nodes to carry the
+#: derivatives too; the tolerance of the run where that is less.
+QUADRATURE = 1e-7

@@ -5,8 +5,8 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 
 S' is linear in S, so it needs no steps of its own: along those of the compiled run, on each the four nodes of Gauss's
 formula of order 8 (section II.7), all Jacobians come from one call and all steps from one set of linear systems. The
-same formula applied to the run itself tells whether the steps are short enough.  Where they are not, and for loops,
-events and laws of inputs that depend on the state, both are integrated together.
+same formula applied to the run itself tells whether the steps are short enough.  Where they are not, for loops, events,
+laws that bend or jump, inputs that depend on the state and many states, both are integrated together.
 """
 
 from __future__ import annotations
@@ -368,12 +368,15 @@ MATRIX = algebra.solve(NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] 
 #: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
 #: more in the derivatives than in the run.
 TIGHTER = 0.1
+FEW = 16  #: states up to which this is the faster way: the systems of a step grow with their third power
+ENTRIES = 2_000_000  #: of the systems that are held at once
 
 
 def serves(module: BoundModel, forcing: Forcing) -> bool:
-    """Whether derivatives can be had along the steps of a run: no constraints, and inputs of time alone, smooth."""
+    """Whether derivatives can be had along the steps of a run: smooth equations of no constraints, and inputs of time
+    alone, smooth between corners."""
     layout, formulas = module.layout, forcing.formulas
-    if layout.n_c or layout.quaternion_slots or layout.general_rates:
+    if layout.n_c or layout.quaternion_slots or layout.general_rates or not layout.info.smooth:
         return False
     if any(f.branches or any(op in ("x", "p") for op, *_ in f.tape[0]) for f in formulas.values()):
         return False
@@ -385,15 +388,23 @@ def find_along(run: Variational, simulated: Callable[..., Trajectory], corners: 
     """S (n_t, n_x, k) at times of a run, from S at its start, where Gauss's formula meets the run; else None."""
     tight = {**settings, **{name: TIGHTER * settings[name] for name in ("rtol", "atol")}}
     grid = np.unique(np.concatenate([simulated(**tight).t, times, corners]))
-    h, n_x = np.diff(grid), len(S)
+    h, n_x, s = np.diff(grid), len(S), len(NODES)
     t = (grid[:-1, None] + h[:, None] * NODES).ravel()
     whole = simulated(**tight, t_eval=np.unique(np.concatenate([t, grid])))
     x, ends = whole.x[:, np.searchsorted(whole.t, t)], whole.x[:, np.searchsorted(whole.t, grid)]
-    _, rate, J, by, _ = run.rates(t, x, None)
-    missed = ends[:, :-1] + h * (rate.reshape(n_x, len(h), -1) @ WEIGHTS) - ends[:, 1:]
-    if not np.abs(missed).max(initial=0.0) <= QUADRATURE * np.min(settings["rtol"]) * np.abs(whole.x).max():
-        return None
-    return integrate_linear(h, J, by, S)[np.searchsorted(grid, times)]
+    sizes, at = np.abs(whole.x).max(axis=1), np.searchsorted(grid, times)
+    allowed = np.minimum(settings["atol"] + np.minimum(settings["rtol"], QUADRATURE) * sizes, QUADRATURE * sizes.max())
+    found, count = list[Array](), max(1, ENTRIES // (s * n_x) ** 2)
+    for first in range(0, len(h), count):
+        steps, nodes = h[first : first + count], slice(s * first, s * (first + count))
+        _, rate, J, by, _ = run.rates(t[nodes], x[:, nodes], None)
+        missed = steps * (rate.reshape(n_x, -1, s) @ WEIGHTS) - np.diff(ends[:, first : first + count + 1])
+        if not (np.abs(missed).max(axis=1) <= allowed).all():
+            return None
+        S_here = integrate_linear(steps, J, by, S)
+        found += [S_here[k - first] for k in at[(first <= at) & (at < first + len(steps))]]
+        S = S_here[-1]
+    return np.array([*found, *[S] * (len(times) - len(found))])
 
 
 def integrate_linear(h: Array, J: Array, by: Array, start: Array) -> Array:
@@ -495,16 +506,21 @@ def sensitivities(
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
     follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
     S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
-    solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
-    if not salts and stop > start and serves(bound, forcing):
-        simulated = partial(simulate, bound, (start, stop), x0, None, inputs, events=events, method=method)
+    few = layout.n_x <= FEW or method == "Taylor"
+    if few and not salts and stop > start and serves(bound, forcing):
+        texts = {layout.u[i]: formula for i, formula in forcing.formulas.items()}  # read once
+        read = {name: texts.get(name, value) for name, value in (inputs or {}).items()}
+        simulated = partial(simulate, bound, (start, stop), x0, None, read, events=events)
+        every = forcing.corners(start, stop, every_jump=True)
         with inner_run():
-            trajectory = simulated(**settings, t_eval=times)
-            S = find_along(run, simulated, corners, S0, trajectory.t, settings)
+            trajectory = simulated(**settings, method=method, t_eval=times)
+            method = "DOP853" if method == "Taylor" else method  # whose steps are too long, and which SciPy lacks
+            S = find_along(run, partial(simulated, method=method), every, S0, trajectory.t, settings)
         if S is not None:
             return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held)
+    solver = choose_solver(method)
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
     z0 = run.joined(x0, S0)

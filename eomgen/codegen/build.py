@@ -16,8 +16,9 @@ import numpy as np
 
 from ..base.kernel_table import KERNELS, NAMED, Kernel
 from ..base.names import hint, joined
+from ..base.operations import operations_with
 from ..errors import UsageError, ill_placed, no_such
-from ..expr.core import Expr, Graph, reachable, symbols_of
+from ..expr.core import LEAVES, Expr, Graph, reachable, symbols_of
 from ..expr.functions import Function, NativeCode
 from ..expr.schedule import count
 from ..expr.user_functions import Curve, Surface
@@ -88,6 +89,8 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
             blocks[other] = (maker.public(other) if other in NAMED else None) or maker.internal(other)
     made = {*(d.name for d in drivers), *(b.name for b in blocks.values() if b.public)}
     hoisted, parameter_only = hoist(terms.graph, [y for block in blocks.values() for y in block.roots], terms.p)
+    nodes, plain = terms.graph.nodes, operations_with(lambda row: not row.bends) | LEAVES
+    motion = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma, *terms.rates)))
     counts = {b.name: count((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
     counts["precompute"] = count(hoisted)
     derivatives = [b for b in blocks.values() if b.outputs and b.name in SPARSE]
@@ -95,6 +98,7 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
         **metadata,
         abi=ABI,
         sizes=sizes,
+        smooth=all(nodes[i][0] in plain or i in parameter_only for i in motion),
         output_accelerations=maker.outputs_need_accelerations,
         kernels={k.name: list(k.shape(sizes)) for k in KERNELS if k.name in made},
         sparsity={b.name: [k for k, x in enumerate(b.outputs) if not x.is_zero] for b in derivatives},

@@ -344,7 +344,7 @@ class Forcing:
 
     def _read(self, name: str, value: Any) -> Any:
         """What a user gives as a number, a Signal, an Expression or a function."""
-        if isinstance(value, Signal):
+        if isinstance(value, Signal | Expression):
             return value
         if callable(value):
             value = of_time(value)

@@ -122,6 +122,7 @@ class ModelInfo:
     rigid_only: Sequence[str] = ()
     no_inertia: str = ""  #: why the model is for kinematics only
     indefinite: bool = False
+    smooth: bool = False  #: no operation of its right-hand side, but of parameters alone, may jump or bend
     lanes: Sequence[str] = ()
     series: bool = False
     no_series: str = "its module was compiled without one, as with target='numpy'"

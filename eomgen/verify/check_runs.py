@@ -17,9 +17,7 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import ACCEPTED
-from ..base.operations import operations_with
 from ..errors import EomgenError, SimulationError
-from ..expr.core import reachable
 from ..runtime.argument_checks import require
 from ..runtime.runs.compiled import step
 from ..runtime.runs.events import Events
@@ -52,7 +50,7 @@ def check_runs(model: CheckedModel) -> list[Finding]:
     why = _inapplicable(model)
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
-    kinked = _kinked(model)
+    kinked = not model.layout.info.smooth
     references = [(case, cache(_reference(model, case))) for case in _held(model)[:TRIED]]
     found = [_order(model, method, references) for method in ORDERS if method in _methods(model)]
     end = _far(model, *references[0])
@@ -73,14 +71,6 @@ def _inapplicable(model: CheckedModel) -> str:
     if not model.layout.projects:
         return "derived with baumgarte="
     return ""
-
-
-def _kinked(model: CheckedModel) -> bool:
-    """Whether right-hand sides may have kinks, where methods need not keep their order."""
-    terms = model.terms
-    nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
-    kinked = operations_with(lambda row: row.bends).union(terms.graph.calls)
-    return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
 def _methods(model: CheckedModel) -> tuple[str, ...]:

@@ -96,6 +96,26 @@ def test_a_linear_oscillator() -> None:
     assert (found.held, found.dx.shape, found.dy.shape) == (("s", "s_dot"), (2, 5, 7), (1, 5, 7))
 
 
+def test_a_spring_that_bends_beside_a_far_coordinate() -> None:
+    """Two half waves, k above and 20 below, in closed form; the far coordinate lends them no tolerance."""
+    m = eg.Model("bent")
+    m.parameter("k", 40.0)
+    for name, start in (("z", 1.0), ("far", 1e4)):
+        m.body(f"body_{name}", mass=1.0)
+        m.prismatic(name, m.ground, f"body_{name}", axis="x")
+        m.initial(**{name: start, f"{name}_dot": 0.0})
+    m.actuator("spring", "z", value="-k*max(z, 0) + 20*max(-z, 0)")
+    times = np.linspace(0.0, 0.9, 19)
+    k, t = sympy.symbols("k t", positive=True)
+    above, below = sympy.sqrt(k), sympy.sqrt(20)
+    later = -above / below * sympy.sin(below * (t - sympy.pi / 2 / above))
+    slope = sympy.Piecewise((sympy.cos(above * t).diff(k), t < sympy.pi / 2 / above), (later.diff(k), True))
+    exact = sympy.lambdify(t, slope.subs(k, 40.0))(times)
+    for rtol, allowed in ((1e-9, 1e-8), (1e-6, 1e-5)):
+        found = m.compile(target="numpy").sensitivities(["k"], times[-1], t_eval=times, rtol=rtol)
+        np.testing.assert_allclose(found["z", "k"], exact, rtol=0, atol=allowed)
+
+
 def differences(mod: Any, name: str, held: dict[str, float], times: np.ndarray, **inputs: Any) -> np.ndarray:
     """Central differences, fourth order, of whole runs from assembled states: (n_x, n_t)."""
 
