@@ -18,7 +18,7 @@ from eomgen import pipeline
 from eomgen.base.kernel_table import KERNELS
 from eomgen.codegen.c import emit_c
 from eomgen.codegen.c_pairs import pair_files
-from eomgen.runtime.runs.moreau import ContactWarning
+from eomgen.runtime.impacts.moreau import ContactWarning
 from eomgen.toolchain.compiler import find_compiler
 from eomgen.toolchain.layer import read_header
 

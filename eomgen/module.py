@@ -104,8 +104,10 @@ def find_function(file: str, name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name != f"{__package__}.{file.partition('.')[0]}":
             raise
-        remedy = f"give --analyses to `eomgen generate`; where eomgen is, Module.of({__package__}) has it"
-        if file.startswith("codegen."):
+        remedy = f"where eomgen is, Module.of({__package__}) has it"
+        if file.startswith("analysis."):
+            remedy = f"give --analyses to `eomgen generate`; {remedy}"
+        elif file.startswith("codegen."):
             remedy = "it is made from the model, by `eomgen generate MODEL --target web`; traj.animate() shows runs"
         raise UnavailableError(f"{__package__} was generated without {name}: {remedy}") from None
 

@@ -39,7 +39,9 @@ LONGEST = 800  #: lines of a file of tests
 
 #: What runs reach beyond the folders that packages carry: texts, pictures, analyses.
 BEYOND = {
-    "module": {"analysis", "codegen", "toolchain", "verify"},
+    "analysis.experiments": {"model"},
+    "analysis.modes": {"show"},
+    "module": {"codegen", "toolchain", "verify"},
     "runtime.drawing": {"show"},
     "runtime.inputs": {"model"},
     "runtime.plotting": {"expr"},

@@ -153,8 +153,10 @@ def _unit_factor(given: Any, own: str) -> float:
     """What values in the unit that a table tells are multiplied by; 1 where it tells none."""
     if not given or given == own:
         return 1.0
-    from ..model.units import UnitError, read_unit
-
+    try:
+        from ..model.units import UnitError, read_unit
+    except ModuleNotFoundError:
+        raise ValueError(f"is in {given!r}; only eomgen itself converts units, so give it in {own!r}") from None
     try:
         unit, wanted = read_unit(str(given)), read_unit(own)
     except UnitError as error:

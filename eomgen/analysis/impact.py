@@ -29,11 +29,11 @@ from ..errors import (
 from ..runtime.argument_checks import read_flag, read_number, without_dots
 from ..runtime.columns import Columns, Residuals, describe
 from ..runtime.constrained import ProjectedStates
+from ..runtime.impacts.impact import SI, Gaps, Impact, Rough, allowance, apply, find_sliding, one_state
 from ..runtime.inputs import Forcing
 from ..runtime.layout import Layout
 from ..runtime.refusals import require_support
 from ..runtime.runs.events import WAIT, Events, RunEvent
-from ..runtime.runs.impact import SI, Gaps, Impact, Rough, allowance, apply, find_sliding, one_state
 from ..runtime.runs.integrate import header_of
 from ..runtime.runs.run_arguments import find_state, set_up
 from ..runtime.runs.simulate import simulate

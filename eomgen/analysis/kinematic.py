@@ -25,9 +25,9 @@ from ..errors import (
     too_large,
 )
 from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_size, unknown
+from ..runtime.prescribed.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
+from ..runtime.prescribed.kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
 from ..runtime.refusals import require_support
-from ..runtime.runs.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
-from ..runtime.runs.kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
 from ..runtime.trajectory import Start
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from .plot import Picture, check_columns, check_picture, find_paths, picture_opt
 if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..module import Module
-    from ..runtime.runs.kinematic import KinematicAnalysis
+    from ..runtime.prescribed.kinematic import KinematicAnalysis
     from ..runtime.trajectory import Trajectory
     from .energy import EnergyBalance
 

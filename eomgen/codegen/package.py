@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -45,9 +45,17 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 ANALYSES = ("sensitivities", "kinematic_analysis", "motion_range", "impact", "simulate_impacts", "linearize", "modes",
             "equilibrium", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces",
             "consistent")  # fmt: skip
-#: What packages in Python carry of eomgen, unchanged: whatever runs need, and the analyses if asked for.
-CARRIED = ("errors.py", "module.py", "base", "runtime")
-CARRIED_ANALYSES = ("analysis",)
+#: What packages in Python carry of eomgen, unchanged.
+CARRIED = ("errors.py", "module.py", "base", "runtime", "analysis")
+#: Of these the folders that not every package has, whole or not at all -> when: by its model, its target, --analyses.
+OPTIONAL: dict[str, Callable[[ModelInfo, str, bool], bool]] = {
+    "analysis/": lambda info, target, analyses: analyses,
+    "runtime/device/": lambda info, target, analyses: target == "cuda",
+    "runtime/impacts/": lambda info, target, analyses: (
+        analyses or bool(info.rigid_contacts) or any(event.get("restitution") is not None for event in info.events)
+    ),
+    "runtime/prescribed/": lambda info, target, analyses: analyses or not info.sizes.n_dof,
+}
 
 
 def emit_package(
@@ -127,30 +135,16 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
     """What is generated in Python besides the core, and what is carried of eomgen."""
-    carried = carry(
-        (*CARRIED, *(CARRIED_ANALYSES if context["analyses"] else ())),
-        _unused(context["metadata"], context["analyses"]),
-    )
+    carried = carry(CARRIED, context["metadata"], context["analyses"])
     names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
     own = context | {"folders": folders_of(carried), "compiled": True}
     return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **carried}
 
 
-def _unused(metadata: Mapping[str, Any], analyses: bool) -> tuple[str, ...]:
-    """Parts of ``runtime`` that no call of a package reaches: GPUs, and methods of runs that its model cannot have."""
-    info = ModelInfo.of(metadata)
-    impacts = analyses or any(event.get("restitution") is not None for event in info.events)
-    methods = {
-        "moreau": bool(info.rigid_contacts),
-        **dict.fromkeys(("kinematic", "followed_path"), analyses or not info.sizes.n_dof),
-        **dict.fromkeys(("impact", "impact_equations"), impacts),
-    }
-    return ("runtime/device", *(f"runtime/runs/{name}.py" for name, used in methods.items() if not used))
-
-
-def carry(names: Iterable[str], left_out: tuple[str, ...] = ()) -> dict[str, str]:
-    """Files and whole folders of eomgen, as they are, by their place in a package."""
-    root = Path(__file__).parents[1]
+def carry(names: Iterable[str], metadata: Mapping[str, Any], analyses: bool = False) -> dict[str, str]:
+    """Files and whole folders of eomgen, as they are, by their place in a package; of :data:`OPTIONAL` what is used."""
+    root, info = Path(__file__).parents[1], ModelInfo.of(metadata)
+    left_out = tuple(folder for folder, used in OPTIONAL.items() if not used(info, metadata["target"], analyses))
     files = [
         file for name in names for file in ([root / name] if name.endswith(".py") else (root / name).rglob("*.py"))
     ]

@@ -94,7 +94,7 @@ cdef int ask_for_inputs(void *stepper, double t, const double *x, double *u) noe
 
 
 cdef class RigidStepper:
-    """Steps of a mechanism with rigid contacts; see simulation/moreau.py.
+    """Steps of a mechanism with rigid contacts; see runtime/impacts/moreau.py.
 
     Parameters
     ----------

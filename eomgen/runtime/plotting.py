@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -305,12 +306,17 @@ def draw_panel(ax: Any, panel: Curves, below: bool = False) -> None:
 
 
 def printed_names(metadata: Mapping[str, Any], form: str = "mathtext") -> Callable[[str], str]:
-    """How names are printed: for Matplotlib, or as ``html``; a generated package brings these forms of its names."""
+    """How names are printed: for Matplotlib, or as ``html``; a generated package brings these forms of its names.
+
+    A package that reads a run of eomgen prints its names as they are.
+    """
     known = metadata.get("printed")
     if known is None:
-        notation = import_module("..expr.notation", __package__).Notation.of(metadata)
-        found: Callable[[str], str] = getattr(notation, form)
-        return found
+        with suppress(ModuleNotFoundError):
+            notation = import_module("..expr.notation", __package__).Notation.of(metadata)
+            found: Callable[[str], str] = getattr(notation, form)
+            return found
+        known = {form: {}}
     return lambda name: str(known[form].get(name, html_text(name) if form == "html" else name))
 
 

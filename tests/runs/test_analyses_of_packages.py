@@ -97,10 +97,17 @@ import numpy as np
 import servo, slider_crank
 import eomgen as eg
 
-try:
-    slider_crank.linearize()
-except slider_crank.EomgenError as error:
-    told = str(error)
+told = []
+for name in ("linearize", "kinematic_analysis", "verify"):
+    try:
+        getattr(slider_crank, name)
+    except slider_crank.EomgenError as error:
+        told.append(str(error))
+from slider_crank.runtime.plotting import printed_names
+from slider_crank.runtime.trajectory import load_trajectory
+read = load_trajectory("run.npz")
+label = read.plot("theta").get_ylabel()
+labels = [label, printed_names(read.metadata, "html")("theta<1"), printed_names(slider_crank.metadata)("theta")]
 ANALYSES = ("linearize", "equilibrium", "impact", "simulate_impacts", "sensitivities", "kinematic_analysis", "fit")
 assert not any(hasattr(one, name) for one in (slider_crank, slider_crank.module) for name in ANALYSES)
 m = eg.Module.of(slider_crank)
@@ -113,7 +120,8 @@ try:
     eg.Module.of(np)
 except eg.UsageError as error:
     refused = str(error)
-print(json.dumps([[np.asarray(one).tolist() for one in numbers], m.verify(states=2).ok, told, open_loop, refused]))
+numbers = [np.asarray(one).tolist() for one in numbers]
+print(json.dumps([numbers, m.verify(states=2).ok, told, open_loop, refused, labels]))
 """
 
 
@@ -123,17 +131,19 @@ def test_a_package_without_analyses_has_them_where_eomgen_is(tmp_path: Path) -> 
         done = run("generate", tmp_path / "model.yaml", "--out", tmp_path)
         assert done.code == 0, done.err
         built(tmp_path / model.name)
+    m = crank().compile(target="numpy")
+    m.simulate(0.1).save(tmp_path / "run.npz")
     words = [sys.executable, "-c", OF_PACKAGE]
     child = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert child.returncode == 0, child.stderr
-    (A, x, p), ok, told, open_loop, refused = json.loads(child.stdout.splitlines()[-1])
-    m = crank().compile(target="numpy")
+    (A, x, p), ok, told, open_loop, refused, labels = json.loads(child.stdout.splitlines()[-1])
     np.testing.assert_allclose(A, m.linearize().A, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(x, m.equilibrium({"theta": -1.5}).x, rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(p, m.bind(p={"r": 0.12}).p)
     assert ok
-    assert "--analyses" in told
-    assert "Module.of(slider_crank)" in told
+    assert ["--analyses" in one for one in told] == [True, True, False]
+    assert all("Module.of(slider_crank)" in one for one in told)
+    assert labels == ["theta (rad)", "theta&lt;1", "$\\theta$"]
     assert "s" in open_loop
     assert "no package" in refused
 

@@ -183,7 +183,7 @@ def cuda_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     facts = describe_device(program)
     context = context | {"facts": facts, "timed": TIMED_ON_DEVICE}
     init = render("cuda/__init__.py.j2", context)
-    carried = carry(CARRIED)
+    carried = carry(CARRIED, program.metadata)
     context |= {"folders": folders_of(carried), "requirements": (*context["requirements"], *CUDA_REQUIREMENTS)}
     return {
         "py.typed": "",

@@ -1,4 +1,4 @@
-/* Impulses of rigid contacts, and a step of a mechanism with them (eomgen/runtime/runs/moreau.py says the scheme).
+/* Impulses of rigid contacts, and a step of a mechanism with them (eomgen/runtime/impacts/moreau.py says the scheme).
 
    Of each contact the impulse P = (P_n, P_t) and the velocity y = c + W P, less what the normal one is to be, obey
 

@@ -138,7 +138,7 @@ class Events:
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
         if any(event.action == WAIT for event in self.model):
-            from .impact import strike_events
+            from ..impacts.impact import strike_events
 
             self._strike = strike_events
 

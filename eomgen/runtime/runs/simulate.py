@@ -223,7 +223,7 @@ def simulate(
         if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
             if module.layout.n_dof:
                 raise not_driven(module.layout)
-            from .kinematic import follow_drivers
+            from ..prescribed.kinematic import follow_drivers
 
             asked = {**limits, **others}
             motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, asked)
@@ -231,7 +231,7 @@ def simulate(
                 return motion
         if (isinstance(method, str) and method == "moreau") or module.info.rigid_only:
             require_rigid_contacts(module.layout)
-            from .moreau import step_rigidly
+            from ..impacts.moreau import step_rigidly
 
             asked = {**limits, "dense_output": dense_output, "controllers": controllers, **others}
             given = (module, span, initial, parameters, inputs, method, step, t_eval, events, progress, asked)
@@ -271,7 +271,7 @@ def simulate(
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
     if any(event.action == WAIT for event in watched.model) and not is_inner_run():
-        from .impact import describe_negative_gaps
+        from ..impacts.impact import describe_negative_gaps
 
         if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
             warnings.warn(words, stacklevel=calls_within() + 1)

@@ -33,11 +33,11 @@ from ..argument_checks import read_number, read_numbers
 from ..columns import Columns, Residuals, describe
 from ..inputs import Forcing
 from ..refusals import not_driven
+from ..runs.events import Events
+from ..runs.integrate import header_of, integrate
+from ..runs.run_arguments import ordered_times, set_up
 from ..trajectory import Span, Start, Trajectory, last_state
-from .events import Events
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
-from .integrate import header_of, integrate
-from .run_arguments import ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

@@ -58,11 +58,11 @@ from ..argument_checks import check_names, read_number, require_size, require_st
 from ..columns import Columns
 from ..inputs import Forcing
 from ..kernels import LazyCore, eager
+from ..runs.bound_run import watch_run
+from ..runs.events import Events, is_inner_run
+from ..runs.integrate import Solution, record
+from ..runs.run_arguments import check_step, deep_start, find_state, ordered_times, set_up
 from ..trajectory import Span, Start, Trajectory
-from .bound_run import watch_run
-from .events import Events, is_inner_run
-from .integrate import Solution, record
-from .run_arguments import check_step, deep_start, find_state, ordered_times, set_up
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
