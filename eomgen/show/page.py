@@ -45,7 +45,8 @@ class InlinePage:
 
     def _repr_html_(self) -> str:
         style = f"width:100%;height:{self.height}px;border:0"
-        return f'<iframe style="{style}" srcdoc="{escape(self.text, quote=True)}"></iframe>'
+        text = escape(self.text, quote=True).replace("\n", "&#10;")  # one line of a stored notebook
+        return f'<iframe style="{style}" srcdoc="{text}"></iframe>'
 
 
 @dataclass
