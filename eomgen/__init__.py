@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from .errors import ZenoError as ZenoError
     from .module import Module as Module
     from .runtime.inputs import Signal as Signal
-    from .runtime.trajectory import load_trajectory as load_trajectory
     from .runtime.trajectory import Trajectory as Trajectory
+    from .runtime.trajectory import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs

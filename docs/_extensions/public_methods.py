@@ -12,7 +12,6 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
 
 import eomgen
-import eomgen
 from eomgen.elements.constraints import CONSTRAINTS
 from eomgen.elements.forces import FORCES
 from eomgen.elements.joints import JOINTS

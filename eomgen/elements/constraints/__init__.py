@@ -2,8 +2,7 @@
 
 from ..element_type import Types
 from . import cams, constraint, drivers, gears, rolling, switching
-from .constraint import Condition, Constraint, ConstraintView
-from .constraint import Equation, Linear
+from .constraint import Condition, Constraint, ConstraintView, Equation, Linear
 from .drivers import CoordinateDriver, Driver
 from .gears import Gear, Planetary
 from .rolling import RollingDisc

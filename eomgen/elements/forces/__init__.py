@@ -2,15 +2,12 @@
 
 from ..element_type import Types
 from . import friction, muscle, normal_laws, springs, wheels
-from .springs import Actuator
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import ReactionFriction
-from .friction import Friction, LuGre
+from .friction import Friction, LuGre, ReactionFriction
 from .muscle import Muscle
 from .paths import JointCoordinate, Line, Path, Route, Turn
-from .springs import Damper, Spring
+from .springs import Actuator, Bushing, Damper, Spring
 from .wheels import Tyre
-from .springs import Bushing
 
 FORCES: Types = {}
 for _home in (springs, friction, normal_laws, muscle, wheels):
