@@ -227,7 +227,7 @@ class Module(BoundModel):
             from .toolchain.trusted_files import load_source
 
             core = load_source(f"{__package__}._{module.name}", file, Path(file).read_bytes())
-        return cls(core, module.p, module.u)
+        return cls(core, module.p, module.constant_inputs)
 
     if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
         simulate = _simulate

@@ -520,7 +520,7 @@ def sensitivities(
             S = find_along(run, partial(simulated, method=method), every, S0, trajectory.t, settings)
         if S is not None:
             return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held)
-    solver = choose_solver(method)
+    solver = choose_solver(method, "sensitivities")
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
     z0 = run.joined(x0, S0)

@@ -319,8 +319,8 @@ class Mechanism:
                 f"parameters.{p.name}",
                 "has no value",
                 f"give it one where it is declared: parameters: {{{p.name}: VALUE}} in a file, "
-                f'm.parameter("{p.name}", VALUE) or parameters= in Python; or by --set {p.name}=VALUE, of verbs that '
-                "have --set",
+                f'm.parameter("{p.name}", VALUE) in Python; or by m.add(FILE, {p.name}=VALUE) to a new model m, '
+                f"or by --set {p.name}=VALUE, of verbs that have --set",
                 "EG-MISSING",
             )
             for p in self.parameters

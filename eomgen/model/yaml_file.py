@@ -99,9 +99,8 @@ class Document:
         except MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             what = " ".join(part for part in (error.context, error.problem) if part)
-            raise self._stop(
-                mark.line + 1 if mark else 1, f"not YAML: {what}", "check indents, colons and brackets"
-            ) from None
+            remedy = "replace the tab by spaces" if r"'\t'" in what else "check indents, colons and brackets"
+            raise self._stop(mark.line + 1 if mark else 1, f"not YAML: {what}", remedy) from None
         except (YAMLError, RecursionError, ValueError) as error:
             what = str(getattr(error, "reason", "") or error).split("\n")[0]
             raise self._stop(_line_of(error, text), f"not YAML: {what}") from None

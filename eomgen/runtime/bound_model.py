@@ -69,7 +69,7 @@ class BoundModel:
     def __init__(self, core: Core, p: Any = None, u: Any = None) -> None:
         self.core = core
         self.layout = layout = Layout(core.metadata)
-        self._setup(core, layout, self._declared("parameter", p), self._declared("input", u))
+        self._setup(core, layout.without_signals(u), self._declared("parameter", p), self._declared("input", u))
 
     def _declared(self, what: str, given: Any) -> Any:
         layout = self.layout
@@ -125,7 +125,8 @@ class BoundModel:
         Parameters
         ----------
         p, u : mapping of str to float, or arrays (n_p,), (n_u,), optional
-            A mapping changes those it names; None keeps what is bound here.
+            A mapping changes those it names; None keeps what is bound here.  Inputs bound stay constant in runs, in
+            place of declared signals.
 
         Returns
         -------
@@ -139,16 +140,22 @@ class BoundModel:
         if p is None and u is None:
             return self
         layout = self.layout
-        return self.rebound(
-            layout.values("parameter", layout.p, p, self.p), layout.values("input", layout.u, u, self.u)
-        )
+        p, values = layout.values("parameter", layout.p, p, self.p), layout.values("input", layout.u, u, self.u)
+        return self.rebound(p, values, layout.without_signals(u))
 
-    def rebound(self, p: Array, u: Array) -> Self:
+    def rebound(self, p: Array, u: Array, layout: Layout | None = None) -> Self:
         """The same model with other parameters (n_p,), which are allowed, and inputs (n_u,)."""
         other = object.__new__(type(self))
-        other.core, other.layout, other.equations = self.core, self.layout, self.equations
-        other._setup(self.core, self.layout, p, u)
+        other.core, other.equations = self.core, self.equations
+        other._setup(self.core, layout or self.layout, p, u)
         return other
+
+    @property
+    def constant_inputs(self) -> dict[str, float]:
+        """The inputs without a declared signal, with which a copy of the model is made."""
+        return {
+            name: x for name, x in zip(self.u_names, self.u.tolist(), strict=True) if name not in self.layout.signals
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles hold where the compiled code lies and the values bound, not the code: see :mod:`.pickling`."""

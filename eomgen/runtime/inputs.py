@@ -320,7 +320,7 @@ class Forcing:
         values = self.values = {name: self._read(name, value) for name, value in given.items()}
         self.derived = fill_rates(layout, values, derive) if layout.input_rates else {}
         values |= {name: value for name, (_, _, value) in self.derived.items()}
-        for name, tape in layout.info.signals.items():
+        for name, tape in layout.signals.items():
             if name not in values:
                 slopes = layout.info.signal_slopes[name]
                 values[name] = Expression(DECLARED, tape, lambda slopes=slopes: slopes)  # type: ignore[misc]
@@ -575,7 +575,7 @@ def fill_rates(
         As :func:`derive`.
     """
     found: dict[str, tuple[str, int, Any]] = {}
-    signals = layout.info.signals
+    signals = layout.signals
     for first, rates in layout.input_rates.items():
         last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
         led = first in given or first in signals or first not in layout.u

@@ -300,6 +300,7 @@ class Layout:
         }
         #: places in u of the inputs on which constraints depend
         self.constraint_inputs = [self.u.index(name) for name in info.constraint_inputs]
+        self.signals = info.signals  #: declared for inputs that are not bound: name -> tape
         self.start_parameters = list(info.start_parameters)
         self.independent = np.array(info.independent, dtype=np.intp)
         self.rows = np.array(info.independent_rows, dtype=np.intp)
@@ -351,6 +352,16 @@ class Layout:
         if self.general_rates:
             found.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), found.length)
         found.loop_scales = np.where(self.loop_lengths, found.length, 1.0)
+        return found
+
+    def without_signals(self, u: object) -> Layout:
+        """The same where inputs that are bound, those of a mapping or all of an array, have no declared signals."""
+        if u is None or not self.signals:
+            return self
+        bound = set(without_dots(u, self.instances) if isinstance(u, Mapping) else self.u)
+        bound |= {rate for name in bound for rate, _ in self.input_rates.get(name, ())}
+        found = copy(self)
+        found.signals = {name: tape for name, tape in self.signals.items() if name not in bound}
         return found
 
     def require_minimal_form(self) -> None:

@@ -34,10 +34,10 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
     if isinstance(module.core, LazyCore):
         further: dict[str, Any] = module.core.further
         late = module.core.names, {group: (made.__name__, str(made.__file__)) for group, made in further.items()}
-    return restore, (type(module), name, str(file), module.p, module.u, late)
+    return restore, (type(module), name, str(file), module.p, module.constant_inputs, late)
 
 
-def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> Any:
+def restore(kind: type[Any], name: str, file: str, p: Array, u: dict[str, float], late: Late | None = None) -> Any:
     """The module of a pickle, with the rarer kernels where they had been made."""
     core: Any = _find_core(name, file)
     if late is None:

@@ -495,6 +495,7 @@ class Page {
     for (const name of columns) for (const k of [1, 2]) option(`choice${k}`, name, label(name));
     if (columns.length > 1) [get("choice1").value, get("choice2").value] = columns[0] === "energies" ? [columns[1], columns[0]] : columns;
     get("plots").hidden = !columns.length;
+    get("side").hidden = !model && !columns.length && !get("equations");
     for (const factor of [0.1, 0.25, 0.5, 1, 2, 4]) option("speed", factor, `\u00d7${shown(factor * (model ? 1 : data.motion.pace), 2)}`);
     get("speed").value = 1;
     get("named").hidden = !data.labels.length;

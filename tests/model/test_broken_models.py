@@ -132,6 +132,9 @@ def test_a_parameter_may_lack_a_value_until_it_is_needed(tmp_path: Path) -> None
     first, second = caught.value.problems
     assert str(first).startswith(f"{tmp_path / 'model.yaml'}:5: parameters.l: has no value; ")
     assert second.path == "parameters.m_c"
+    whole = eg.Model("whole")
+    whole.add(tmp_path / "model.yaml", l=0.4, m_c=1.0)
+    assert 0.4 in whole.compile(target="numpy").p
 
 
 # -- in Python --------------------------------------------------------------------------------------------------------
@@ -221,7 +224,7 @@ REFUSED = {
     "two documents": ("name: a\n---\nname: b\n", "EG-FILE-DAMAGED :3: second"),
     "empty": ("# nothing\n", "EG-FILE-DAMAGED :1: empty"),
     "list": ("- a\n", "EG-FILE-DAMAGED :1: mapping"),
-    "tab": ("name: a\n\tdoc: b\n", "EG-FILE-DAMAGED :2: \\t"),
+    "tab": ("name: a\n\tdoc: b\n", "EG-FILE-DAMAGED :2: \\t tab spaces"),
     "open quote": ('name: a\ndoc: "b\n', "EG-FILE-DAMAGED :3: YAML"),
     "control character": ("name: a\ndoc: \x01\n", "EG-FILE-DAMAGED :2: YAML"),
     "section of the wrong kind": ("name: a\nbodies: [b, c]\n", "EG-TYPE :2: bodies names"),

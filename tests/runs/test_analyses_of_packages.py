@@ -116,6 +116,8 @@ try:
 except eg.AssemblyError as error:
     open_loop = str(error)
 numbers = [m.linearize().A, m.equilibrium({"theta": -1.5}).x, eg.Module.of(slider_crank.bind(p={"r": 0.12})).p]
+still = eg.Module.of(slider_crank.bind(u={"push": 0.1})).simulate(0.1).metadata["inputs"]["push"]
+assert (still, m.simulate(0.1).metadata["inputs"]["push"]) == (0.1, "declared by the model")
 try:
     eg.Module.of(np)
 except eg.UsageError as error:

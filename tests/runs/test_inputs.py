@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -124,11 +125,32 @@ def test_signals_that_the_model_declares(target: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(stiffer["s"], np.cos(3 * stiffer.t), atol=1e-5)
     free = mod.simulate((0, 3), inputs={"u": 0.0}, method=method)
     np.testing.assert_allclose(free["s"], 1.0)
+    assert free.metadata["inputs"] == {"u": 0.0}
+    for still in (bound := mod.bind(u={"u": 0.0}), mod.bind(u=[0.0]), bound.bind(p={"k": 9.0})):
+        run = still.simulate((0, 3), method=method)
+        np.testing.assert_allclose(run["s"], 1.0)
+        assert run.metadata["inputs"] == {"u": 0.0}
+        np.testing.assert_allclose(still.simulate_many(3, count=1, method=method)["s"], 1.0)
+        np.testing.assert_allclose(still.sensitivities(["s"], 3)["s", "s"], 1.0)
+    many = mod.bind(p={"k": 4.0}).simulate_many(3, count=1, method="LSODA", **TIGHT)
+    np.testing.assert_allclose(many["s"], np.cos(6.0), atol=1e-8)
+    if target == "cython":
+        loaded = [pickle.loads(pickle.dumps(one)).simulate((0, 3))["s"][-1] for one in (bound, mod)]
+        np.testing.assert_allclose(loaded, [1.0, np.cos(6.0)], atol=1e-6)
     other = eg.Model("cart")
     other.prismatic("J", other.ground, other.body("cart", mass=1.0), axis="x", coordinate="s")
     other.input("w")
     other.input("u", signal="w + s_ddot")
     refuses("EG-REFERENCE inputs.u.signal s_ddot", other.compile)
+
+
+def test_a_bound_length_wins_over_its_signal_where_it_drives_the_motion() -> None:
+    m = eg.Model("hoist")
+    m.prismatic("J", m.ground, m.body("load", mass=1.0), axis="y", coordinate="l")
+    m.driver("rope", "l", value=m.input("L", 3.0, signal="3 - 0.5*(1 - cos(t))"))
+    mod = m.compile(target="numpy")
+    np.testing.assert_allclose(mod.simulate(3)["l"][-1], 2.5 + 0.5 * np.cos(3.0), atol=1e-8)
+    np.testing.assert_allclose(mod.bind(u={"L": 2.5}).simulate(3, {"l": 2.5})["l"], 2.5)
 
 
 @pytest.mark.parametrize(

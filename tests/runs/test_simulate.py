@@ -228,6 +228,9 @@ def test_without_scipy_the_message_says_what_to_install() -> None:
         "try:\n    m.simulate(1.0, method='LSODA')\n"
         "except eg.MissingDependencyError as error:\n    assert 'pip install scipy' in str(error)\n"
         "else:\n    raise SystemExit('no error')\n"
+        "try:\n    m.sensitivities(['r'], 0.1)\n"
+        "except eg.MissingDependencyError as error:\n    assert 'sensitivities needs scipy' in str(error)\n"
+        "else:\n    raise SystemExit('no error')\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

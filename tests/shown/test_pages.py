@@ -279,6 +279,18 @@ def test_a_page_plays_steps_and_fits_a_telephone(page: Path, tmp_path: Path) -> 
         assert (browser.complaints, browser.requests) == ([], [])
 
 
+@pytest.mark.needs("chromium")
+@pytest.mark.slow
+def test_a_film_has_a_side_panel_only_for_its_curves(tmp_path: Path) -> None:
+    run = slider_crank().simulate(0.2)
+    with Browser(tmp_path / "profile") as browser:
+        for plot, empty in (("theta", False), ((), True)):
+            browser.open(run.animate(tmp_path / f"{empty}.html", plot=plot).as_uri())
+            browser.wait_for("window.page !== undefined && page.playing")
+            assert browser.evaluate("get('side').hidden") is empty
+            assert (browser.evaluate("get('stage').clientWidth") == 900) is empty
+
+
 def test_names_of_other_files_are_refused(tmp_path: Path) -> None:
     for name in ("it.gif", "it.txt", "it"):
         with pytest.raises(eg.UsageError, match="must end in .html"):

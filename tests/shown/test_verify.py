@@ -60,7 +60,7 @@ def orifice() -> eg.Model:
 def lift() -> eg.Model:
     """Two sliders tied by an equation that an input moves."""
     model = eg.Model("lift")
-    model.input("l", 0.3)
+    model.input("l", 0.3, signal="0.3 + 0.2*sin(t)")
     model.prismatic("X", model.ground, model.body("b", mass=1.0), axis="x", coordinate="x")
     model.prismatic("S", model.ground, model.body("c", mass=1.0), axis="x", coordinate="s")
     model.actuator("F", "X", "-4*x")

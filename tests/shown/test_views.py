@@ -231,6 +231,8 @@ def test_a_view_shows_its_values_and_its_equations() -> None:
     assert "<mn>9.81</mn>" in page
     assert "<mn>4.905</mn>" in page
     assert r"\frac{1}{4} m \ddot{\theta} = -4.905 m \sin \theta" in view._repr_latex_()
+    m.actuator("motor", "pin", "where(theta > 0.1, 1, 0)")
+    assert "<mtext>if&#160;</mtext>" in m.derive()._repr_html_()  # MathML drops plain blanks at ends of a text
     chain = equations.subs({"l": "2*r_0"}).subs({"r_0": sp.Rational(1, 8)})
     assert "  with l = 2 r₀, r₀ = 1/8" in str(chain).splitlines()
     still = equations.subs({"theta_ddot": 3, "theta": "pi/2"})

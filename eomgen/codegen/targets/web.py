@@ -255,7 +255,7 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         limits, reach = module.limits.get(layout.q[k], {}), 0.5 * size if layout.unit(layout.q[k]) == "m" else np.pi
         ends = [limits.get("lower", x0[k] - reach), limits.get("upper", x0[k] + reach)]
         ranges[layout.q[k]] = [float(min(ends[0], x0[k])), float(max(ends[1], x0[k]))]
-    signals = {layout.u.index(name): ["as declared", *_tape(tape)] for name, tape in info.signals.items()
+    signals = {layout.u.index(name): ["as declared", *_tape(tape)] for name, tape in layout.signals.items()
                if name in layout.u}  # fmt: skip
     try:
         found = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []

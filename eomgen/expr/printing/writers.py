@@ -390,7 +390,7 @@ class _MathMLWriter(FormulaWriter):
     def cases(self, formula: tree.PiecewiseOf) -> str:
         rows = []
         for value, when in formula.branches:
-            held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if </mtext>", self.write(when))
+            held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if&#160;</mtext>", self.write(when))
             rows.append([self.write(value), held])
         return row("<mo>{</mo>", table(rows, "text-align:left"))
 

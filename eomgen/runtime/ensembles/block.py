@@ -278,7 +278,9 @@ def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: 
     status, samples = block.status, block.samples
     for k in range(len(x0)):
         try:
-            bound = module.bind(*(a if a.ndim == 1 else a[k] for a in (p, u)))
+            own_p, own_u = (a if a.ndim == 1 else a[k] for a in (p, u))
+            module.layout.require_allowed(own_p)
+            bound = module.rebound(own_p, own_u)
         except UsageError as error:
             status[k], block.words[k] = BAD_PARAMETERS, str(error)
             continue

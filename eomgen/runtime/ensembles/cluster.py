@@ -38,7 +38,7 @@ class Handle(NamedTuple):
     digest: str  #: SHA-256 of that file
     recipe: str  #: JSON of name, sources, options and needed features of the processor; empty of an installed package
     p: Array
-    u: Array
+    u: dict[str, float]
 
     def open(self) -> BoundModel:
         """The module: from its file if the same is here and for this processor, else built from the sources, or
@@ -59,7 +59,9 @@ def describe(module: BoundModel) -> Handle:
     if not file.is_file():
         raise cannot(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     core.take_lanes()  # here, once, so that workers find them beside the module
-    return Handle(type(module), core.__name__, str(file), _digest(file), _recipe(file), module.p, module.u)
+    return Handle(
+        type(module), core.__name__, str(file), _digest(file), _recipe(file), module.p, module.constant_inputs
+    )
 
 
 def _digest(file: Path) -> str:

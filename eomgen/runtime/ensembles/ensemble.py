@@ -180,7 +180,7 @@ class Ensemble(Result):
             initial: Any = varied.states[:, k]
         else:
             initial = {name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()} or None
-        declared = set(self._module.info.signals)
+        declared = set(self._module.layout.signals)
         constants = dict(zip(self._module.u_names, column["u"].tolist(), strict=True))
         rates = self._module.layout.input_rates
         declared |= {rate for name in self._plan.inputs for rate, _ in rates.get(name, ())}

@@ -72,9 +72,9 @@ class Joined:
         return np.empty((0, 0)) if result is None else result
 
 
-def choose_solver(method: Any) -> Any:
+def choose_solver(method: Any, purpose: str = "simulate") -> Any:
     """SciPy's class for a name, or the OdeSolver subclass itself."""
-    scipy = require("scipy.integrate", "scipy", "simulate")
+    scipy = require("scipy.integrate", "scipy", purpose)
     if isinstance(method, str):
         if method not in METHODS:
             raise unknown("method", method, NAMES)

@@ -86,7 +86,7 @@ class Integrator:
             self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
             self._compiled.make_stall_check = self._stall_check
         else:
-            choose_solver(method)
+            choose_solver(method, "integrator")
 
     @both_names
     def __call__(
