@@ -21,7 +21,7 @@ from ..base.texts import angle_in_degrees
 from ..errors import calls_within, ill_placed, ill_shaped, no_number
 from .argument_checks import both_names, read_number, read_numbers, require_mapping
 from .initial import Given, Initial
-from .kernels import Kernels, public_call
+from .kernels import Kernels, public_call, reduce
 from .layout import Layout
 from .refusals import require_support
 
@@ -158,9 +158,7 @@ class BoundModel:
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickles hold where the compiled code lies and the values bound, not the code: see :mod:`.pickling`."""
-        from .pickling import reduce
-
+        """Pickles hold where the compiled code lies and the values bound, not the code."""
         return reduce(self)
 
     @property

@@ -17,8 +17,7 @@ from ...base.files import MANIFEST
 from ...base.value_rules import as_count
 from ...errors import MissingDependencyError, ToolchainError, UsageError, bad_file, cannot, ill_typed
 from ..argument_checks import require
-from ..kernels import eager
-from ..pickling import restore
+from ..kernels import eager, restore
 from .block import LOST, MEANING, Custom, Kept, Plan, Reduction, RunBlock, Runs, keep, run_block
 from .variations import Variations
 
