@@ -80,10 +80,20 @@ def require_wheel(target: str) -> None:
 def build_wheel(folder: Path | str, directory: Path | str | None = None) -> BuiltWheel:
     """Build the wheel of a generated package by setuptools, as ``pip wheel`` does, with what is installed here.
 
-    The folder is that of a package of target ``cython``; the wheel goes beside it, or into a directory, in the place of
-    one of its name.  It is for all CPythons from 3.11 on (abi3), and for all Linux systems with the C library that
-    auditwheel finds sufficient, where that is installed.  The same package, compiler and versions give the same bytes
-    (SOURCE_DATE_EPOCH sets the time of its files).
+    The same package, compiler and versions give the same bytes (SOURCE_DATE_EPOCH sets the time of its files).
+
+    Parameters
+    ----------
+    folder : Path or str
+        Of the package, of target ``cython``.
+    directory : Path or str, optional
+        Where the wheel goes; beside the folder by default.  A file of its name is replaced.
+
+    Returns
+    -------
+    BuiltWheel
+        For all CPythons from 3.11 on (abi3), and for all Linux systems with the C library that auditwheel finds
+        sufficient, where that is installed.
 
     Raises
     ------

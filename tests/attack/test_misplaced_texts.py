@@ -174,7 +174,8 @@ def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Pa
         # in a module what lies in several files is not linked by name, nor are static functions of the solvers
         if target == "c" and file.suffix in (".c", ".h") and file.name != "eomgen_solvers.c":
             bare = re.sub(r'/\*.*?\*/|"(\\.|[^"\\\n])*"', " ", file.read_text(), flags=re.DOTALL)
-            bare = re.sub(r"typedef struct \{.*?\}|->\w+", " ", bare, flags=re.DOTALL)  # members are no names
+            # members are no names, nor what the list of the solvers joins with "eom_"
+            bare = re.sub(r"typedef struct \{.*?\}|->\w+|\bX\(\w+\)", " ", bare, flags=re.DOTALL)
             there |= set(re.findall(r"[A-Za-z_]\w*", bare))
     own = {word for word in there if WORD in word.lower()}
     assert len(own) > 2
