@@ -226,17 +226,3 @@ def test_tables_of_runs_and_units_that_tables_tell(module: eg.Module) -> None:
     dates = run.to_pandas().set_index(pd.to_datetime(TIMES, unit="s"))
     for data, message in ((wrong, "EG-TYPE kg rad"), (dates, "EG-TYPE t")):
         refuses(message, module.fit, data, ["m3"], initial=START, inputs=DRIVE)
-
-
-def test_a_fit_by_taylor_series() -> None:
-    """SciPy has no such method: derivatives go along the steps of another, or are integrated by it."""
-    m = eg.Model("stiffening")
-    m.parameter("k", 40.0)
-    m.body("body", mass=1.0)
-    m.prismatic("z", m.ground, "body", axis="x")
-    m.actuator("spring", "z", value="-k*z - z**3")
-    m.initial(z=1.0)
-    module = m.compile(**IN_C)
-    run = module.simulate(2.0, parameters={"k": 37.0}, t_eval=TIMES)
-    fit = module.fit({"t": TIMES, "z": run["z"]}, {"k": 40.0}, method="Taylor")
-    assert abs(fit.values["k"] - 37.0) < 1e-6

@@ -126,6 +126,14 @@ def test_the_error_follows_the_tolerance_in_few_steps(swing: Any, rtol: float) -
     assert len(run.t) < 140
 
 
+def test_a_fit_by_series_finds_a_length(swing: Any) -> None:
+    """SciPy has no such method: derivatives go along the steps of another, or are integrated by it."""
+    times = np.linspace(0.0, 1.5, 31)
+    run = swing.simulate(1.5, START, parameters={"l2": 0.9}, t_eval=times)
+    fit = swing.fit({"t": times, "theta2": run["theta2"]}, {"l2": 1.0}, initial=START, method="Taylor")
+    assert abs(fit.values["l2"] - 0.9) < 1e-6
+
+
 def test_solve_ivp_takes_it(swing: Any) -> None:
     found = solve_ivp(
         swing.rhs, (0, 3), START, method=swing.Taylor, rtol=1e-11, atol=1e-13, dense_output=True,
