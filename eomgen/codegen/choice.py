@@ -42,7 +42,7 @@ class Choice:
 
     def __str__(self) -> str:
         counts = ", ".join(f"{method} {n}" for method, n in self.operations.items())
-        return f"{self.method} chosen; operations of the right-hand side: {counts}"
+        return f"{self.method} chosen; right-hand side: {counts} operations"
 
 
 def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
