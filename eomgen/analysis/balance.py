@@ -153,10 +153,10 @@ def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array
     else:
         dq = np.asarray(space.rates(q, dz @ space.velocities(q, unit)) + space.stretch(q, unit))
     dq = np.hstack([dq, np.zeros((n_q, layout.n_v))])
-    found = np.vstack([dq, _velocity_change(layout, x, jacobian[:n_q], dq)])
+    result = np.vstack([dq, _velocity_change(layout, x, jacobian[:n_q], dq)])
     own = slice(layout.n_x - len(layout.states), None)
-    found[own, own] = np.eye(len(layout.states))
-    return found
+    result[own, own] = np.eye(len(layout.states))
+    return result
 
 
 class Balance(NamedTuple):

@@ -89,8 +89,8 @@ class BaseFit(Result):
         rows = []
         for name, value in self.values.items():
             error = self.errors[name]
-            told = f"+- {error:.2g}" if np.isfinite(error) else "not determined by the motion"
-            rows.append((f"{value:.6g}", f"{told}   {texts.get(name, name)}"))
+            determined = f"+- {error:.2g}" if np.isfinite(error) else "not determined by the motion"
+            rows.append((f"{value:.6g}", f"{determined}   {texts.get(name, name)}"))
         noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
         return [*rows, ("noise", noise), ("condition", f"{self.condition:.3g}")]
 
@@ -176,8 +176,8 @@ class _Data:
     def sizes(self) -> Array:
         """What each force is like, 1 for one that vanishes."""
         squares = np.where(self.there, self.target, 0.0) ** 2
-        found = np.sqrt(squares.sum(axis=1) / np.maximum(1, self.there.sum(axis=1)))
-        return np.where(found > 0.0, found, 1.0)
+        result = np.sqrt(squares.sum(axis=1) / np.maximum(1, self.there.sum(axis=1)))
+        return np.where(result > 0.0, result, 1.0)
 
     def residuals(self, beta: Array) -> Array:
         """Measured less computed."""
@@ -197,10 +197,10 @@ class _Data:
         sizes = np.linalg.norm(rows, axis=0)
         scale = np.where(sizes > 0.0, sizes, 1.0)
         U, s, Vt = algebra.svd(rows / scale, full_matrices=False)
-        told = s > IDENTIFIED * s[0]
-        beta = (Vt[told].T @ ((U[:, told].T @ right) / s[told])) / scale
-        covariance = (Vt[told].T / s[told] ** 2) @ Vt[told] / np.outer(scale, scale)
-        weak = (np.abs(Vt[~told]) > np.sqrt(IDENTIFIED)).any(axis=0)
+        determined = s > IDENTIFIED * s[0]
+        beta = (Vt[determined].T @ ((U[:, determined].T @ right) / s[determined])) / scale
+        covariance = (Vt[determined].T / s[determined] ** 2) @ Vt[determined] / np.outer(scale, scale)
+        weak = (np.abs(Vt[~determined]) > np.sqrt(IDENTIFIED)).any(axis=0)
         covariance[weak], covariance[:, weak] = np.nan, np.nan
         return beta, covariance, float(s[0] / s[-1]) if s[-1] > 0.0 else float("inf"), weak
 
@@ -413,10 +413,10 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     others = [k for k in np.flatnonzero(seen) if k not in set(chosen)]
     if others and chosen:
         A, B = W[:, chosen] / sizes[chosen], W[:, others] / sizes[others]
-        found = algebra.lstsq(A, B)
-        found[np.abs(found) < ROUNDED_COEFFICIENT] = 0.0
-        found *= sizes[others] / sizes[chosen][:, None]
-        combination[:, others] = _rounded(found)
+        result = algebra.lstsq(A, B)
+        result[np.abs(result) < ROUNDED_COEFFICIENT] = 0.0
+        result *= sizes[others] / sizes[chosen][:, None]
+        combination[:, others] = _rounded(result)
     return BaseParameters(
         module,
         tuple(standard[k] for k in chosen),
@@ -435,10 +435,10 @@ def _typical(sizes: Array) -> Array:
     return np.tile(np.concatenate(parts), len(bodies))
 
 
-def _rounded(found: Array) -> Array:
+def _rounded(result: Array) -> Array:
     """Whole numbers where only rounding parts an entry from one."""
-    whole = np.round(found)
-    return np.where((np.abs(found - whole) < ROUNDED_COEFFICIENT) & (whole != 0.0), whole, found)
+    whole = np.round(result)
+    return np.where((np.abs(result - whole) < ROUNDED_COEFFICIENT) & (whole != 0.0), whole, result)
 
 
 def _independent(W: Array, sizes: Array, least: float) -> tuple[list[int], float]:

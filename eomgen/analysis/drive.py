@@ -140,13 +140,13 @@ def actuator_forces(
     for k, B in enumerate(bases):
         A = B.T @ S[:, :, k]
         want = B.T @ (needed[:, k] + S[:, :, k] @ base)
-        found = _solve(A, want, weights)
-        left = want - A @ found
+        result = _solve(A, want, weights)
+        left = want - A @ result
         if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), TINY):
             raise UsageError(
                 _out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None), code="EG-UNDETERMINED"
             )
-        forces[:, k] = found
+        forces[:, k] = result
     _check_inputs(states, names, accelerations, forces, bases, S)
     rest = needed - np.einsum("jik,ik->jk", S, forces - base[:, None])
     multipliers = solve_multipliers(C_q, rest, layout.scales)

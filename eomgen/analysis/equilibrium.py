@@ -71,9 +71,9 @@ class Equilibrium(Result):
     stability: str
     steps: int
 
-    def __init__(self, module: BoundModel, t: float, x: Array, found: dict[str, Any]) -> None:
+    def __init__(self, module: BoundModel, t: float, x: Array, result: dict[str, Any]) -> None:
         self.module, self.t, self.x, self.q = module, t, x, x[: module.n_q]
-        vars(self).update(found)
+        vars(self).update(result)
 
     def __getitem__(self, name: str) -> float:
         values, name = {**self.coordinates, **self.states, **self.unknowns}, self.module.layout.plain(name)
@@ -110,7 +110,7 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     layout = module.layout
     held = search.gradients(module, q) if search.supported else None
     here = balance_forces(module, t, q, s, held)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
         "states": dict(zip(layout.states, s.tolist(), strict=True)),
         "unknowns": dict(zip(search.names, point.unknowns.tolist(), strict=True)),
@@ -121,19 +121,19 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     }
     if held is None:
         linear = linearize(module, here.x, t)
-        found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
+        result |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
         free = balance_forces(module, t, q, s)
         pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
         rows = search.rows_to_hold(module, q)
-        found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
+        result["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A, second = _motion_with_holds(search, module, here, t)
         if second is None:
             stability = stability_of_matrix(A, error=DIFFERENCES)
         else:
             stability = verdict(second, A, error=DIFFERENCES)
-        found |= {"eigenvalues": np.sort_complex(algebra.eigvals(A)), "stability": stability}
-    return Equilibrium(module, t, here.x, found)
+        result |= {"eigenvalues": np.sort_complex(algebra.eigvals(A)), "stability": stability}
+    return Equilibrium(module, t, here.x, result)
 
 
 def _motion_with_holds(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:

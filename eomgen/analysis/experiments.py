@@ -50,15 +50,15 @@ def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -
     starts, driven = (
         _one_each(what, x, len(given), several, problems) for what, x in (("initial", initial), ("inputs", inputs))
     )
-    found = []
+    result = []
     for k, one in enumerate(given):
         where = f"data[{k}]" if several else "data"
         read = _read(module, where, one, problems)
         if read is not None:
-            found.append(Experiment(*read, starts[k], driven[k]))
+            result.append(Experiment(*read, starts[k], driven[k]))
     if problems:
         raise ill_typed("; ".join(problems))
-    return found
+    return result
 
 
 def _one_each(what: str, given: Any, count: int, several: bool, problems: list[str]) -> list[Any]:
@@ -114,8 +114,8 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     elif hasattr(data, "columns") and hasattr(data, "index"):  # a pandas DataFrame
         given = {str(name): data[name] for name in data.columns}
         given = given if TIME in given else {TIME: data.index, **given}
-        told = data.attrs.get("units")
-        units = dict(told) if isinstance(told, Mapping) else {}
+        units_of_data = data.attrs.get("units")
+        units = dict(units_of_data) if isinstance(units_of_data, Mapping) else {}
     elif isinstance(data, Mapping):
         given = {str(name): values for name, values in data.items()}
     else:
@@ -127,13 +127,13 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     states = [name for name in module.x_names if name in given]
     if states and getattr(data, "attrs", {}).get("model") == module.name:  # the table of a run: as of the run itself
         given = {name: values for name, values in given.items() if name in (TIME, *states)}
-    found = {}
+    result = {}
     for name, values in given.items():
         try:
-            found[name] = _numbers(values) * _unit_factor(units.get(name), module.layout.unit(name))
+            result[name] = _numbers(values) * _unit_factor(units.get(name), module.layout.unit(name))
         except (TypeError, ValueError) as error:
             problems.append(f"{where}: {name} {error}")
-    return found
+    return result
 
 
 def _numbers(values: Any) -> Array:
@@ -177,8 +177,8 @@ def read_sigma(given: Any, names: Sequence[str]) -> dict[str, float] | None:
     missing = [name for name in names if name not in table]
     if missing:
         raise incomplete(f"sigma lacks {', '.join(missing)}; give a standard deviation for every measured column")
-    found = {name: float(read_numbers(f"sigma of {name}", table[name])) for name in names}
-    for name, value in found.items():
+    result = {name: float(read_numbers(f"sigma of {name}", table[name])) for name in names}
+    for name, value in result.items():
         if not value > 0.0:
             raise off_range(f"sigma of {name} must be greater than 0, not {value:g}")
-    return found
+    return result

@@ -63,7 +63,7 @@ class Fit(Result):
     )
 
     def __init__(
-        self, problem: Any, values: Array, jacobian: Array, limits: tuple[Array, Array], found: Any, known: bool
+        self, problem: Any, values: Array, jacobian: Array, limits: tuple[Array, Array], result: Any, known: bool
     ) -> None:
         self._problem, self._values, self._jacobian = problem, values, jacobian
         self.names: tuple[str, ...] = problem.names
@@ -73,17 +73,17 @@ class Fit(Result):
         self.residuals: Array = problem.residuals(values)
         self.cost = 0.5 * float(self.residuals @ self.residuals)
         self.degrees_of_freedom = len(self.residuals) - len(self.names)
-        self.evaluations, self.success, self.message = int(found.nfev), bool(found.success), str(found.message)
-        active = np.asarray(found.active_mask, dtype=int) != 0
+        self.evaluations, self.success, self.message = int(result.nfev), bool(result.success), str(result.message)
+        active = np.asarray(result.active_mask, dtype=int) != 0
         self.at_bounds = tuple(name for name, at in zip(self.names, active, strict=True) if at)
         self._low, self._high = limits
         self.covariance, self.undetermined = self._certainty(active)
         with np.errstate(invalid="ignore"):
             spread = np.sqrt(np.diag(self.covariance))
             self.correlation = self.covariance / np.outer(spread, spread)
-        told = {name for direction in self.undetermined for name in direction}
+        note = {name for direction in self.undetermined for name in direction}
         self.errors = {
-            name: float("inf") if name in told else float(error) for name, error in zip(self.names, spread, strict=True)
+            name: float("inf") if name in note else float(error) for name, error in zip(self.names, spread, strict=True)
         }
 
     def _certainty(self, active: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Array, list[dict[str, float]]]:
@@ -175,13 +175,13 @@ class Fit(Result):
         for name, value in self.values.items():
             error = self.errors[name]
             if name in self.at_bounds:
-                told = "at its bound"
+                note = "at its bound"
             elif not np.isfinite(error):
-                told = "not determined by the data"
+                note = "not determined by the data"
             else:
                 part = f" ({100.0 * error / abs(value):.2g} %)" if value else ""
-                told = f"+- {error:.2g}{part}"
-            rows.append((name, f"{value:.7g}  {told}"))
+                note = f"+- {error:.2g}{part}"
+            rows.append((name, f"{value:.7g}  {note}"))
         noise = ", ".join(f"{name} {x:.3g}" for name, x in self.sigma.items())
         rows.append(("noise" if self.sigma_given else "noise found", noise))
         rows.append(("residuals", f"{len(self.residuals)}, chi^2 per degree of freedom {self.reduced_chi_squared:.4g}"))
@@ -281,20 +281,20 @@ def fit(
     if count <= len(problem.names):
         raise ill_shaped(f"there are {count} measured values, and {len(problem.names)} unknowns; give more data")
     values: Array = problem.start
-    found: Any = None
+    result: Any = None
     problem.sigma = known or {name: problem.spread(name) for name in columns}
-    problem.residuals(values, told=True)
+    problem.residuals(values, note=True)
     for _ in range(1 if known else ROUNDS):
-        if found is not None:
+        if result is not None:
             problem.sigma = {name: problem.noise(values, name) for name in columns}
         jac = problem.jacobian if derivatives == "exact" else "2-point"
-        found = least_squares(problem.residuals, values, jac=jac, bounds=limits, x_scale="jac", **options)
-        values = found.x
+        result = least_squares(problem.residuals, values, jac=jac, bounds=limits, x_scale="jac", **options)
+        values = result.x
     if options.get("loss", "linear") != "linear":  # SciPy weights its derivatives by what the loss takes off
-        return Fit(problem, values, np.asarray(found.jac), limits, found, known is not None)
+        return Fit(problem, values, np.asarray(result.jac), limits, result, known is not None)
     if not known:
         problem.sigma = {name: problem.noise(values, name) for name in columns}
-    return Fit(problem, values, problem.jacobian(values), limits, found, known is not None)
+    return Fit(problem, values, problem.jacobian(values), limits, result, known is not None)
 
 
 class _Problem:
@@ -374,7 +374,7 @@ class _Problem:
         with silent():
             return simulate(self.module, **self.arguments(values, one))
 
-    def residuals(self, values: Array, told: bool = False) -> Array:
+    def residuals(self, values: Array, note: bool = False) -> Array:
         """(run - data) / sigma where something was measured; infinite where there is no run, unless that is told."""
         parts = []
         for one in self.experiments:
@@ -382,13 +382,13 @@ class _Problem:
                 run = self.run(values, one)
                 complete = len(run.t) == len(one.t)
             except (SimulationError, ParameterError):
-                if told:
+                if note:
                     raise
                 complete = False
             for name, measured in one.columns.items():
                 there = np.isfinite(measured)
                 if not complete:
-                    if told:
+                    if note:
                         raise SimulationError("the run ends at an event before the last measured time", code="EG-EVENT")
                     parts.append(np.full(int(there.sum()), np.inf))
                 else:
@@ -400,9 +400,9 @@ class _Problem:
         parts = []
         for one in self.experiments:
             with silent():
-                found = sensitivities(self.module, self.names, **self.arguments(values, one))
+                result = sensitivities(self.module, self.names, **self.arguments(values, one))
             for name, measured in one.columns.items():
-                slopes = np.array([found[name, of] for of in self.names]).T
+                slopes = np.array([result[name, of] for of in self.names]).T
                 parts.append(slopes[np.isfinite(measured)] / self.sigma[name])
         return np.vstack(parts)
 

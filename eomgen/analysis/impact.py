@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 
 def check_gaps(
-    layout: Layout, gaps: Any = None, lock: Any = (), words: tuple[str, str] = ("gaps", "lock")
+    layout: Layout, gaps: Any = None, lock: Any = (), keys: tuple[str, str] = ("gaps", "lock")
 ) -> tuple[dict[str, float], tuple[str, ...]]:
     """Gaps with their restitutions and the names that are locked, if all of them are there and can be.
 
@@ -56,10 +56,10 @@ def check_gaps(
     ----------
     gaps, lock
         As a user gives them.
-    words : (str, str)
+    keys : (str, str)
         What these are called where the user gives them.
     """
-    word, other = words
+    word, other = keys
     if gaps is not None and not isinstance(gaps, Mapping):
         raise ill_typed(f"{word} must be a mapping of names to restitutions, {{name: 0.5}}, not {gaps!r}")
     locked = (lock,) if isinstance(lock, str) else lock
@@ -77,12 +77,12 @@ def check_gaps(
             if name not in allowed:
                 near = joined(hint(name, allowed), f"there are {', '.join(allowed) or 'none'}")
                 raise no_such(f"{what}: no coordinate or output {name!r}; {near}")
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for name, e in (gaps or {}).items():
-        found[name] = read_number(f"{word}: the restitution of {name}", e)
-        if not 0.0 <= found[name] <= 1.0:
+        result[name] = read_number(f"{word}: the restitution of {name}", e)
+        if not 0.0 <= result[name] <= 1.0:
             raise off_range(f"{word}: the restitution of {name} must be between 0 and 1, not {e}")
-    return found, tuple(locked)
+    return result, tuple(locked)
 
 
 def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], word: str = "friction") -> Rough:
@@ -101,7 +101,7 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
         return {}
     if not isinstance(friction, Mapping):
         raise ill_typed(f"{word} must be a mapping {{gap: (coefficient, sliding velocity)}}, not {friction!r}")
-    found: dict[str, tuple[float, tuple[str, ...]]] = {}
+    result: dict[str, tuple[float, tuple[str, ...]]] = {}
     placed = [name for name in (*layout.velocity_labels, *layout.loops) if name in layout.q + layout.loops]
     allowed = [*placed, *layout.y]
     for gap, given in without_dots(friction, layout.instances).items():
@@ -132,8 +132,8 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
                     "another output without a unit",
                     code="EG-UNIT",
                 )
-        found[gap] = mu, names
-    return found
+        result[gap] = mu, names
+    return result
 
 
 def _listed(names: Any) -> str:
@@ -205,16 +205,16 @@ def impact(
     that would bring in energy, restitutions are multiplied by the largest factor with which it does not.
     """
     module = module.bind(p, u)
-    found, locked = check_gaps(module.layout, gaps, lock)
-    rough = check_friction(module.layout, friction, found)
+    result, locked = check_gaps(module.layout, gaps, lock)
+    rough = check_friction(module.layout, friction, result)
     if rough and locked:
         raise at_odds("an impact has friction= or lock=, not both: lock the coordinates in a call before or after it")
     states = one_state(module, read_number("t", t), x)
-    watched = Gaps(module, tuple(found))
+    watched = Gaps(module, tuple(result))
     rows = watched.normals(float(states.t[0]), states.x[:, 0])
     if not read_flag("closed", closed):
         _require_closed(watched, states)
-    return _strike_gaps(states, watched, rows, found, locked, rough)
+    return _strike_gaps(states, watched, rows, result, locked, rough)
 
 
 def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float], rough: Rough) -> Impact:
@@ -310,20 +310,20 @@ class ImpactRun(Trajectory):
     @property
     def pieces(self) -> list[Trajectory]:
         """The trajectories between impacts."""
-        ends, found, values = [0, *self.breaks, len(self.t)], [], self.to_numpy()
+        ends, result, values = [0, *self.breaks, len(self.t)], [], self.to_numpy()
         energies = self.energies if self.has_energies else None
         for a, b in pairwise(ends):
             header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
             columns = Stored(self.names, values[:, a:b], None if energies is None else energies[:, a:b])
-            found.append(Trajectory(self.t[a:b], self.x[:, a:b], columns, header))
-        return found
+            result.append(Trajectory(self.t[a:b], self.x[:, a:b], columns, header))
+        return result
 
 
 # -- gaps as events ----------------------------------------------------------------------------------------------------
 
 
 AT_REST = 0.1  #: part of the size at which gaps count as closed by which one that stays closed may fall
-IDLE = 50  #: closings of gaps in a row, each right after the one before, without an impact
+NO_IMPACTS = 50  #: closings of gaps in a row, each right after the one before, without an impact
 ENDLESS = 2**31 - 1  #: resets in a row for the loop, whose count is an int in C
 
 
@@ -358,7 +358,7 @@ class GapEvents(Events):
             self.functions.append(RunEvent(partial(self._value, i), name, 0, -1, WAIT))
             self.names.append(name)
         self._lift = np.zeros(len(gaps.names))
-        self._last, self._idle = np.nan, 0
+        self._last, self._no_impacts = np.nan, 0
 
     def begin(self, t: float, x: Array) -> Array:
         """The state (n_x,) at the start, after an impact of gaps that are closed there."""
@@ -397,9 +397,9 @@ class GapEvents(Events):
         x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
         if len(own) < len(fired):
             soon = t - self._last < CROWDED * (self.end - self._start) and len(self.impacts) == known
-            self._last, self._idle = t, self._idle + 1 if soon else 0
-            if self._idle > IDLE:
-                raise self.crowded(t, self._idle)
+            self._last, self._no_impacts = t, self._no_impacts + 1 if soon else 0
+            if self._no_impacts > NO_IMPACTS:
+                raise self.crowded(t, self._no_impacts)
         if self.stays:
             self.arm(t, x)
         return x
@@ -511,8 +511,8 @@ def simulate_impacts(
                 f"simulate_impacts has no {key}=; use t_events of the run that it returns, and at(t) for any times"
             )
     most = read_count("most, the number of impacts,", most, 1)
-    found, _ = check_gaps(module.layout, gaps)
-    rough = check_friction(module.layout, friction, found)
+    result, _ = check_gaps(module.layout, gaps)
+    rough = check_friction(module.layout, friction, result)
     if not module.layout.n_dof:
         raise cannot(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
@@ -521,7 +521,7 @@ def simulate_impacts(
     if end < start:
         raise cannot(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
     forcing.begin(start, end)
-    events = GapEvents(Gaps(bound, tuple(found), forcing if forcing else None), found, rough, most, end)
+    events = GapEvents(Gaps(bound, tuple(result), forcing if forcing else None), result, rough, most, end)
     before = find_state(bound, initial, start, forcing)
     first = events.begin(start, before)
     events.arm(start, first)

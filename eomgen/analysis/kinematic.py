@@ -195,7 +195,7 @@ def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial:
     n = len(requested.t)
     pieces = _pieces(driven, requested)
     columns: list[tuple[Array, Array, Array]] = []
-    found: list[Singular] = []
+    collected: list[Singular] = []
     stop: Singular | None = None
     extents = float(np.ptp(requested.t)), largest(np.ptp(requested.y, axis=1) / driven.led_scales)
     count, done, points, places = 0, 0.0, list[tuple[float, float, Array]](), list[Array]()
@@ -216,17 +216,17 @@ def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial:
         points += [(done + p.s, path.at(p.s)[0], p.q) for p in followed.continuation.points if followed.holds(p.s)]
         places.append(done + along[taken])
         done += length
-        found += followed.singular
+        collected += followed.singular
         if followed.stop is not None:
             stop = followed.stop
-            found.append(followed.stop)
+            collected.append(followed.stop)
             break
         q = columns[-1][0][:, -1] if len(taken) else q
     along_all, times, positions = (np.array(part) for part in zip(*points, strict=True))
     x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
     order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
     passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
-    result = keep(driven, requested.t[:count], columns, found, stop, n, requested.names[:led], passed=passed)
+    result = keep(driven, requested.t[:count], columns, collected, stop, n, requested.names[:led], passed=passed)
     if count < n and not partial:
         gap = (
             ""
@@ -392,7 +392,7 @@ def _follow_both_ways(
         low, high = bounds.tolist()
     if not low <= here <= high:
         raise off_range(f"{name} is {here:.6g} at the start, which is not within {low:.6g} .. {high:.6g}")
-    found: list[tuple[float, Singular | None, str]] = []
+    result: list[tuple[float, Singular | None, str]] = []
     singular: list[Singular] = []
     for sign, bound in ((1.0, high), (-1.0, low)):
         y1 = np.zeros(len(y))
@@ -407,9 +407,9 @@ def _follow_both_ways(
             gap = describe_gap(driven, *path.at(beyond), followed.stop.q)
         whole = within is None and followed.stop is None
         limit = sign * np.inf if whole else here + sign * followed.reached
-        found.append((float(limit), followed.stop, gap))
+        result.append((float(limit), followed.stop, gap))
         if turns and whole:
-            found.append((-np.inf, None, ""))
+            result.append((-np.inf, None, ""))
             break
-    (upper, top, above), (lower, bottom, below) = found
+    (upper, top, above), (lower, bottom, below) = result
     return MotionRange(name, lower, upper, (bottom, top), (below, above), tuple(singular))

@@ -73,13 +73,13 @@ def find_directions(module: BoundModel, t: float, x: Array, independent: Sequenc
 
 def _chosen(among: Sequence[str], names: Sequence[str], count: int) -> tuple[Indices, bool] | None:
     """Indices of those named, which are taken strictly; None if none is."""
-    found = [among.index(name) for name in names if name in among]
-    if not found:
+    result = [among.index(name) for name in names if name in among]
+    if not result:
         return None
-    if len(set(found)) != count or len(found) != count:
-        named = ", ".join(among[k] for k in found)
+    if len(set(result)) != count or len(result) != count:
+        named = ", ".join(among[k] for k in result)
         raise ill_chosen(f"independent must name {count} different ones of {', '.join(among)}, not {named}")
-    return np.array(found, dtype=np.intp), True
+    return np.array(result, dtype=np.intp), True
 
 
 def refuse_inputs(layout: Layout) -> None:

@@ -275,8 +275,8 @@ def verdict(
         return stability_of_matrix(A, own, error, errors) if gyroscopic.any() else "unstable"
     if (squares <= bound).any():
         return "marginal"
-    found = stability_of_matrix(A, own, error, errors)
-    return found if found == "asymptotically stable" else "stable (undamped)"  # a least potential
+    result = stability_of_matrix(A, own, error, errors)
+    return result if result == "asymptotically stable" else "stable (undamped)"  # a least potential
 
 
 def _is_dissipative(second: SecondOrder) -> bool:
@@ -588,7 +588,7 @@ class Linearization(Result):
     @property
     def tables(self) -> list[ResultTable]:
         """A, B, C and D, those that have entries."""
-        found = []
+        result = []
         for title, rows, columns in (
             ("A", self.states, self.states),
             ("B", self.states, self.inputs),
@@ -598,8 +598,8 @@ class Linearization(Result):
             entries = iter(without_noise(getattr(self, title).ravel().tolist()))
             if rows and columns:
                 lines = [[name, *(next(entries) for _ in columns)] for name in rows]
-                found.append(ResultTable(["", *columns], lines, title))
-        return found
+                result.append(ResultTable(["", *columns], lines, title))
+        return result
 
 
 def without_noise(

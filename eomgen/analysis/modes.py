@@ -98,15 +98,15 @@ class Modes(Result):
         """The modes with damping and gyroscopic terms, slow ones first."""
         values = self.linear.eigenvalues
         tiny = SYMMETRIC * max(1.0, float(np.abs(values).max(initial=0.0)))
-        found = []
+        result = []
         for value in values:
             if value.imag < -tiny:
                 continue
             size = float(abs(value))
             ratio = 0.0 if size <= tiny else float(-value.real / size)
             imaginary = float(value.imag) if value.imag > tiny else 0.0
-            found.append(Damped(complex(value), size, imaginary, ratio))
-        return sorted(found, key=lambda mode: mode.frequency)
+            result.append(Damped(complex(value), size, imaginary, ratio))
+        return sorted(result, key=lambda mode: mode.frequency)
 
     def to_dict(self) -> dict[str, Any]:
         keys = ("eigenvalue", "frequency", "damped_frequency", "ratio")
@@ -188,8 +188,8 @@ class Modes(Result):
     def _shown(self, k: int) -> tuple[Array, str]:
         """The displacements q' of a mode, and what is written above it."""
         v, space = self.motions[:, k], self.linear.layout.space
-        found = v if space is None else space.rates(self.linear.x[: self.linear.layout.n_q], v)
-        return found, f"mode {k + 1}" + (f": {self.hertz[k]:.4g} Hz" if self.hertz[k] else "")
+        result = v if space is None else space.rates(self.linear.x[: self.linear.layout.n_q], v)
+        return result, f"mode {k + 1}" + (f": {self.hertz[k]:.4g} Hz" if self.hertz[k] else "")
 
     def _repr_html_(self) -> str:
         table = self._table()

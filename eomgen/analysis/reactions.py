@@ -155,7 +155,7 @@ def bases(table: Mapping[str, Any], geometry: Geometry, length: float) -> list[A
 
     A state in which there are fewer than in others has columns of zeros.
     """
-    found = []
+    result = []
     for joint in range(len(table["ends"])):
         reach = [i for i, owner in enumerate(table["reach"]) if owner == joint]
         if reach:
@@ -169,8 +169,8 @@ def bases(table: Mapping[str, Any], geometry: Geometry, length: float) -> list[A
             kept = np.ones(Vt.shape[:2], dtype=bool)
             kept[:, : sizes.shape[1]] = sizes <= RANK
         columns = Vt[:, kept.any(axis=0)] * kept[:, kept.any(axis=0), None]
-        found.append(np.swapaxes(columns, 1, 2))
-    return found
+        result.append(np.swapaxes(columns, 1, 2))
+    return result
 
 
 def _per(length: float) -> Array:
@@ -268,18 +268,18 @@ def self_stresses(
                 needed[body] -= sign * moved.reshape(wrench.shape)
     needed[..., starts[-2] :] += np.moveaxis(elements, 0, -1)
     passed = transmitted(table, wide, needed.reshape(len(needed), 6, -1)).reshape(-1, 6, count, width)
-    found, rest = [], []
+    result, rest = [], []
     for joint, B in enumerate(joints):
         if joint in cut:
             n = cut.index(joint)
-            found.append(np.broadcast_to(np.eye(width)[starts[n] : starts[n + 1]], (count, B.shape[2], width)))
+            result.append(np.broadcast_to(np.eye(width)[starts[n] : starts[n + 1]], (count, B.shape[2], width)))
         else:
             scaled = np.moveaxis(passed[joint] * per[:, None, None], 1, 0)
             along = np.swapaxes(B, 1, 2) @ scaled
-            found.append(along)
+            result.append(along)
             rest.append(scaled - B @ along)
-    found.append(np.broadcast_to(np.eye(width)[starts[-2] :], (count, len(elements), width)))
-    own = np.concatenate(found, axis=1)
+    result.append(np.broadcast_to(np.eye(width)[starts[-2] :], (count, len(elements), width)))
+    own = np.concatenate(result, axis=1)
     Q = algebra.qr(np.concatenate([own, *rest], axis=1))[0]
     n = own.shape[1]
     _, missing, Vt = algebra.svd(algebra.qr(Q[:, n:])[1])

@@ -218,8 +218,8 @@ class Move(NamedTuple):
                 "expression in a text, or as a table"
             )
         known = np.isfinite(self.u).all(axis=1)
-        found = slopes[:, :n_x] @ self.x + np.multiply.outer(slopes[:, n_x], self.t)
-        return np.asarray(found + by_u[:, known] @ self.u[known] + slopes[:, n_x + 1 + n_u :] @ self.p)
+        result = slopes[:, :n_x] @ self.x + np.multiply.outer(slopes[:, n_x], self.t)
+        return np.asarray(result + by_u[:, known] @ self.u[known] + slopes[:, n_x + 1 + n_u :] @ self.p)
 
 
 class Variational:
@@ -563,9 +563,9 @@ class Saltation(Events):
     def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
         forcing, here = self.run.forcing, self.run.at(t, x)
         if self.model[index].action == RESET:
-            found = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
-            self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
-            return found
+            result = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
+            self._refuse_contradictions(t, (x, x_after), (move.x, result), move, index)
+            return result
         declared = self.declared
         values = self.module.kernels.kernel("events", nan=True)(t, x, u=forcing(t, x))
         near = TOUCHING * max(1.0, self.module.layout.length)

@@ -124,7 +124,7 @@ class Search:
 
     def rows_to_hold(self, module: BoundModel, q: Array) -> list[Held]:
         """The held coordinates, three rows for a rotation."""
-        initial, layout, found = Initial(module.kernels, self.t), self.layout, []
+        initial, layout, result = Initial(module.kernels, self.t), self.layout, []
         for name in self.held:
             for row in initial.gradients(q, name):
                 moved = np.flatnonzero(row)
@@ -132,8 +132,8 @@ class Search:
                     label, scale = name, float(layout.loop_scales[layout.loops.index(name)])
                 else:
                     label, scale = displacement_names(layout)[moved[0]], float(layout.scales.q[moved[0]])
-                found.append(Held(label, name, row / layout.scales.q, scale))
-        return found
+                result.append(Held(label, name, row / layout.scales.q, scale))
+        return result
 
     def gradients(self, module: BoundModel, q: Array) -> Array:
         """Gradients (k, n_v) of the held coordinates by displacements, in their scales."""
@@ -146,8 +146,8 @@ class Search:
         if len(self.first):
             solver = Solver(self.linearize(point))
             change = solver.linear.moved @ solver.solve(self.residual(point.here, point.here))
-            found = np.abs(change[self.moving :]) * self.scale[self.moving :]
-            self.scale[self.moving :] = np.maximum(self.scale[self.moving :], np.nan_to_num(found, posinf=0.0))
+            result = np.abs(change[self.moving :]) * self.scale[self.moving :]
+            self.scale[self.moving :] = np.maximum(self.scale[self.moving :], np.nan_to_num(result, posinf=0.0))
         return point
 
     def longest(self, displacement: Array) -> float:
@@ -192,8 +192,8 @@ class Search:
             )
         held = self.gradients(point.module, point.q)
         held_by = self._hold_slopes(point.module, here.x)
-        found = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
-        basis, inverse = _orthonormal(found.Z / s[:, None])
+        result = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
+        basis, inverse = _orthonormal(result.Z / s[:, None])
         if len(held):  # only displacements that leave the held coordinates alone
             split = algebra.svd(held * s @ basis)
             free = split[2][len(held) :].T
@@ -202,12 +202,12 @@ class Search:
         weights = np.maximum(sizes, LEAST_UNKNOWN * max(1.0, float(sizes.max(initial=0.0))))
         unknown_rates = np.zeros((len(s), len(weights)))
         J = np.vstack([
-            (np.hstack([found.by_position @ inverse, found.by_unknown * weights]) / s[:, None])[here.velocities],
-            (np.hstack([found.rates @ inverse, unknown_rates]) / s[:, None])[here.surplus],
+            (np.hstack([result.by_position @ inverse, result.by_unknown * weights]) / s[:, None])[here.velocities],
+            (np.hstack([result.rates @ inverse, unknown_rates]) / s[:, None])[here.surplus],
         ])  # fmt: skip
-        moved = np.hstack([basis, found.motion * weights / s[:, None]])
+        moved = np.hstack([basis, result.motion * weights / s[:, None]])
         changed = np.hstack([np.zeros((len(weights), basis.shape[1])), np.diag(weights)])
-        flow = (found.by_position + found.rates) @ inverse / s[:, None]
+        flow = (result.by_position + result.rates) @ inverse / s[:, None]
         return LinearizedResidual(J, moved, changed, self._sizes(point, J), RANK, flow)
 
     def _sizes(self, point: SearchPoint, J: Array) -> Array:
@@ -525,8 +525,8 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     residual find.
     """
     start = search.start(q)
-    first, steps, found = newton(search, start, reach=REACH)
-    if found:
+    first, steps, result = newton(search, start, reach=REACH)
+    if result:
         return first, steps
     ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
         lambda: newton(search, start),
@@ -537,13 +537,13 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
         ways.insert(0, lambda: creep(search, start))
     ends = [start, first]
     for way in ways:
-        point, more, found = way()
+        point, more, result = way()
         ends.append(point)
         steps += more
-        if not found:
-            point, more, found = newton(search, point)
+        if not result:
+            point, more, result = newton(search, point)
             steps += more
-        if found:
+        if result:
             return point, steps
     raise _failure(search, min(ends, key=lambda end: float(np.abs(search.residual(end.here, end.here)).max())))
 

@@ -102,7 +102,9 @@ class Sensitivities(Result):
         watched = trajectory.t_events.names if len(trajectory.t_events) else ()
         times = [[event.dt for event in self.events if event.name == name] for name in watched]
         self._instances = trajectory.metadata.get("instances", {})
-        self.event_times = Named([np.array(found).reshape(-1, len(names)) for found in times], watched, self._instances)
+        self.event_times = Named(
+            [np.array(result).reshape(-1, len(names)) for result in times], watched, self._instances
+        )
         self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
         self._rows |= dict(zip(trajectory.x_names, dx, strict=True))
 
@@ -138,11 +140,11 @@ class Sensitivities(Result):
         """Derivatives at the end, and those of the times of events."""
         columns = ["", *self.names]
         final = [[row, *plain(list(by.values()))] for row, by in self.final.items()]
-        found = [ResultTable(columns, final, f"derivatives at t = {self.t[-1]:g} s, by")]
+        result = [ResultTable(columns, final, f"derivatives at t = {self.t[-1]:g} s, by")]
         if self.events:
             events = [[f"{e.name}, t = {e.t:.6g} s", *e.dt.tolist()] for e in self.events]
-            found.append(ResultTable(columns, events, "times of events, by"))
-        return found
+            result.append(ResultTable(columns, events, "times of events, by"))
+        return result
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
         if not (isinstance(key, tuple) and len(key) == 2):
@@ -220,7 +222,7 @@ def names_to_hold(module: BoundModel, t: float, x: Array, given: Mapping[str, fl
     leave each other room."""
     layout = module.layout
     initial = Initial(module.kernels, t)
-    q, found = x[: layout.n_q], []
+    q, result = x[: layout.n_q], []
     starts = [*(given or ()), *layout.initial_outputs]
     if outputs := [name for name in starts if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
         raise incomplete(
@@ -236,8 +238,8 @@ def names_to_hold(module: BoundModel, t: float, x: Array, given: Mapping[str, fl
     ):
         wanted = dict.fromkeys([*second, *rest], 0.0)
         soft = initial.compatible(q, first, {n: x for n, x in wanted.items() if n not in first}, positions=positions)
-        found += [*first, *soft]
-    return found
+        result += [*first, *soft]
+    return result
 
 
 def start_sensitivity(
@@ -296,7 +298,7 @@ def start_sensitivity(
 
 def _turns(layout: Layout, q: Array, wanted: Mapping[str, Array]) -> dict[int, Array]:
     """Rotations (k,) that changes of held Euler parameters make, by the places of their angular velocities in v."""
-    found: dict[int, Array] = {}
+    result: dict[int, Array] = {}
     for i, j in layout.quaternion_slots:
         held = [k for k in range(4) if layout.q[i + k] in wanted]
         changes = np.array([wanted[layout.q[i + k]] for k in held])
@@ -305,8 +307,8 @@ def _turns(layout: Layout, q: Array, wanted: Mapping[str, Array]) -> dict[int, A
             G = np.stack([layout.space.rates(q, e)[i : i + 4] for e in np.eye(layout.n_v)[j : j + 3]], axis=1)
             whole = np.zeros((4, changes.shape[1]))
             whole[held] = changes  # of length 1, those not given are 0
-            found |= dict(zip(range(j, j + 3), algebra.lstsq(G, whole, rcond=STATE), strict=True))
-    return found
+            result |= dict(zip(range(j, j + 3), algebra.lstsq(G, whole, rcond=STATE), strict=True))
+    return result
 
 
 def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, columns: Differentiated) -> Array:
@@ -314,15 +316,15 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     A, b = np.array(rows).reshape(len(rows), n), np.array(right).reshape(len(rows), count)
     if not A.size or not count:
         return np.zeros((n, count))
-    found = algebra.lstsq(A, b, rcond=STATE)
-    left = np.abs(A @ found - b).max(axis=0)
+    result = algebra.lstsq(A, b, rcond=STATE)
+    left = np.abs(A @ result - b).max(axis=0)
     bad = np.flatnonzero(left > CONTRADICTION * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:
         raise untrue(
             f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values do "
             "not allow it; hold fewer values"
         )
-    return np.asarray(found)
+    return np.asarray(result)
 
 
 # -- branches that a change leaves -------------------------------------------------------------------------------------
@@ -394,7 +396,7 @@ def find_along(run: Variational, simulated: Callable[..., Trajectory], corners: 
     x, ends = whole.x[:, np.searchsorted(whole.t, t)], whole.x[:, np.searchsorted(whole.t, grid)]
     sizes, at = np.abs(whole.x).max(axis=1), np.searchsorted(grid, times)
     allowed = np.minimum(settings["atol"] + np.minimum(settings["rtol"], QUADRATURE) * sizes, QUADRATURE * sizes.max())
-    found, count = list[Array](), max(1, ENTRIES // (s * n_x) ** 2)
+    result, count = list[Array](), max(1, ENTRIES // (s * n_x) ** 2)
     for first in range(0, len(h), count):
         steps, nodes = h[first : first + count], slice(s * first, s * (first + count))
         _, rate, J, by, _ = run.rates(t[nodes], x[:, nodes], None)
@@ -402,9 +404,9 @@ def find_along(run: Variational, simulated: Callable[..., Trajectory], corners: 
         if not (np.abs(missed).max(axis=1) <= allowed).all():
             return None
         S_here = integrate_linear(steps, J, by, S)
-        found += [S_here[k - first] for k in at[(first <= at) & (at < first + len(steps))]]
+        result += [S_here[k - first] for k in at[(first <= at) & (at < first + len(steps))]]
         S = S_here[-1]
-    return np.array([*found, *[S] * (len(times) - len(found))])
+    return np.array([*result, *[S] * (len(times) - len(result))])
 
 
 def integrate_linear(h: Array, J: Array, by: Array, start: Array) -> Array:
@@ -419,11 +421,11 @@ def integrate_linear(h: Array, J: Array, by: Array, start: Array) -> Array:
     right = np.concatenate([J, by], axis=-1).reshape(count, s * n, -1)
     K = algebra.solve(system, right).reshape(count, s, n, -1)
     gain = h[:, None, None] * np.einsum("i,mipq->mpq", WEIGHTS, K)
-    found = np.empty((count + 1, *start.shape))
-    found[0] = start
+    result = np.empty((count + 1, *start.shape))
+    result[0] = start
     for m in range(count):
-        found[m + 1] = found[m] + gain[m, :, :n] @ found[m] + gain[m, :, n:]
-    return found
+        result[m + 1] = result[m] + gain[m, :, :n] @ result[m] + gain[m, :, n:]
+    return result
 
 
 # -- the run -----------------------------------------------------------------------------------------------------------
@@ -498,10 +500,10 @@ def sensitivities(
     settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **chosen})
     require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
     salts = Saltation(run, events, (start, stop), (settings["rtol"], settings["atol"]), corners)
-    alone = None
+    single = None
     if salts:
         with inner_run():
-            alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
+            single = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
     follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
@@ -546,12 +548,12 @@ def sensitivities(
     kept = _distinct(solution)
     steps = None if solution.steps is None else (solution.steps[0], solution.steps[1][:n])
     states = solution._replace(
-        t=solution.t[kept], x=solution.x[:n, kept], x_events=[found[:n] for found in solution.x_events], steps=steps
+        t=solution.t[kept], x=solution.x[:n, kept], x_events=[result[:n] for result in solution.x_events], steps=steps
     )
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
     trajectory = record(bound, forcing, states, title, settings, salts.names)
-    if alone is not None:
-        _require_same(trajectory, alone)
+    if single is not None:
+        _require_same(trajectory, single)
     refuse_lost_branches(bound, forcing, trajectory, columns)
     S = np.array([run.consistent(float(t), trajectory.x[:, j], raw[..., j]) for j, t in enumerate(trajectory.t)])
     return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held, salts.found)
@@ -570,9 +572,9 @@ def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Arra
         )
 
 
-def _require_same(found: Trajectory, alone: Trajectory) -> None:
+def _require_same(result: Trajectory, single: Trajectory) -> None:
     """Refuse a run that passes over events which the run by itself finds."""
-    for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
+    for name, ours, theirs in zip(result.t_events.names, result.t_events, single.t_events, strict=True):
         if len(ours) != len(theirs):
             raise SimulationError(
                 f"event {name} is found {len(theirs)} times by simulate, but {len(ours)} times together with the "

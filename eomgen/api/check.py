@@ -35,13 +35,19 @@ def check(model: Builder) -> MechanismReport:
     """
     equations = derive(model)
     equations.kinematics.mechanism.require_values()
-    idle = require_inertia(equations.kinematics, equations.mobility, equations.tree)
-    found = report(equations.kinematics, equations.mobility)
+    unbalanced = require_inertia(equations.kinematics, equations.mobility, equations.tree)
+    result = report(equations.kinematics, equations.mobility)
     note = note_lost_digits(equations.kinematics, equations.mobility, equations.tree)
-    more = [f"kinematics only (no masses, so no equations of motion): {idle}"] if idle else [note] if note else []
+    more = (
+        [f"kinematics only (no masses, so no equations of motion): {unbalanced}"]
+        if unbalanced
+        else [note]
+        if note
+        else []
+    )
     more += _assemble_start(equations)
     others = other_branches(equations.kinematics, equations.mobility)
-    return replace(found, notes=[*found.notes, *more], other_branches=others)
+    return replace(result, notes=[*result.notes, *more], other_branches=others)
 
 
 def _assemble_start(equations: Derivation) -> list[str]:
@@ -64,8 +70,8 @@ def _assemble_start(equations: Derivation) -> list[str]:
         wanted = [*OF_STARTS, *(OF_OUTPUTS if mechanism.initial_outputs else ())]
         module = BoundModel(compile_core(equations, "numpy", wanted))
     except EomgenError as error:
-        told = str(error).splitlines()[0]
-        return [f"the initial values of {', '.join(more) or 'driven velocities'} are not checked here: {told}"]
+        first_line = str(error).splitlines()[0]
+        return [f"the initial values of {', '.join(more) or 'driven velocities'} are not checked here: {first_line}"]
     try:
         module.x0()
     except (AssemblyError, UsageError) as error:

@@ -76,14 +76,14 @@ def generate(
     program = build(equations, target)
     if row.kernels and not row.module:
         program = with_start(equations, program)
-    asked = {
+    requested = {
         "independent": list(independent or ()) or None,
         "baumgarte": baumgarte,
         "precision": precision,
         "analyses": analyses or None,
     }
-    told = {name: value for name, value in asked.items() if value not in (None, "double")}
-    sources = dict(emit_package(program, target, precision, told, analyses))
+    recorded = {name: value for name, value in requested.items() if value not in (None, "double")}
+    sources = dict(emit_package(program, target, precision, recorded, analyses))
     if row.module:
         sources[RECORDED] = record_calls(equations.name, _evaluated(equations))
     return write_package(sources, folder / equations.name)

@@ -107,10 +107,10 @@ def load_example(name: str, **options: Unpack[LoadOptions]) -> Model:
     UsageError
         There is no such example, or it is a script.
     """
-    found = example_files()
-    file = find_example(name, found) if isinstance(name, str) else None
+    result = example_files()
+    file = find_example(name, result) if isinstance(name, str) else None
     if file is None:
-        models = [key for key in found if not key.endswith(".py")]
+        models = [key for key in result if not key.endswith(".py")]
         near = hint(str(name), models, quoted=False) or f"there are: {', '.join(models)}"
         raise no_such(f"no example {shown(name)}; {near}")
     if file.suffix == ".py":

@@ -57,9 +57,9 @@ def linearize(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool
 def modes(work: Prepared, t: float, as_json: bool) -> None:
     """Find natural frequencies and mode shapes about the equilibrium found from the initial position."""
     rest = work.module.equilibrium(work.position(), t)
-    found = work.module.modes(rest.x, t)
+    result = work.module.modes(rest.x, t)
     about = {"coordinates": rest.coordinates, "stability": rest.stability}
-    work.show(as_json, t, rest, found, values=about | found.to_dict())
+    work.show(as_json, t, rest, result, values=about | result.to_dict())
 
 
 @analysis_verb
@@ -92,10 +92,10 @@ def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Pat
     if not names:
         raise incomplete("the model has no parameters; name an input or an initial value with --by")
     with stage("integrate"):
-        found = work.module.sensitivities(names, end, work.initial)
-    files = [] if out is None else [found.save(out)]
-    held = f"held at the start: {', '.join(found.held)}"
-    work.show(as_json, float(found.t[-1]), *found.tables, held, values=found.to_dict(), files=files)
+        result = work.module.sensitivities(names, end, work.initial)
+    files = [] if out is None else [result.save(out)]
+    held = f"held at the start: {', '.join(result.held)}"
+    work.show(as_json, float(result.t[-1]), *result.tables, held, values=result.to_dict(), files=files)
 
 
 @analysis_verb
@@ -118,8 +118,8 @@ def consistent(
             raise no_such(f"--set {name}: the names of a rough state are {', '.join(names)}")
         rough[names.index(name)] = value
     weights: Any = "mass" if mass else parse_settings(weight, "--weight", "theta=100") or None
-    found = module.consistent(rough, t, weights=weights, hold=hold)
-    states = {"x": found, "rough": rough, "change": found - rough}
+    result = module.consistent(rough, t, weights=weights, hold=hold)
+    states = {"x": result, "rough": rough, "change": result - rough}
     units = [module.layout.unit(name) for name in names]
     columns = [without_noise(states[key].tolist(), units) for key in ("rough", "x", "change")]
     rows = [[name, a, b, f"{c:.3g}"] for name, a, b, c in zip(names, *columns, strict=True)]
@@ -155,20 +155,20 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
         with stage("integrate"):
             run = module.simulate((t, end), x)
         times, x = run.t, run.x
-    found, marks = module.reactions(times, x), module.undetermined_reactions(times, x)
+    result, marks = module.reactions(times, x), module.undetermined_reactions(times, x)
     multipliers = module.multipliers(times, x)
     if out is not None:
-        _write_reactions(out, module, times, found)
+        _write_reactions(out, module, times, result)
     title = f"reactions at t = {t:g} s"
     if end is not None:
         title = f"largest reactions up to t = {end:g} s"
-        places = np.abs(found).argmax(axis=-1)
-        found = np.take_along_axis(found, places[..., None], axis=-1)[..., 0]
+        places = np.abs(result).argmax(axis=-1)
+        result = np.take_along_axis(result, places[..., None], axis=-1)[..., 0]
         marks = marks.any(axis=-1)
         multipliers = np.take_along_axis(multipliers, np.abs(multipliers).argmax(axis=-1)[:, None], axis=-1)[:, 0]
-    values = {"end": end, "joints": module.joint_names, "components": COMPONENTS, "reactions": found}
+    values = {"end": end, "joints": module.joint_names, "components": COMPONENTS, "reactions": result}
     values |= {"undetermined": marks, "constraints": module.constraint_labels, "multipliers": multipliers}
-    large = np.where(np.abs(found) < SHOWN_FORCE * np.abs(found).max(initial=0.0), 0.0, found)
+    large = np.where(np.abs(result) < SHOWN_FORCE * np.abs(result).max(initial=0.0), 0.0, result)
     rows = [
         [joint, *(f"{value:.6g}{'*' if mark else ''}" for value, mark in zip(row, stars, strict=True))]
         for joint, row, stars in zip(module.joint_names, large, marks, strict=True)
@@ -178,10 +178,10 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     work.show(as_json, t, table, *notes, values=values, files=[] if out is None else [out])
 
 
-def _write_reactions(out: Path, module: Module, times: Any, found: Any) -> None:
+def _write_reactions(out: Path, module: Module, times: Any, result: Any) -> None:
     """Histories of all components, a column each."""
     names = [f"{joint}.{component}" for joint in module.joint_names for component in COMPONENTS]
-    flat = found.reshape(len(names), -1)
+    flat = result.reshape(len(names), -1)
     with whole_file(out) as file:
         if out.suffix == ".npz":
             np.savez(file, t=times, names=np.array(names), reactions=flat)
@@ -200,8 +200,8 @@ def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tup
     """Find the forces of drives for given accelerations at the initial state; loops stay closed."""
     module, layout = work.module, work.module.layout
     x = module.x0(work.initial, t=t)
-    found = module.actuator_forces(t, x, parse_settings(accelerate), actuated=actuated or None)
-    forces, accelerations = found.as_dict(), _by_name(layout.a, found.a)
+    result = module.actuator_forces(t, x, parse_settings(accelerate), actuated=actuated or None)
+    forces, accelerations = result.as_dict(), _by_name(layout.a, result.a)
     kinds = {"m": "N", "rad": "N m"}
     units = {name: layout.unit(name) if name in layout.u else kinds.get(layout.unit(name), "") for name in forces}
     more = {"accelerations": accelerations, "constraints": module.constraint_labels, "joints": module.joint_names}
@@ -210,7 +210,7 @@ def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tup
         t,
         _with_units(f"forces of the drives at t = {t:g} s", forces, units),
         _with_units("accelerations", accelerations, {name: layout.unit(name) for name in layout.a}),
-        values=found.to_dict() | more,
+        values=result.to_dict() | more,
     )
 
 
@@ -253,12 +253,12 @@ def impact(
     rough = check_friction(layout, dict(map(_read_friction, slip)), gaps, "--slip")
     if rough and locked:
         raise at_odds("give --slip or --stop, not both")
-    found = module.impact(t, module.x0(work.initial, t=t), gaps, lock=locked, closed=closed, friction=rough or None)
-    rates = _by_name(layout.v, found.x[module.n_q :])
+    result = module.impact(t, module.x0(work.initial, t=t), gaps, lock=locked, closed=closed, friction=rough or None)
+    rates = _by_name(layout.v, result.x[module.n_q :])
     units = {name: layout.unit(name) for name in layout.v}
-    table = _with_units("velocities after it", rates, units, found.before[module.n_q :].tolist())
-    more = {"x": _by_name(module.x_names, found.x), "constraints": module.constraint_labels}
-    work.show(as_json, t, found, table, values=found.to_dict() | more)
+    table = _with_units("velocities after it", rates, units, result.before[module.n_q :].tolist())
+    more = {"x": _by_name(module.x_names, result.x), "constraints": module.constraint_labels}
+    work.show(as_json, t, result, table, values=result.to_dict() | more)
 
 
 def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
@@ -283,7 +283,7 @@ def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
 def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
     """Check a compiled model against independent computations; exit with 5 if a limit is broken."""
     with stage("verify"):
-        found = work.module.verify(states=states, seed=seed, seconds=seconds)
+        result = work.module.verify(states=states, seed=seed, seconds=seconds)
     head = {"name": work.equations.name, "method": work.equations.method}
-    show(as_json, head | found.as_dict() | {"seconds": round(found.seconds, 3)}, str(found), files=None)
-    sys.exit(0 if found.ok else BREACH)
+    show(as_json, head | result.as_dict() | {"seconds": round(result.seconds, 3)}, str(result), files=None)
+    sys.exit(0 if result.ok else BREACH)

@@ -100,9 +100,9 @@ def eomgen() -> None:
     """Equations of motion of mechanisms: derived, compiled, simulated."""
 
 
-def _check_file_name(words: Sequence[str]) -> None:
+def _check_file_name(line: Sequence[str]) -> None:
     """Refuse what cannot be part of a file's name; no file system takes it."""
-    for word in words:
+    for word in line:
         try:
             bad = b"\0" in os.fsencode(word)
         except UnicodeEncodeError:
@@ -118,18 +118,18 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Parse and run a command line; returns the exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    line = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):  # where the terminal has no such characters, their numbers are shown
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        _check_file_name(words)
+        _check_file_name(line)
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
+            code = eomgen.main(line, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
-        if "--json" in words:
+        if "--json" in line:
             print_json(to_dict(UsageError(error.format_message())))
         vars(error)["message"] = visible(error.message)
         error.show()

@@ -100,29 +100,29 @@ def ensemble(
     last = module.info.simulation.get("end") or 10.0
     times = None if samples is None else _even(end or float(last), samples)
     with stage("integrate"):
-        found = module.simulate_many(
+        result = module.simulate_many(
             end, *(group or None for group in sorted_values.values()), t_eval=times, grid=axes or None,
             threads=threads, reduce="statistics" if statistics else None,
             cluster=int(cluster) if cluster is not None and cluster.isdigit() else cluster, store=store, **solver,
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
-            write_whole(out, found.to_pandas(samples=times is not None and not statistics).to_csv(index=False))
+            write_whole(out, result.to_pandas(samples=times is not None and not statistics).to_csv(index=False))
         elif out.suffix == ".nc":
-            write_netcdf(found.to_xarray(), out)
+            write_netcdf(result.to_xarray(), out)
         else:
-            found.save(out)
+            result.save(out)
     if plot is not None:
-        save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
-    varied, failures = sorted({**values, **axes}), found.failures()
-    (table,) = found.tables
+        save_figure(result.plot(plot[0]).figure, plot[1], dpi=150)
+    varied, failures = sorted({**values, **axes}), result.failures()
+    (table,) = result.tables
     notes = [f"run {one.run} ended at t = {one.t:.6g} s: {one.message}" for one in failures[:SHOWN]]
     if len(failures) > SHOWN:
-        notes.append(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+        notes.append(f"... and {len(failures) - SHOWN} more of {result.count} failed")
     work.show(
-        as_json, float(found.t[-1]),
-        table._replace(title=f"{found.count} runs to t = {found.t[-1]:g} s; varied: {', '.join(varied)}"), *notes,
-        values=found.to_dict() | {"varied": varied},
+        as_json, float(result.t[-1]),
+        table._replace(title=f"{result.count} runs to t = {result.t[-1]:g} s; varied: {', '.join(varied)}"), *notes,
+        values=result.to_dict() | {"varied": varied},
         files=[path for path in (out, plot and plot[1]) if path],
     )  # fmt: skip
 

@@ -107,9 +107,9 @@ def _packages() -> Iterator[Check]:
     for name in CORE:
         yield Check(name, *_import(name), f"pip install --upgrade {name}")
     for extra, (purpose, packages) in EXTRAS.items():
-        found = {name: _import(name) for name in packages}
-        detail = ", ".join(f"{name} {detail}" for name, (_, detail) in found.items())
-        ok = all(ok for ok, _ in found.values())
+        result = {name: _import(name) for name in packages}
+        detail = ", ".join(f"{name} {detail}" for name, (_, detail) in result.items())
+        ok = all(ok for ok, _ in result.values())
         yield Check(f"[{extra}]", ok, f"{purpose}: {detail}", f'pip install --upgrade "eomgen[{extra}]"', needed=False)
 
 
@@ -131,12 +131,12 @@ def _compiler() -> Iterator[Check]:
     from ..toolchain.compiler import find_compiler
 
     try:
-        found = find_compiler()
+        result = find_compiler()
     except EomgenError as error:
         what, _, remedy = str(error).partition("\n")
         yield Check("compiler", False, what, remedy)
     else:
-        yield Check("compiler", True, f"{found.path}: {found.version.splitlines()[0]}")
+        yield Check("compiler", True, f"{result.path}: {result.version.splitlines()[0]}")
 
 
 def _compiles() -> Check:
@@ -282,8 +282,8 @@ def describe_example(file: Path) -> str:
     if file.name.endswith(".urdf"):
         comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
         return " ".join(comment.group(1).split()) if comment else ""
-    found = re.search(r"^doc:\s*(.+)$", text, re.MULTILINE)
-    return found.group(1).strip().strip('"') if found else ""
+    match = re.search(r"^doc:\s*(.+)$", text, re.MULTILINE)
+    return match.group(1).strip().strip('"') if match else ""
 
 
 @click.command(cls=Verb)
@@ -298,27 +298,27 @@ def examples(name: str | None, force: bool, every: bool, target: str, as_json: b
 
     With --all the exit code is that of the first example that fails.  docs/gallery.md shows them.
     """
-    found = example_files()
+    result = example_files()
     if every:
         if name is not None:
             raise at_odds(f"--all runs every example; leave out {name} or --all")
-        _run_all(found, target, as_json)
+        _run_all(result, target, as_json)
         return
     if name is None:
-        rows = [{"name": key, "file": file.name, "doc": describe_example(file)} for key, file in found.items()]
+        rows = [{"name": key, "file": file.name, "doc": describe_example(file)} for key, file in result.items()]
         table = ResultTable(["example", "what it is"], [[row["name"], row["doc"]] for row in rows], right=())
         show(as_json, {"examples": rows}, table, "copy one here:  eomgen examples NAME", files=None)
         return
-    copied = _copy(name, found, force)
+    copied = _copy(name, result, force)
     show(as_json, {"file": copied}, str(copied), files=None)
     if not as_json:
         say(f"next:  {'python' if copied.suffix == '.py' else 'eomgen run'} {copied}", err=True)
 
 
-def _run_all(found: dict[str, Path], target: str, as_json: bool) -> None:
+def _run_all(result: dict[str, Path], target: str, as_json: bool) -> None:
     """Run all examples and leave with the exit code of the first that fails."""
     start, runs = perf_counter(), list[ExampleRun]()
-    for key, file in found.items():
+    for key, file in result.items():
         with stage(key):
             runs.append(run_example(key, file, target))
     failed = [run for run in runs if not run.ok]
@@ -349,10 +349,10 @@ def _row(run: ExampleRun) -> list[str]:
     return [run.name, *counts, well if run.ok else f"exit code {run.exit_code}: {run.error}"]
 
 
-def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
-    file = find_example(name, found)
+def _copy(name: str, result: dict[str, Path], force: bool) -> Path:
+    file = find_example(name, result)
     if file is None:
-        near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
+        near = hint(name, result, quoted=False) or f"there are: {', '.join(result)}"
         raise no_such(f"no example {name!r}; {near}")
     target = Path(file.name)
     if target.exists() and not force:
@@ -402,36 +402,38 @@ class ExampleRun(NamedTuple):
 def run_example(name: str, file: Path, target: str) -> ExampleRun:
     """Run an example; what fails in it is told in the result."""
     seconds: dict[str, float] = {}
-    found: dict[str, Any] = {"degrees_of_freedom": None, "steps": None, "end": None}
+    result: dict[str, Any] = {"degrees_of_freedom": None, "steps": None, "end": None}
     code, error = 0, ""
-    told: list[warnings.WarningMessage] = []
+    caught: list[warnings.WarningMessage] = []
     try:
         if file.suffix == ".py":
             code, error = _run_script(file, seconds)
         else:
-            with warnings.catch_warnings(record=True) as told:
+            with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                _run_model(file, target, seconds, found)
+                _run_model(file, target, seconds, result)
     except (EomgenError, OSError) as failure:
         code, error = exit_code(failure), lines_of(failure)[0]
     except Exception as failure:  # a fault of eomgen itself is a result of this verb
         code, error = MODEL, f"{type(failure).__name__}: {failure}"
-    return ExampleRun(name, file.name, code, error, seconds=seconds, warnings=[str(w.message) for w in told], **found)
+    return ExampleRun(
+        name, file.name, code, error, seconds=seconds, warnings=[str(w.message) for w in caught], **result
+    )
 
 
-def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[str, Any]) -> None:
+def _run_model(file: Path, target: str, seconds: dict[str, float], result: dict[str, Any]) -> None:
     """Derive, compile and simulate a part of the time that the file asks for."""
     from ..api.loading import load
 
     with timed(seconds, "derive"):
         equations = load(file).derive()
-    found["degrees_of_freedom"] = equations.report.degrees_of_freedom
+    result["degrees_of_freedom"] = equations.report.degrees_of_freedom
     with timed(seconds, "compile"):
         module = equations.compile(target=target)
-    found["end"] = PART * float(module.info.simulation["end"])
+    result["end"] = PART * float(module.info.simulation["end"])
     with timed(seconds, "simulate"):
-        trajectory = module.simulate(found["end"])
-    found["steps"] = len(trajectory) - 1
+        trajectory = module.simulate(result["end"])
+    result["steps"] = len(trajectory) - 1
 
 
 def _run_script(file: Path, seconds: dict[str, float]) -> tuple[int, str]:

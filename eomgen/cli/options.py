@@ -200,7 +200,7 @@ def require_once(option: str, names: Sequence[str]) -> None:
 
 def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
     """Names that are given one by one or separated by commas."""
-    return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
+    return tuple(name.strip() for text in value for name in text.split(",") if name.strip())
 
 
 def require_folder(option: str, file: Path | None) -> None:
@@ -477,9 +477,9 @@ class Prepared(NamedTuple):
         if not as_json:
             show(False, {}, *parts, files=files)
             return
-        found = parts[0].to_dict() if values is None and isinstance(parts[0], Result) else values
+        result = parts[0].to_dict() if values is None and isinstance(parts[0], Result) else values
         head = {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
-        show(True, head | found, files=files)
+        show(True, head | result, files=files)
 
 
 def model_verb(*names: str, target: Decorator | None = None) -> Callable[[Callable[..., Any]], Verb]:
@@ -509,10 +509,10 @@ def analysis_verb(verb: Callable[..., Any]) -> Verb:
     return model_verb("allow_native", "method", "independent", "target", "settings", "robot")(compiled)
 
 
-def _locked(words: tuple[str, ...]) -> dict[str, float]:
+def _locked(text: tuple[str, ...]) -> dict[str, float]:
     """``joint`` or ``joint=value`` -> the value at which it is held."""
     result: dict[str, float] = {}
-    for word in words:
+    for word in text:
         name, equals, _ = word.rpartition("=")
         result |= dict([_parse_setting(word, "--lock")]) if equals and name else {word: 0.0}
     return result

@@ -69,10 +69,10 @@ def print_table(table: ResultTable) -> None:
     header, rows = list(table.columns), table.cells
     right = range(1, len(header)) if table.right is None else table.right
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-    room = terminal_width() or WIDTH
+    columns = terminal_width() or WIDTH
     last = len(header) - 1
     if last not in right:
-        widths[last] = max(min(widths[last], room - sum(widths[:last]) - 2 * last - 1), 20)
+        widths[last] = max(min(widths[last], columns - sum(widths[:last]) - 2 * last - 1), 20)
 
     def line(cells: Sequence[str]) -> str:
         placed = [

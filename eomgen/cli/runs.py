@@ -247,48 +247,48 @@ def kinematics(
 
     Without --range, drivers move the model from t = 0 to the end given in its file.
     """
-    asked = [_read_range(words) for words in ranges]
+    requested = [_read_range(text) for text in ranges]
     _check_files(out, plot, picture)
     work = source.compile("embedding")
     equations, module = work.equations, work.bound().module
     check_columns(module, picture)
-    named = _range_values(module, asked) if asked or not limits else {}
+    named = _range_values(module, requested) if requested or not limits else {}
     start = perf_counter()
     with stage("kinematics"):
         motion = module.kinematic_analysis(initial=work.initial, partial=partial, **named) if named else None
-        found = [module.motion_range(name, initial=work.initial) for name in limits]
+        result = [module.motion_range(name, initial=work.initial) for name in limits]
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files = [] if motion is None else _write(equations, motion, out, plot, picture)
     values = {"name": module.name, "report": summary(equations)["report"], "seconds": seconds}
-    values |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [r.to_dict() for r in found]}
+    values |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [r.to_dict() for r in result]}
     tables = [
         *([] if motion is None else _tables_of_motion(motion)),
-        *(ResultTable((), r.facts, r.title) for r in found),
+        *(ResultTable((), r.facts, r.title) for r in result),
     ]
     show(as_json, values, str(equations.report), *tables, files=files)
 
 
-def _read_range(words: str) -> tuple[str, float, float, int | None]:
-    return parse_span("--range", words, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
+def _read_range(text: str) -> tuple[str, float, float, int | None]:
+    return parse_span("--range", text, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
 
 
-def _range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+def _range_values(module: Module, requested: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
     """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
-    if not asked:
+    if not requested:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
             raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
-        asked = [("t", 0.0, float(module.info.simulation.get("end") or 10.0), None)]
-    names = [name for name, *_ in asked]
+        requested = [("t", 0.0, float(module.info.simulation.get("end") or 10.0), None)]
+    names = [name for name, *_ in requested]
     require_once("--range", names)
-    counts = {count for *_, count in asked if count is not None} or {COUNT}
+    counts = {count for *_, count in requested if count is not None} or {COUNT}
     if len(counts) > 1:
         raise ill_shaped(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
     (count,) = counts
-    values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in asked}
-    if "t" in values and len(asked) > 1 and count > 1:  # coordinates that are led over time have their rates
+    values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in requested}
+    if "t" in values and len(requested) > 1 and count > 1:  # coordinates that are led over time have their rates
         span = values["t"][-1] - values["t"][0]
-        values |= {f"{name}_dot": (end - start) / span for name, start, end, _ in asked if name != "t" and span}
+        values |= {f"{name}_dot": (end - start) / span for name, start, end, _ in requested if name != "t" and span}
     return values
 
 
@@ -312,9 +312,9 @@ def _motion_to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
 def _tables_of_motion(motion: KinematicAnalysis) -> tuple[ResultTable, ResultTable]:
     """Points, residuals and singular positions of an analysis, and some of its rows."""
     rows = [("loop residual", f"{motion.residuals.position:.1e} (m, rad), {motion.residuals.velocity:.1e} of rates")]
-    for found in motion.singular[:20]:
-        place, _, words = str(found).removeprefix(f"{found.kind} at ").partition(": ")
-        rows.append((found.kind, f"{place}: {words}"))
+    for result in motion.singular[:20]:
+        place, _, text = str(result).removeprefix(f"{result.kind} at ").partition(": ")
+        rows.append((result.kind, f"{place}: {text}"))
     if len(motion.singular) > 20:
         rows.append(("", f"and {len(motion.singular) - 20} more singular positions"))
     names = [n for n in _final_names(motion) if not n.endswith("_dot")][:8]
@@ -363,18 +363,18 @@ def view(
 
     from ..show.writers import require_kind
 
-    asked = [_read_range(words) for words in ranges]
-    if asked and (end is not None or solver):
+    requested = [_read_range(text) for text in ranges]
+    if requested and (end is not None or solver):
         raise at_odds("--range moves the model without forces; leave out --end and options of the integrator")
-    if any(count == 1 for *_, count in asked):
+    if any(count == 1 for *_, count in requested):
         raise incomplete("an animation needs two positions: give --range a COUNT of at least 2")
     file = out if out is not None else Path(gettempdir()) / f"eomgen_{source.model.stem}.html"
     require_kind(file)
     require_folder("--out", None if out is None or not out.suffix else out)
-    work = source.compile("embedding" if asked else "auto")
-    if asked:
+    work = source.compile("embedding" if requested else "auto")
+    if requested:
         with stage("kinematics"):
-            module, values = work.bound().module, _range_values(work.module, asked)
+            module, values = work.bound().module, _range_values(work.module, requested)
             motion: Any = module.kinematic_analysis(initial=work.initial, **values)
     else:
         with stage("simulate"):
@@ -383,7 +383,7 @@ def view(
             )
     look = {key: value for key, value in (("speed", speed), ("fps", fps)) if value is not None}
     with after_integration(), stage("animate"):
-        film = asked or trace or plot or forces or look or work.inputs or file.suffix != ".html"
+        film = requested or trace or plot or forces or look or work.inputs or file.suffix != ".html"
         written = None if film else _live_page(work.bound().module, motion, file)
         written = written or motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
     opened = out is None and webbrowser.open(Path(written).absolute().as_uri())

@@ -79,7 +79,7 @@ def _of_elements(elements: Sequence[dict[str, Any]], scene: Scene, module: Any, 
     for way in (step, -step):
         poses = np.moveaxis(module.poses(q + way * rates, t=motion.t, u=motion.u), -1, 0)
         sides.append(np.concatenate([poses, scene.frames[:, -1:]], axis=1))
-    found: list[Pull] = []
+    result: list[Pull] = []
     for one in elements:
         stops = [frame for frame, _, _ in one["stops"]]
         length = _lengths(stops, scene.frames)
@@ -89,8 +89,8 @@ def _of_elements(elements: Sequence[dict[str, Any]], scene: Scene, module: Any, 
             if end.body != GROUND:
                 away = _places(end, scene.frames) - _places(other, scene.frames)
                 size = np.linalg.norm(away, axis=1)
-                found.append((one["name"], end, away * (force / np.maximum(size, NOTHING))[:, None]))
-    return found
+                result.append((one["name"], end, away * (force / np.maximum(size, NOTHING))[:, None]))
+    return result
 
 
 def _places(frame: PlacedFrame, frames: Array) -> Array:

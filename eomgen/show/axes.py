@@ -50,27 +50,27 @@ def telling_view(scenes: Sequence[Scene]) -> tuple[float, float]:
     Two branches differ by the mean distance between the same points of their drawings, seen from far away, as a part of
     that in space.  Those that differ in angles alone and have all bodies in one place look alike from everywhere.
     """
-    usual = default_view(scenes[0])
+    default = default_view(scenes[0])
     if len(scenes) < 2:
-        return usual
+        return default
     moving = [
         np.vstack([s.frames[0, :, :3, 3], *(item.at(s.frames[0]) for item in s.items if item.role in SOLID)])
         for s in scenes
     ]
     if len({len(points) for points in moving}) > 1:
-        return usual
+        return default
     size = float(np.ptp(moving[0], axis=0).max())
     apart = [(one - other, _mean(one - other)) for one, other in combinations(moving, 2)]
     apart = [(way, far) for way, far in apart if far > SEEN * size]
     if not apart:
-        return usual
+        return default
 
     def difference(view: tuple[float, float]) -> float:
         n = toward_eye(scenes[0], *view)
         return min(_mean(way - np.outer(way @ n, n)) / far for way, far in apart)
 
-    best = max(((e, usual[1] + 360.0 * k / AZIMUTHS) for e in ELEVATIONS for k in range(AZIMUTHS)), key=difference)
-    return usual if difference(usual) >= GOOD * difference(best) else best
+    best = max(((e, default[1] + 360.0 * k / AZIMUTHS) for e in ELEVATIONS for k in range(AZIMUTHS)), key=difference)
+    return default if difference(default) >= GOOD * difference(best) else best
 
 
 def _mean(ways: Array) -> float:
@@ -147,12 +147,12 @@ def _closed(corners: Array) -> Array:
 
 def dots(line: Array) -> Array:
     """Dots (m, 2) along a line (n, 2), broken at NaN, at most EVERY apart."""
-    found = [np.empty((0, 2))]
+    result = [np.empty((0, 2))]
     for a, b in pairwise(line):
         if np.isfinite(a).all() and np.isfinite(b).all():
             count = int(np.ceil(float(np.hypot(*(b - a))) / EVERY)) + 1
-            found.append(a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
-    return np.vstack(found)
+            result.append(a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
+    return np.vstack(result)
 
 
 def places(
@@ -177,7 +177,7 @@ def places(
     turns = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     ways = np.tile(np.column_stack([np.cos(turns), np.sin(turns)]), (len(DISTANCES), 1))
     distances = np.repeat(DISTANCES, DIRECTIONS)
-    taken, found = np.empty((0, 4)), []  # middles and halves of the names that have a place
+    taken, result = np.empty((0, 4)), []  # middles and halves of the names that have a place
     for point, text in zip(points, texts, strict=True):
         lines = text.split("\n")
         half = 0.5 * size * np.array([WIDE * max(map(len, lines)) + EDGE, TALL * len(lines) + EDGE])
@@ -187,9 +187,9 @@ def places(
         cost = FAR * distances + (np.abs(near - middles) < half + 1.0).all(axis=2).sum(axis=1)
         cost += ON_A_NAME * (np.abs(taken[:, :2] - middles) < half + taken[:, 2:]).all(axis=2).sum(axis=1)
         cost += OUTSIDE * ((middles - half < low) | (middles + half > high)).any(axis=(1, 2))
-        found.append(offsets[cost.argmin()])
-        taken = np.vstack([taken, [*(point + found[-1]), *half]])
-    return found
+        result.append(offsets[cost.argmin()])
+        taken = np.vstack([taken, [*(point + result[-1]), *half]])
+    return result
 
 
 # -- pieces in space, hindmost first -----------------------------------------------------------------------------------
@@ -270,14 +270,14 @@ class ScenePieces:
     def at(self, frame: int) -> Array:
         """Corners (n, 3, 3) of all pieces in ground axes at a frame; NaN where there is nothing."""
         poses, frames = self.scene.frames[frame], len(self.scene.frames)
-        found = [np.empty((0, 3, 3))]
+        result = [np.empty((0, 3, 3))]
         for item, corners, (of, parts) in zip(self.scene.items, self._corners, self._parts, strict=True):
             points = item.at(poses, frame)
             if item.role == "trace":
                 points = points.copy()
                 points[len(passed(points, frame, frames)) :] = np.nan
-            found.append(parts @ points[corners[of]])
-        return np.concatenate(found)
+            result.append(parts @ points[corners[of]])
+        return np.concatenate(result)
 
     def seen(self, corners: Array, eye: Array) -> SeenPieces:
         """What an eye sees of the pieces.
@@ -466,15 +466,15 @@ class Flat:
 
 def joined_limits(ax: Any, axes: str, limits: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Limits that a picture needs, wide enough for what is on the axes already and turned round where theirs are."""
-    found = []
+    result = []
     for name, own in zip(axes, limits, strict=True):
         theirs = (
             getattr(ax, f"get_{name}lim")() if ax.has_data() or not getattr(ax, f"get_autoscale{name}_on")() else own
         )
         low, high = min(*own, *theirs), max(*own, *theirs)
         turned = own[0] > own[1] or theirs[0] > theirs[1]
-        found.append((high, low) if turned else (low, high))
-    return found
+        result.append((high, low) if turned else (low, high))
+    return result
 
 
 def _axis_name(direction: Array) -> str:

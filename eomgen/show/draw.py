@@ -42,8 +42,8 @@ SMALL = 4.6  #: longer edge of a picture in a notebook (inch)
 def position(module: Any, x: Any, t: float) -> Array:
     """Coordinates (n_q,) of a state, a position or values by name; the declared initial ones without any."""
     if x is None or isinstance(x, Mapping):
-        found: Array = module.x0(x, t=t)[: module.n_q]
-        return found
+        result: Array = module.x0(x, t=t)[: module.n_q]
+        return result
     try:
         given = np.asarray(x, dtype=float)
     except (TypeError, ValueError):
@@ -149,19 +149,19 @@ def draw_branches(
 ) -> Any:
     """See :func:`eomgen.runtime.drawing.draw_branches`."""
     pyplot = matplotlib("pyplot", "draw_branches")
-    found: Sequence[Array] = module.branches(values, t=t, **named)
-    scenes = [build_scene(module, q[:, None], t, names=names) for q in found]
+    result: Sequence[Array] = module.branches(values, t=t, **named)
+    scenes = [build_scene(module, q[:, None], t, names=names) for q in result]
     columns = min(3, len(scenes))
     rows = -(-len(scenes) // columns)
     figure = pyplot.figure(figsize=(4.2 * columns, 4.0 * rows), layout="constrained")
     panels = []
     view = telling_view(scenes) if scenes[0].view is None else None
-    values_told = telling_values(module.q_names, found)
+    value_labels = telling_values(module.q_names, result)
     low, high = np.min([s.low for s in scenes], axis=0), np.max([s.high for s in scenes], axis=0)
     for k, scene in enumerate(scenes):
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(rows, columns, k + 1, **spatial)
         title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not (values or named) else "")
-        title += f"\n{values_told[k]}" if values_told[k] else ""
+        title += f"\n{value_labels[k]}" if value_labels[k] else ""
         panels.append(draw_scene(scene._replace(low=low, high=high), ax, title, view))
     return np.array(panels, dtype=object)

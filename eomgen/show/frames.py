@@ -41,7 +41,7 @@ class MotionFrames(NamedTuple):
     speed : float
         Seconds of the run in one of the animation.
     fps : float
-    words : list of str
+    captions : list of str
         What is written above each frame: its time, or the coordinate that is led.
     over : (k,) array
         Time, or the coordinate that is led where time stands still.
@@ -54,7 +54,7 @@ class MotionFrames(NamedTuple):
     u: Array | None
     speed: float
     fps: float
-    words: list[str]
+    captions: list[str]
     over: Array
     across: str = TIME
 
@@ -198,7 +198,7 @@ class Frames:
         grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[height, *below])
         spatial = {} if scene.view is not None else {"projection": "3d"}
         frames = cls(figure, motion)
-        letters = len(f"{scene.name}  {motion.words[0]}{motion.pace}   {scene.note}")
+        letters = len(f"{scene.name}  {motion.captions[0]}{motion.pace}   {scene.note}")
         note = f"{'   ' if LETTER * letters < width else chr(10)}{scene.note}" if scene.note else ""
         frames.add_scene(scene, figure.add_subplot(grid[0], **spatial), f"{scene.name}  {{}}{note}")
         if panels:
@@ -213,7 +213,7 @@ class Frames:
 
         def update(k: int) -> None:
             artist.show(k)
-            above.set_text(title.replace("{}", self.motion.words[k] + self.motion.pace))
+            above.set_text(title.replace("{}", self.motion.captions[k] + self.motion.pace))
 
         self.updates.append(update)
         self.titles.append(above)
@@ -243,8 +243,8 @@ class Frames:
         wide = self.canvas.get_width_height()[0]
         for title in self.titles:  # a narrow picture cuts nothing off
             box = title.get_window_extent(self.canvas.get_renderer())
-            room = min(box.x0 + box.x1, 2 * wide - box.x0 - box.x1) - TITLE_MARGIN
-            title.set_fontsize(max(title.get_fontsize() * min(1.0, room / max(box.width, 1.0)), LEAST_TITLE))
+            width = min(box.x0 + box.x1, 2 * wide - box.x0 - box.x1) - TITLE_MARGIN
+            title.set_fontsize(max(title.get_fontsize() * min(1.0, width / max(box.width, 1.0)), LEAST_TITLE))
 
     def __len__(self) -> int:
         return len(self.motion.t)

@@ -31,26 +31,26 @@ class Layout(NamedTuple):
 
 def layout(report: Any) -> Layout:
     """Bodies in the layer of their distance to ground in the tree, each above the middle of what it carries."""
-    carried: dict[str, list[str]] = {"ground": []}
+    children: dict[str, list[str]] = {"ground": []}
     for branch in report.tree:
-        carried.setdefault(branch["parent"], []).append(branch["body"])
-        carried.setdefault(branch["body"], [])
-    found: dict[str, tuple[float, float]] = {}
+        children.setdefault(branch["parent"], []).append(branch["body"])
+        children.setdefault(branch["body"], [])
+    result: dict[str, tuple[float, float]] = {}
     columns = layers = 0
-    waiting = [(body, 1, False) for body in reversed(carried["ground"])]
+    waiting = [(body, 1, False) for body in reversed(children["ground"])]
     while waiting:
         body, layer, seen = waiting.pop()
-        above = carried[body]
+        above = children[body]
         if above and not seen:
             waiting += [(body, layer, True), *((child, layer + 1, False) for child in reversed(above))]
             continue
         if above:
-            found[body] = ((found[above[0]][0] + found[above[-1]][0]) / 2, float(layer))
+            result[body] = ((result[above[0]][0] + result[above[-1]][0]) / 2, float(layer))
         else:
-            found[body] = (float(columns), float(layer))
+            result[body] = (float(columns), float(layer))
             columns += 1
         layers = max(layers, layer)
-    return Layout(found, max(columns, 1), layers)
+    return Layout(result, max(columns, 1), layers)
 
 
 class Graph:
@@ -84,17 +84,17 @@ class Graph:
 
     def typed(self, points: Any) -> Array:
         """Points (n, 2) in columns and layers -> in points of type on the page."""
-        found: Array = self.ax.transData.transform(np.atleast_2d(points)) * 72.0 / self.ax.figure.dpi
-        return found
+        result: Array = self.ax.transData.transform(np.atleast_2d(points)) * 72.0 / self.ax.figure.dpi
+        return result
 
     def _write_title(self) -> None:
         """Title and legend."""
         report, ax = self.report, self.ax
         freedoms = report.degrees_of_freedom
-        words = f"{freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
+        caption = f"{freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
         if report.independent and len(report.independent) <= 4:
-            words += f" ({', '.join(report.independent)})"
-        ax.set_title(f"{report.name}: {words}")
+            caption += f" ({', '.join(report.independent)})"
+        ax.set_title(f"{report.name}: {caption}")
         kinds = (("joint of the tree", TREE, "-", True), ("joint that closes a loop", CUT, "--", report.loop_joints),
                  ("constraint element", ELEMENT, ":", report.elements))  # fmt: skip
         lines = [ax.plot([], [], color=color, linestyle=style, label=kind)[0] for kind, color, style, on in kinds if on]

@@ -86,12 +86,12 @@ def _stops(item: Item) -> list[tuple[PlacedFrame, float, int]]:
 
 def _shapes(scene: Scene, module: Any) -> list[Array]:
     """The points of all items, then those of the names, then the markers: what changes with parameters."""
-    found = []
+    result = []
     for item in _drawn(scene):
         own = item.points if item.follow is None else getattr(item.follow, "shape", np.empty((0, 3)))
-        found.append(np.vstack([*(frame.position[None] for frame, _, _ in _stops(item)), own]))
+        result.append(np.vstack([*(frame.position[None] for frame, _, _ in _stops(item)), own]))
     markers = [frame.position for _, frame in _markers(module)]
-    return [*found, np.array([label.point for label in scene.labels]).reshape(-1, 3), *markers]
+    return [*result, np.array([label.point for label in scene.labels]).reshape(-1, 3), *markers]
 
 
 def _markers(module: Any) -> list[tuple[str, PlacedFrame]]:
@@ -103,16 +103,16 @@ def _drawn(scene: Scene) -> list[Item]:
     """The items; in a plane the symbols of joints stand on a dark edge, as they are white as the paper."""
     if scene.view is None:
         return scene.items
-    found = []
+    result = []
     for item in scene.items:
         if item.role == "joint" and item.faces is not None and item.follow is None:
             normal = scene.frames[0, item.body, :3, :3].T @ scene.view[2]
             middle = item.points.mean(axis=0)
             depth = np.outer((item.points - middle) @ normal, normal)
             points = middle + RIM * (item.points - middle - depth) + BEHIND * depth
-            found.append(item._replace(points=points, color=color_of(item)))
-        found.append(item)
-    return found
+            result.append(item._replace(points=points, color=color_of(item)))
+        result.append(item)
+    return result
 
 
 def _floor(scene: Scene) -> Array:
@@ -135,32 +135,32 @@ def _floor(scene: Scene) -> Array:
 def _item(scene: Scene, item: Item, shape: int, numbers: Numbers) -> dict[str, Any]:
     style, bodies = style_of(item.role), scene.frames.shape[1]
     color = item.color or (style.face if item.faces is not None else None) or color_of(item)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "role": item.role, "name": item.name, "body": item.body, "shape": shape, "width": style.width,
         "color": {"white": "#ffffff"}.get(color, color), "layer": item.layer + LAYER * (item.body + 1) / bodies,
         "alpha": style.alpha if item.faces is not None and item.role in ("wheel", "shape") else 1.0,
     }  # fmt: skip
     if item.faces is not None:
-        found["faces"] = numbers.add(item.faces)
+        result["faces"] = numbers.add(item.faces)
     if item.path is not None:
-        found |= {"frames": numbers.add(item.path)[0], "size": item.path[0].size}
+        result |= {"frames": numbers.add(item.path)[0], "size": item.path[0].size}
     elif item.follow is not None:
         stops = [
             {"body": frame.body, "radius": radius, "sense": sense, "rotation": frame.rotation.tolist()}
             for frame, radius, sense in _stops(item)
         ]
-        found |= {
+        result |= {
             "follow": type(item.follow).__name__,
             "stops": stops,
             "flat": getattr(item.follow, "view", None) is not None,
         }
-    return found
+    return result
 
 
 def _morphs(module: Any, scene: Scene, shapes: list[Array], ranges: Mapping[str, Any], numbers: Numbers) -> list[Any]:
     """How the shapes change from a parameter's value to the ends of its range, for those that they depend on."""
     code = module.metadata["picture"]["tape"][0]
-    found = []
+    result = []
     for place in sorted({a for kind, a, _, _ in code if kind == "p"}):
         name, ends = module.p_names[place], []
         for end in ranges[name]:
@@ -178,8 +178,8 @@ def _morphs(module: Any, scene: Scene, shapes: list[Array], ranges: Mapping[str,
                 moved.append([k, *(numbers.add(np.nan_to_num(way)) for way in ways)])
         if moved:
             low, high = ranges[name]
-            found.append({"name": name, "at": float(module.p[place]), "low": low, "high": high, "moved": moved})
-    return found
+            result.append({"name": name, "at": float(module.p[place]), "low": low, "high": high, "moved": moved})
+    return result
 
 
 def scene_position(module: Any) -> Array:
@@ -231,7 +231,8 @@ def page_html(
     }  # fmt: skip
     if motion is not None:
         data["motion"] = {
-            "t": motion.t.tolist(), "clock": motion.clock.tolist(), "over": motion.over.tolist(), "words": motion.words,
+            "t": motion.t.tolist(), "clock": motion.clock.tolist(), "over": motion.over.tolist(),
+            "words": motion.captions,
             "pace": motion.speed, "states": numbers.add(motion.x.T)[0] if model else 0,
             "poses": 0 if model else numbers.add(scene.frames[:, :-1, :3, :])[0],
         }  # fmt: skip
@@ -242,12 +243,12 @@ def page_html(
     )
     texts = {"script": picture + script, "style": style}
     hashes = {f"{k}_hash": f"sha256-{b64encode(sha256(v.encode()).digest()).decode()}" for k, v in texts.items()}
-    words = {
+    captions = {
         "title": html_text(scene.name), "doc": html_text(module.doc or ""), "note": html_text(scene.note),
         "equations": equations and "<details id='equations'><summary>Equations of motion</summary>"
         + re.sub(r" style=(\"[^\"]*\"|'[^']*')", "", equations)
         + "</details>",
-        "data": re.sub("[<>&]", lambda found: f"\\u{ord(found[0]):04x}", json.dumps(data, allow_nan=False)),
+        "data": re.sub("[<>&]", lambda result: f"\\u{ord(result[0]):04x}", json.dumps(data, allow_nan=False)),
     }  # fmt: skip
-    fill = {**texts, **hashes, **words}
-    return re.sub(r"{{ (\w+) }}", lambda found: fill[found[1]], page)
+    fill = {**texts, **hashes, **captions}
+    return re.sub(r"{{ (\w+) }}", lambda result: fill[result[1]], page)

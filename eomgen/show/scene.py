@@ -21,7 +21,7 @@ CORNERS = 4  #: fewest of an outline that turns both ways
 
 def hollow_lines(data: PictureData, body: int) -> list[Array]:
     """Closed lines (n, 3) in a plane of a body, in its axes, which are not those around their convex hull."""
-    found = []
+    result = []
     for element in data.elements:
         stops = [stop for stop, _, _ in element.get("stops", ())]
         if element["kind"] != "lines" or len(stops) <= CORNERS or any(stop.body != body for stop in stops):
@@ -33,8 +33,8 @@ def hollow_lines(data: PictureData, body: int) -> list[Array]:
         points = points[np.abs(points - np.roll(points, 1, axis=0)).max(axis=1) > near]
         flat = _in_plane(points) if len(points) >= CORNERS else None
         if flat is not None and (_turns(flat[0]) < -near * near).any():
-            found.append(points)
-    return found
+            result.append(points)
+    return result
 
 
 def hollow_plate(points: Array, half: float) -> Mesh:
@@ -74,7 +74,7 @@ def _turns(corners: Array) -> Array:
 
 def _triangles(corners: Array) -> np.ndarray:
     """Triangles (n - 2, 3) that fill a counterclockwise outline, cut off one by one (Meisters, 1975)."""
-    left, found = list(range(len(corners))), list[tuple[int, int, int]]()
+    left, result = list(range(len(corners))), list[tuple[int, int, int]]()
     k = tried = 0
     while len(left) > 3:
         a, b, c = (left[(k + step) % len(left)] for step in (-1, 0, 1))
@@ -82,14 +82,14 @@ def _triangles(corners: Array) -> np.ndarray:
         turns = [_side(corners[p], corners[q], rest) for p, q in ((a, b), (b, c), (c, a))]
         empty = not np.all([turn >= 0.0 for turn in turns], axis=0).any()
         if tried > len(left) or (_side(corners[a], corners[b], corners[c : c + 1])[0] >= 0.0 and empty):
-            found.append((a, b, c))
+            result.append((a, b, c))
             left.pop(k % len(left))
             tried = 0
         else:
             tried += 1
             k += 1
         k %= len(left)
-    return np.array([*found, tuple(left)])
+    return np.array([*result, tuple(left)])
 
 
 def _side(p: Array, q: Array, points: Array) -> Array:
@@ -230,18 +230,18 @@ def placed(poses: Array, frame: PlacedFrame) -> tuple[Array, Array]:
 
 def attachments(data: PictureData) -> list[Array]:
     """Points at which something is attached to each body, and its markers, body axes; the last list is ground's."""
-    found: list[list[Array]] = [[] for _ in range(len(data.bodies) + 1)]
+    result: list[list[Array]] = [[] for _ in range(len(data.bodies) + 1)]
     for joint in data.joints:
         if joint.type == "free":
             continue
         for frame in (joint.P, joint.S):
-            found[frame.body].append(frame.position)
+            result[frame.body].append(frame.position)
     for element in data.elements:
         for stop, _, _ in element.get("stops", ()):
-            found[stop.body].append(stop.position)
+            result[stop.body].append(stop.position)
     for frame in data.markers.values():
-        found[frame.body].append(frame.position)
-    return [np.array(points).reshape(-1, 3) for points in found]
+        result[frame.body].append(frame.position)
+    return [np.array(points).reshape(-1, 3) for points in result]
 
 
 def distinct(points: Array, near: float) -> Array:
@@ -547,11 +547,11 @@ def find_view(poses: Callable[[Array], Array], q: Array, quaternions: list[int],
     moved = poses(trial)
     if not np.isfinite(moved).all():
         return None
-    travel = moved[:, :3, 3] - first[:, :3, 3, None]
+    displacement = moved[:, :3, 3] - first[:, :3, 3, None]
     turns = np.einsum("bijk,blj->bilk", moved[:, :3, :3], first[:, :3, :3])  # relative rotation
-    size = max(float(np.abs(travel).max(initial=0.0)), NOTHING)
+    size = max(float(np.abs(displacement).max(initial=0.0)), NOTHING)
     # the normal n has n . travel = 0 and R n = n
-    rows = [(travel / size).transpose(0, 2, 1).reshape(-1, 3)]
+    rows = [(displacement / size).transpose(0, 2, 1).reshape(-1, 3)]
     rows.append((turns.transpose(0, 3, 1, 2) - np.eye(3)).reshape(-1, 3))
     stacked = np.vstack(rows)
     candidates = [np.eye(3)[k] for k in (2, 1, 0)]

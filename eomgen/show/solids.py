@@ -116,16 +116,16 @@ def hull(points: Array) -> Mesh | None:
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        found = ConvexHull(points)
+        result = ConvexHull(points)
     except QhullError:
         return None
-    used = np.unique(found.simplices)
+    used = np.unique(result.simplices)
     place = np.zeros(len(points), dtype=np.int64)
     place[used] = np.arange(len(used))
-    faces = place[found.simplices]
+    faces = place[result.simplices]
     vertices = points[used]
     normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
-    inward = (normals * found.equations[:, :3]).sum(axis=1) < 0.0
+    inward = (normals * result.equations[:, :3]).sum(axis=1) < 0.0
     faces[inward] = faces[inward][:, ::-1]
     return vertices, faces
 
@@ -163,12 +163,12 @@ def outline(points: Array) -> Array:
         return order
 
     def chain(several: Array) -> list[Array]:
-        found: list[Array] = []
+        result: list[Array] = []
         for p in several:
-            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
-                found.pop()
-            found.append(p)
-        return found[:-1]
+            while len(result) > 1 and _turn(result[-2], result[-1], p) <= 0.0:
+                result.pop()
+            result.append(p)
+        return result[:-1]
 
     return np.array(chain(order) + chain(order[::-1]))
 
@@ -260,7 +260,7 @@ def _read_stl(data: bytes) -> Mesh:
         row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
         corners = np.frombuffer(data, row, count, 84)["corners"].astype(float).reshape(-1, 3)
     else:
-        corners = np.array([[float(x) for x in found] for found in _VERTEX.findall(data)]).reshape(-1, 3)
+        corners = np.array([[float(x) for x in result] for result in _VERTEX.findall(data)]).reshape(-1, 3)
     return corners, np.arange(len(corners) // 3 * 3).reshape(-1, 3)
 
 

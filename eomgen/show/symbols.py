@@ -256,12 +256,12 @@ def lift_items(data: PictureData, element: dict[str, Any], symbol: float, frames
 
 def _slid(joint: JointData, symbol: float, frames: Array) -> Array:
     """Values of the coordinate of a slide over the frames, and beyond."""
-    found = []
+    result = []
     for poses in frames:
         turn, origin = placed(poses, joint.P)
-        found.append(float(turn[:, 2] @ (placed(poses, joint.S)[1] - origin)))
-    more = max(0.3 * (max(found) - min(found)), BEYOND * symbol)
-    return np.linspace(min(found) - more, max(found) + more, 361)
+        result.append(float(turn[:, 2] @ (placed(poses, joint.S)[1] - origin)))
+    more = max(0.3 * (max(result) - min(result)), BEYOND * symbol)
+    return np.linspace(min(result) - more, max(result) + more, 361)
 
 
 def _turned(points: Array, angles: Array) -> Array:
@@ -446,13 +446,13 @@ class Rope:
 
     def __call__(self, poses: Array) -> Array:
         places = [placed(poses, frame)[1] for frame, _, _ in self.stops]
-        found = [places[0][None]]
+        result = [places[0][None]]
         for k, (frame, radius, sense) in enumerate(self.stops[1:], 1):
             if radius is None or k + 1 == len(self.stops):
-                found.append(places[k][None])
+                result.append(places[k][None])
             else:
-                found.append(_wound(poses, frame, float(radius), int(sense or 1), places[k - 1], places[k + 1]))
-        return np.vstack(found)
+                result.append(_wound(poses, frame, float(radius), int(sense or 1), places[k - 1], places[k + 1]))
+        return np.vstack(result)
 
 
 def _wound(poses: Array, frame: PlacedFrame, r: float, sense: int, a: Array, b: Array) -> Array:
@@ -549,8 +549,8 @@ def _belt(poses: Array, first: PlacedFrame, second: PlacedFrame, r_a: float, r_b
     along = along / distance
     across = np.cross(turn[:, 2], along)
     lean = np.arccos(np.clip((r_a - r_b if opened else r_a + r_b) / distance, -1.0, 1.0))
-    found = []
+    result = []
     for side in (1.0, -1.0):
         normal = np.cos(lean) * along + side * np.sin(lean) * across
-        found += [a + r_a * normal, b + (r_b if opened else -r_b) * normal, GAP[0]]
-    return np.array(found[:-1])
+        result += [a + r_a * normal, b + (r_b if opened else -r_b) * normal, GAP[0]]
+    return np.array(result[:-1])

@@ -42,8 +42,8 @@ def palette_of(images: Sequence[Image], colors: int) -> Image:
     if len(packed) <= colors:
         return _unpacked(packed)
     often = np.repeat(_unpacked(packed), np.ceil(np.sqrt(counts)).astype(int), axis=0)
-    found = Pictures.fromarray(often[None]).quantize(colors, Pictures.Quantize.MEDIANCUT, kmeans=ROUNDS)
-    return np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)[:colors]
+    result = Pictures.fromarray(often[None]).quantize(colors, Pictures.Quantize.MEDIANCUT, kmeans=ROUNDS)
+    return np.array(result.getpalette(), dtype=np.uint8).reshape(-1, 3)[:colors]
 
 
 def indices_in(palette: Image, image: Image) -> Image:

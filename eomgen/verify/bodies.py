@@ -143,10 +143,10 @@ def described(mechanism: Mechanism) -> list[Expr]:
 
 def rigid_bodies(numbers: Numbers, poses: Sequence[Pose]) -> list[Rigid]:
     """Bodies where they are."""
-    found = []
+    result = []
     for k, pose in enumerate(poses):
         mass, *rest = numbers[13 * k : 13 * k + 13]
         own = [rest[3:6], rest[6:9], rest[9:12]]
         inertia = product(product(pose.rotation, own), transpose(pose.rotation))
-        found.append(Rigid(mass, times(pose.rotation, rest[:3]), inertia))
-    return found
+        result.append(Rigid(mass, times(pose.rotation, rest[:3]), inertia))
+    return result

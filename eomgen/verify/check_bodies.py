@@ -40,7 +40,7 @@ def _rigid(model: CheckedModel) -> Finding:
     check = "poses: rotation matrices are orthonormal"
     if not model.layout.n_bodies:
         return Finding.skipped(check, "there are no bodies")
-    found = Comparison(check)
+    result = Comparison(check)
     bounds = model.bounds("poses", lambda: model.terms.poses)[1]
     for k, case in enumerate(model.states):
         poses = model.call("poses", case)
@@ -48,8 +48,8 @@ def _rigid(model: CheckedModel) -> Finding:
         R = poses[:, :3, :3]
         gap = np.abs(np.einsum("bij,bik->bjk", R, R) - np.eye(3)).max(axis=(1, 2))
         gap = np.maximum(gap, np.abs(np.linalg.det(R) - 1.0))
-        found.add(k, gap, error, 1.0, model.layout.bodies)
-    return found.finding()
+        result.add(k, gap, error, 1.0, model.layout.bodies)
+    return result.finding()
 
 
 def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
@@ -76,7 +76,7 @@ def _joints(model: CheckedModel) -> Finding:
     check = "joints: poses match their coordinates"
     if not model.mechanism.joints:
         return Finding.skipped(check, "there are no joints")
-    found, graph = Comparison(check), model.kinematics.graph
+    result, graph = Comparison(check), model.kinematics.graph
     cut = model.kinematics.loop_coordinates
     limits = model.bounds("poses", lambda: model.terms.poses)[1]
     held = (
@@ -115,8 +115,8 @@ def _joints(model: CheckedModel) -> Finding:
             np.abs(C).max(initial=0.0)
         )
         limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
-        found.add(k, gaps, limit, 1.0, labels)
-    return found.finding()
+        result.add(k, gaps, limit, 1.0, labels)
+    return result.finding()
 
 
 def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
@@ -139,7 +139,7 @@ def _freedoms(model: CheckedModel) -> Finding:
     check = "joints: relative velocities"
     if not model.mechanism.joints or model.mechanism.bare:
         return Finding.skipped(check, "there are no joints")
-    found, graph = Comparison(check), model.kinematics.graph
+    result, graph = Comparison(check), model.kinematics.graph
     limits = model.bounds("poses", lambda: model.terms.poses)[1]
     names = model.layout.v
     for k, truth in enumerate(model.truths):
@@ -154,8 +154,8 @@ def _freedoms(model: CheckedModel) -> Finding:
                 gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
                 labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
         limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, model.layout.length)
-        found.add(k, gaps, limit, 1.0, labels)
-    return found.finding()
+        result.add(k, gaps, limit, 1.0, labels)
+    return result.finding()
 
 
 def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodies.Twist:
@@ -179,9 +179,9 @@ def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodi
 
 def check_bodies(model: CheckedModel) -> list[Finding]:
     """Equations of the tree, accelerations, energies, momenta and power."""
-    found = [_tree(model, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
-    found += [_accelerations(model), _energy(model), _momentum(model), _power(model)]
-    return found
+    result = [_tree(model, name) for name in ("mass_matrix", "bias", "inverse_dynamics")]
+    result += [_accelerations(model), _energy(model), _momentum(model), _power(model)]
+    return result
 
 
 def source(model: CheckedModel) -> str:
@@ -210,7 +210,7 @@ def _inertia_sizes(truth: Truth) -> Array:
 
 
 def _tree(model: CheckedModel, name: str) -> Finding:
-    found, layout = Comparison(f"{name}: {source(model)}"), model.layout
+    result, layout = Comparison(f"{name}: {source(model)}"), model.layout
     labels = pairs(layout.v, layout.v) if name == "mass_matrix" else list(layout.v)
     for k, truth in enumerate(model.truths):
         actual = model.call(name, truth.case).ravel()
@@ -231,8 +231,8 @@ def _tree(model: CheckedModel, name: str) -> Finding:
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
             floor = FOLDED * np.outer(d, d).ravel() + 4.0 * EPS * size
-        found.add(k, actual - expected, bound + UNIT * np.abs(expected) + floor, size, labels)
-    return found.finding()
+        result.add(k, actual - expected, bound + UNIT * np.abs(expected) + floor, size, labels)
+    return result.finding()
 
 
 def true_accelerations(model: CheckedModel, k: int) -> tuple[Array, Array, float]:
@@ -252,14 +252,14 @@ def true_accelerations(model: CheckedModel, k: int) -> tuple[Array, Array, float
 
 
 def _accelerations(model: CheckedModel) -> Finding:
-    found, n_q = Comparison(f"accelerations: {source(model)}"), model.module.n_q
+    result, n_q = Comparison(f"accelerations: {source(model)}"), model.module.n_q
     for k, truth in enumerate(model.truths):
         try:
             a, limit, size = true_accelerations(model, k)
         except ZeroDivisionError:
-            return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
-        found.add(k, model.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in model.layout.v])
-    return found.finding()
+            return Finding.skipped(result.check, "the system of accelerations and multipliers is singular")
+        result.add(k, model.rhs(truth.case)[n_q:] - a, limit, size, [f"{n}'" for n in model.layout.v])
+    return result.finding()
 
 
 def kinetic(truth: Truth) -> Number:
@@ -287,14 +287,14 @@ def _energy(model: CheckedModel) -> Finding:
     check = "energy: of the bodies"
     if model.mechanism.bare or "energy" not in model.graph_kernels:
         return Finding.skipped(check, "there are no bodies; T and V are those of the given equations")
-    found = Comparison(check)
+    result = Comparison(check)
     bounds = model.bounds("energy", model.graph_kernels["energy"])[1]
     for k, truth in enumerate(model.truths):
         expected = numbers([kinetic(truth), potential(truth, truth.here, truth.values)])
         actual = model.call("energy", truth.case)
         limit = bounds[:, k] + UNIT * np.abs(expected) + FOLDED * size_of(expected)
-        found.add(k, actual - expected, limit, size_of(expected), model.labels("energy"))
-    return found.finding()
+        result.add(k, actual - expected, limit, size_of(expected), model.labels("energy"))
+    return result.finding()
 
 
 def _momentum(model: CheckedModel) -> Finding:
@@ -302,7 +302,7 @@ def _momentum(model: CheckedModel) -> Finding:
     check = "momentum: of the bodies"
     if "centroidal" not in model.graph_kernels:
         return Finding.skipped(check, "no body has a mass")
-    found, n = Comparison(check), 3 + 3 * model.layout.n_v
+    result, n = Comparison(check), 3 + 3 * model.layout.n_v
     bounds = model.bounds("centroidal", model.graph_kernels["centroidal"])[1]
     for k, truth in enumerate(model.truths):
         expected = numbers([*_centre(truth), *_momenta(truth)])
@@ -310,8 +310,8 @@ def _momentum(model: CheckedModel) -> Finding:
         actual, limit = (np.concatenate([y[:3], y[n : n + 6]]) for y in (every, bounds[:, k]))
         labels = [f"{what} {axis}" for what in ("centre", "linear", "angular") for axis in "xyz"]
         size = size_of(expected)
-        found.add(k, actual - expected, limit + UNIT * np.abs(expected) + FOLDED * size, size, labels)
-    return found.finding()
+        result.add(k, actual - expected, limit + UNIT * np.abs(expected) + FOLDED * size, size, labels)
+    return result.finding()
 
 
 def _centre(truth: Truth) -> list[Number]:
@@ -341,7 +341,7 @@ def _power(model: CheckedModel) -> Finding:
     check = "power: rate of energy, forces and drivers"
     if model.mechanism.bare or "energy" not in model.graph_kernels:
         return Finding.skipped(check, "there are no bodies, so it is not known which forces have a potential")
-    found, layout = Comparison(check), model.layout
+    result, layout = Comparison(check), model.layout
     for k, truth in enumerate(model.truths):
         a = model.rhs(truth.case)[model.module.n_q :]
         try:
@@ -362,8 +362,8 @@ def _power(model: CheckedModel) -> Finding:
         gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
         limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
         size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), TINY)
-        found.add(k, [float(rate - power)], [limit], size)
-    return found.finding()
+        result.add(k, [float(rate - power)], [limit], size)
+    return result.finding()
 
 
 def _energy_rate(model: CheckedModel, truth: Truth, a: Array) -> Number:
@@ -412,15 +412,15 @@ def _reactions(model: CheckedModel) -> Finding:
     why = _inapplicable(model)
     if why:
         return Finding.skipped(check, why)
-    found = Comparison(check)
+    result = Comparison(check)
     labels = [f"{body} {part}" for body in model.layout.bodies for part in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
     for k, truth in enumerate(model.truths):
         case = truth.case
         a = model.rhs(case)[module.n_q :]
         wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
         missing, size = _unbalanced(model, truth, a, wrenches)
-        found.add(k, missing, _limit(model, k, truth, wrenches, size), size_of(size), labels)
-    return found.finding()
+        result.add(k, missing, _limit(model, k, truth, wrenches, size), size_of(size), labels)
+    return result.finding()
 
 
 def _limit(model: CheckedModel, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -490,10 +490,10 @@ def _unbalanced(
             if end.body != GROUND:
                 arm = bodies.sub(point, truth.here[end.body].position)
                 take(end.body, bodies.scale(sign, many[:3]), bodies.scale(sign, many[3:]), arm)
-    return total.ravel(), _carried(truth, size).ravel()
+    return total.ravel(), _wrench_sum(truth, size).ravel()
 
 
-def _carried(truth: Truth, size: np.ndarray) -> np.ndarray:
+def _wrench_sum(truth: Truth, size: np.ndarray) -> np.ndarray:
     """Sizes (n_bodies, 6) of the terms of all bodies about each origin: a joint carries what is beyond it."""
     origins = np.array([numbers(pose.position) for pose in truth.here])
     apart = np.linalg.norm(origins[:, None] - origins[None], axis=2)
@@ -529,7 +529,7 @@ def check_reaction_laws(model: CheckedModel) -> list[Finding]:
     laws = [terms for terms in model.kinematics.forces if isinstance(terms.force, ReactionFriction)]
     if not laws or model.layout.info.wrenches is None or not model.layout.projects:
         return []
-    found = Comparison("friction: laws at the joints' reactions")
+    result = Comparison("friction: laws at the joints' reactions")
     specs = {spec.name: spec for spec in model.mechanism.joints}
     forces = [terms.force for terms in laws if isinstance(terms.force, ReactionFriction)]
     loads = [load.value for terms in laws for load in terms.coordinate_loads]
@@ -541,8 +541,8 @@ def check_reaction_laws(model: CheckedModel) -> list[Finding]:
         acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
         expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
         limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(model.layout.bodies)
-        found.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
-    return [found.finding()]
+        result.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
+    return [result.finding()]
 
 
 def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndarray) -> tuple[float, float]:

@@ -31,17 +31,17 @@ def check_kernels(model: CheckedModel) -> list[Finding]:
 
 def _kernel(model: CheckedModel, name: str) -> Finding:
     """Two evaluations of one expression in different orders differ by two bounds at most."""
-    found, labels = Comparison(f"{name}: generated code and graph"), model.labels(name)
+    result, labels = Comparison(f"{name}: generated code and graph"), model.labels(name)
     values, bounds = model.bounds(name, model.graph_kernels[name])
     for k, case in enumerate(model.states):
         actual = model.call(name, case).ravel()
-        found.add(k, actual - values[:, k], 2.0 * bounds[:, k], terms_size(values[:, k], bounds[:, k]), labels)
-    return found.finding()
+        result.add(k, actual - values[:, k], 2.0 * bounds[:, k], terms_size(values[:, k], bounds[:, k]), labels)
+    return result.finding()
 
 
 def _derived(model: CheckedModel) -> list[Finding]:
     """Kernels that are other kernels in disguise: the outputs, and the matrix of the independent coordinates."""
-    module, found = model.module, []
+    module, result = model.module, []
     if module.n_y and "motion_outputs" in model.graph_kernels:
         outputs = Comparison("outputs: at the accelerations of the motion")
         for k, case in enumerate(model.states):
@@ -58,13 +58,13 @@ def _derived(model: CheckedModel) -> list[Finding]:
                 + np.abs(slope[:, n : n + module.layout.n_v]) @ model.moved(k, C)
             )
             outputs.add(k, actual - expected, limit, size_of(expected), model.layout.y)
-        found.append(outputs.finding())
-    return found
+        result.append(outputs.finding())
+    return result
 
 
 def _batches(model: CheckedModel) -> Finding:
     """A batch gives what single calls give; the vector library's functions may differ by units in the last place."""
-    module, found = model.module, Comparison("batches: same as single calls")
+    module, result = model.module, Comparison("batches: same as single calls")
     case = model.states[0]
     rng = np.random.default_rng(COLUMNS)
     q = case.q[:, None] + 0.1 * rng.standard_normal((module.n_q, COLUMNS))
@@ -83,9 +83,9 @@ def _batches(model: CheckedModel) -> Finding:
         for k in range(COLUMNS):
             single = np.asarray(kernel(np.ascontiguousarray(states[:, k]), p=case.p, u=case.u, t=case.t)).ravel()
             labels = [f"{name} {label}" for label in model.labels(name)]
-            found.add(0, batch[:, k] - single, 2.0 * bounds[:, k], terms_size(single, bounds[:, k]), labels)
-    found.cases = 1
-    return found.finding()
+            result.add(0, batch[:, k] - single, 2.0 * bounds[:, k], terms_size(single, bounds[:, k]), labels)
+    result.states_compared = 1
+    return result.finding()
 
 
 KERNEL_STATES = {
@@ -100,7 +100,7 @@ KERNEL_STATES = {
 
 def _digits(model: CheckedModel) -> Finding:
     """The graph in double arithmetic against the graph in 50 digits: that the bounds of rounding are bounds."""
-    found = Comparison("graph: double arithmetic and 50 digits")
+    result = Comparison("graph: double arithmetic and 50 digits")
     every = {**model.graph_kernels, "gamma": lambda: model.terms.gamma}
     for name, outputs in every.items():
         values, bounds = model.bounds(name, outputs)
@@ -108,11 +108,11 @@ def _digits(model: CheckedModel) -> Finding:
         for k, truth in enumerate(model.truths):
             exact = model.system.evaluate(f"kernel {name}", outputs, truth.values)
             apart = numbers([truth.mp.mpf(float(x)) - y for x, y in zip(values[:, k], exact, strict=True)])
-            found.add(
+            result.add(
                 k, apart, bounds[:, k] + UNIT * np.abs(numbers(exact)), terms_size(values[:, k], bounds[:, k]), labels
             )
-    found.cases = len(model.truths)
-    return found.finding()
+    result.states_compared = len(model.truths)
+    return result.finding()
 
 
 # -- constraints -------------------------------------------------------------------------------------------------------
@@ -127,31 +127,31 @@ def _jacobian(model: CheckedModel) -> Finding:
     check = "constraint_jacobian: differences of C"
     if not model.terms.n_c:
         return Finding.skipped(check, "there are no constraints")
-    found, layout = Comparison(check), model.layout
+    result, layout = Comparison(check), model.layout
     bounds = model.bounds("constraint_jacobian", model.graph_kernels["constraint_jacobian"])[1]
     for k, truth in enumerate(model.truths):
         expected = numbers([x for row in truth.constraint_jacobian for x in row])
         actual = model.call("constraint_jacobian", truth.case).ravel()
         limit = bounds[:, k] + UNIT * np.abs(expected)
-        found.add(
+        result.add(
             k, actual - expected, limit + FIRST_DIFFERENCE, size_of(expected), pairs(layout.constraint_labels, layout.v)
         )
-    return found.finding()
+    return result.finding()
 
 
 def _velocity(model: CheckedModel) -> Finding:
     check = "velocity_constraints: rate of C along the motion"
     if not model.terms.n_c:
         return Finding.skipped(check, "there are no constraints")
-    found = Comparison(check)
+    result = Comparison(check)
     bounds = model.bounds("velocity_constraints", model.graph_kernels["velocity_constraints"])[1]
     for k, truth in enumerate(model.truths):
         expected = numbers(truth.velocity_rows)
         actual = model.call("velocity_constraints", truth.case)
         size = float((np.abs(model.call("constraint_jacobian", truth.case)) @ np.abs(truth.case.v)).max(initial=0.0))
         limit = bounds[:, k] + UNIT * np.abs(expected)
-        found.add(k, actual - expected, limit + FIRST_DIFFERENCE, size, model.layout.constraint_labels)
-    return found.finding()
+        result.add(k, actual - expected, limit + FIRST_DIFFERENCE, size, model.layout.constraint_labels)
+    return result.finding()
 
 
 def _gamma(model: CheckedModel) -> Finding:
@@ -161,19 +161,19 @@ def _gamma(model: CheckedModel) -> Finding:
         return Finding.skipped(
             check, "there are no constraints" if model.layout.projects else "derived with baumgarte="
         )
-    found = Comparison(check)
+    result = Comparison(check)
     values, bounds = model.bounds("gamma", lambda: model.terms.gamma)
     for k, truth in enumerate(model.truths):
         expected = numbers(truth.gamma)
         limit = bounds[:, k] + UNIT * np.abs(expected)
-        found.add(
+        result.add(
             k,
             values[:, k] - expected,
             limit + SECOND_DIFFERENCE * size_of(expected),
             size_of(expected),
             model.layout.constraint_labels,
         )
-    return found.finding()
+    return result.finding()
 
 
 def _potentials(model: CheckedModel) -> Finding:
@@ -182,7 +182,7 @@ def _potentials(model: CheckedModel) -> Finding:
     forces = [terms for terms in model.kinematics.forces if terms.potential is not None]
     if not forces:
         return Finding.skipped(check, "no force element has a potential")
-    found, layout = Comparison(check), model.layout
+    result, layout = Comparison(check), model.layout
     for k, truth in enumerate(model.truths):
         slopes = _potential_slopes(model, truth)
         every, rest = truth.applied(), truth.applied(remainder=True)
@@ -191,8 +191,8 @@ def _potentials(model: CheckedModel) -> Finding:
         limit = (64.0 * UNIT if model.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + NO_FORCE
         if "bias" in model.graph_kernels:  # folded constants weigh more beside half a turn, as rounding does
             limit = np.maximum(limit, FOLDED / UNIT * model.bounds("bias", model.graph_kernels["bias"])[1][:, k])
-        found.add(k, gap, limit, size_of(own), layout.v)
-    return found.finding()
+        result.add(k, gap, limit, size_of(own), layout.v)
+    return result.finding()
 
 
 def _potential_slopes(model: CheckedModel, truth: Truth) -> list[Number]:
@@ -217,11 +217,11 @@ DIRECTIONS = 2  #: random ones for each state
 
 def check_derivatives(model: CheckedModel) -> list[Finding]:
     """By the state, by inputs and by parameters."""
-    found = [_along(model), _all_directions(model)]
+    result = [_along(model), _all_directions(model)]
     for name, n in (("input_jacobian", model.module.n_u), ("parameter_jacobian", model.module.n_p)):
         if n and name in model.module.core.names and model.layout.projects and not model.layout.general_rates:
-            found.append(_by(model, name))
-    return found
+            result.append(_by(model, name))
+    return result
 
 
 def accelerations(model: CheckedModel, truth: Truth, values: Values) -> Numbers:
@@ -294,7 +294,7 @@ def _along(model: CheckedModel) -> Finding:
         return Finding.skipped(check, why)
     if not model.module.layout.n_dof:
         return Finding.skipped(check, "the constraints allow no motion")
-    found, rng = Comparison(check), np.random.default_rng(1)
+    result, rng = Comparison(check), np.random.default_rng(1)
     for k, truth in enumerate(model.truths):
         case = truth.case
         J = model.module.jacobian(case.t, case.x, p=case.p, u=case.u)
@@ -313,9 +313,9 @@ def _along(model: CheckedModel) -> Finding:
             d = np.concatenate([_moved(truth, w), change])
             size = max(size_of(np.abs(J) @ np.abs(d)), size_of(model.rhs(case)))
             limit = 4.0 * model.layout.n_x * UNIT * condition * size + slack * max(1.0, size_of(d))
-            found.add(k, J @ d - expected, limit, size, model.labels("rhs"))
-    found.cases = len(model.truths)
-    return found.finding()
+            result.add(k, J @ d - expected, limit, size, model.labels("rhs"))
+    result.states_compared = len(model.truths)
+    return result.finding()
 
 
 def _state_rates(model: CheckedModel, truth: Truth) -> Callable[[Values], Numbers]:
@@ -396,7 +396,7 @@ def _compare(
     least: float = 0.0,
 ) -> Finding:
     """``least``: size of columns of any such Jacobian, which counts where constraints leave no motion."""
-    found, condition = Comparison(check), _condition(model, model.states[0])
+    result, condition = Comparison(check), _condition(model, model.states[0])
     try:
         noise = _noise(model, 0)
     except ZeroDivisionError:
@@ -417,9 +417,9 @@ def _compare(
         slopes.append(slope)
         errors.append(error)
     if left_out:
-        found.note = f"without {', '.join(left_out)}: no consistent state was found nearby"
+        result.note = f"without {', '.join(left_out)}: no consistent state was found nearby"
     expected, error = np.array(slopes).T, np.array(errors).T
     size = max(size_of(expected), size_of(model.rhs(model.states[0])), least)
     limit = error + rounding * size
-    found.add(0, J - expected, limit, size, pairs(model.labels("rhs"), names))
-    return found.finding()
+    result.add(0, J - expected, limit, size, pairs(model.labels("rhs"), names))
+    return result.finding()

@@ -52,12 +52,12 @@ def check_runs(model: CheckedModel) -> list[Finding]:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
     kinked = not model.layout.info.smooth
     references = [(case, cache(_reference(model, case))) for case in _held(model)[:TRIED]]
-    found = [_order(model, method, references) for method in ORDERS if method in _methods(model)]
+    result = [_order(model, method, references) for method in ORDERS if method in _methods(model)]
     end = _far(model, *references[0])
-    found += [_agreement(model, *end), _energy(model, end[0])]
+    result += [_agreement(model, *end), _energy(model, end[0])]
     why = "its forces have corners or tables, and no method keeps its order there"
     return [
-        f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in found
+        f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in result
     ]
 
 
@@ -84,12 +84,12 @@ def _held(model: CheckedModel) -> list[SystemState]:
     rates = [model.layout.u.index(rate) for of in model.layout.input_rates.values() for rate, _ in of]
     if not rates:
         return list(model.states)
-    found = []
+    result = []
     for case in model.states:
         u = np.array(case.u)
         u[rates] = 0.0
-        found.append(case._replace(u=u, x=model.module.project(case.x, t=case.t, p=case.p, u=u)))
-    return found
+        result.append(case._replace(u=u, x=model.module.project(case.x, t=case.t, p=case.p, u=u)))
+    return result
 
 
 def _time_scale(model: CheckedModel, case: SystemState) -> float:
@@ -164,7 +164,7 @@ def _order(model: CheckedModel, method: str, references: Sequence[tuple[SystemSt
     falls short is in order where SciPy's step of the same method ends at the same place, far nearer than their error.
     """
     check, order = f"steppers: order of {method}", ORDERS[method]
-    found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
+    result = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
     observed: list[tuple[float, int]] = []
     for case, reference in references:
         bound = model.module.bind(case.p, case.u)
@@ -199,8 +199,8 @@ def _order(model: CheckedModel, method: str, references: Sequence[tuple[SystemSt
     if not observed:
         return Finding.skipped(check, "the errors of one step are so small that rounding hides them")
     best, number = min(observed)
-    found.add(number, [best], SHORT)
-    return found.finding()
+    result.add(number, [best], SHORT)
+    return result.finding()
 
 
 def _as_scipy(bound: BoundModel, case: SystemState, method: str, h: float, end: Array, error: float) -> bool:
@@ -211,10 +211,10 @@ def _as_scipy(bound: BoundModel, case: SystemState, method: str, h: float, end: 
     try:
         run = solver(bound.rhs, case.t, case.x, case.t + 2.0 * h, first_step=h, max_step=h, rtol=LOOSE, atol=LOOSE)
         run.step()
-        found = bound.project(run.y, t=case.t + h)
+        result = bound.project(run.y, t=case.t + h)
     except EomgenError:
         return False
-    return bool(run.t == case.t + h) and float(np.abs(end - found).max()) < SAME_STEP * error
+    return bool(run.t == case.t + h) and float(np.abs(end - result).max()) < SAME_STEP * error
 
 
 def _agreement(model: CheckedModel, h: float, expected: Array) -> Finding:
@@ -222,35 +222,37 @@ def _agreement(model: CheckedModel, h: float, expected: Array) -> Finding:
     check, case = "runs: methods agree", _held(model)[0]
     methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(model)] or ["DOP853"]
     bound = model.module.bind(case.p, case.u)
-    found = Comparison(check, ", ".join(methods))
+    result = Comparison(check, ", ".join(methods))
     size = size_of(expected)
     for method in methods:
         tolerances = {"rtol": COMPARED, "atol": ABSOLUTE * COMPARED * size}
         end = integrator(bound, method=method, **tolerances)(case.t, case.x, h)
-        found.add(0, end - expected, COLLECTED * COMPARED * size, size, [f"{method} {name}" for name in model.layout.x])
-    found.cases = 1
-    return found.finding()
+        result.add(
+            0, end - expected, COLLECTED * COMPARED * size, size, [f"{method} {name}" for name in model.layout.x]
+        )
+    result.states_compared = 1
+    return result.finding()
 
 
 def _energy(model: CheckedModel, h: float) -> Finding:
     """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
     module, case = model.module, _held(model)[0]
-    found = Comparison("runs: energy and loops")
+    result = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
     rtol, atol = COMPARED, ABSOLUTE * COMPARED
     run = simulate(bound, (case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=atol)
     residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))
                  for t, x in zip(run.t, run.x.T, strict=True)]  # fmt: skip
-    found.add(0, [max(residuals, default=0.0)], [ACCEPTED], 1.0, ["loops"])
+    result.add(0, [max(residuals, default=0.0)], [ACCEPTED], 1.0, ["loops"])
     if _conservative(model):
         E = np.array([bound.energy(x, t=t) for t, x in zip(run.t, run.x.T, strict=True)])
         size = float(np.abs(E[:, 0]).max() + np.abs(E[:, 1] - E[0, 1]).max()) or 1.0
-        found.add(0, [np.abs(E.sum(axis=1) - E[0].sum()).max()], [1e3 * rtol * size], size, ["energy"])
-        found.note = "energy and loops"
+        result.add(0, [np.abs(E.sum(axis=1) - E[0].sum()).max()], [1e3 * rtol * size], size, ["energy"])
+        result.note = "energy and loops"
     else:
-        found.note = "loops; forces, drivers or inputs do work"
-    found.cases = 1
-    return found.finding()
+        result.note = "loops; forces, drivers or inputs do work"
+    result.states_compared = 1
+    return result.finding()
 
 
 def _conservative(model: CheckedModel) -> bool:

@@ -90,9 +90,9 @@ class CheckedModel:
     @cached_property
     def graph_kernels(self) -> dict[str, Callable[[], Sequence[Expr]]]:
         """Kernels that are expressions of the graph, by name."""
-        found = [*GRAPH_KERNELS, *(() if self.terms.by_columns else ("mass_matrix",))]
+        result = [*GRAPH_KERNELS, *(() if self.terms.by_columns else ("mass_matrix",))]
         names = self.module.core.names
-        return {k: partial(EXPRESSIONS[k], self.terms) for k in found if k in names and 0 not in self.layout.shape(k)}
+        return {k: partial(EXPRESSIONS[k], self.terms) for k in result if k in names and 0 not in self.layout.shape(k)}
 
     # -- labels -------------------------------------------------------------------------------------------------------
     def labels(self, kernel: str) -> list[str]:

@@ -186,9 +186,9 @@ def _each(mp: Any, outputs: list[Expr], names: Sequence[str]) -> Any:
     def value(given: Sequence[Any]) -> list[Any]:
         rows = np.broadcast_arrays(*given)
         shape = rows[0].shape
-        found = [evaluate(dict(zip(names, one, strict=True))) for one in zip(*(r.ravel() for r in rows), strict=True)]
-        made = np.empty((len(outputs), len(found)), dtype=object)
-        for k, column in enumerate(found):
+        result = [evaluate(dict(zip(names, one, strict=True))) for one in zip(*(r.ravel() for r in rows), strict=True)]
+        made = np.empty((len(outputs), len(result)), dtype=object)
+        for k, column in enumerate(result):
             made[:, k] = column
         return [row.reshape(shape) for row in made]
 
@@ -246,23 +246,23 @@ def bounded(outputs: Sequence[Expr], values: Mapping[str, Array], count: int) ->
     none = np.zeros(count)
     if graph is None:
         return np.zeros((0, count)), np.zeros((0, count))
-    found: dict[int, Pair] = {}
+    result: dict[int, Pair] = {}
     with np.errstate(all="ignore"):
         for i in reachable(graph, (y.id for y in outputs)):
             operation, *args = graph.nodes[i]
             if operation == "const":
-                found[i] = np.full(count, float(args[0])), none
+                result[i] = np.full(count, float(args[0])), none
             elif operation == "sym":
-                found[i] = np.broadcast_to(np.asarray(values[args[0]], dtype=float), (count,)), none
+                result[i] = np.broadcast_to(np.asarray(values[args[0]], dtype=float), (count,)), none
             elif operation in OPERATIONS:
-                found[i] = _apply(OPERATIONS[operation], [found[k] for k in args])
+                result[i] = _apply(OPERATIONS[operation], [result[k] for k in args])
             else:
                 function, orders = graph.calls[operation]
                 if isinstance(function, PairCall):
-                    found[i] = _of_pairs(function, [found[k] for k in args])
+                    result[i] = _of_pairs(function, [result[k] for k in args])
                     continue
-                found[i] = _called(function.implementation(orders), [found[k] for k in args])
-    return np.array([found[y.id][0] for y in outputs]), np.array([found[y.id][1] for y in outputs])
+                result[i] = _called(function.implementation(orders), [result[k] for k in args])
+    return np.array([result[y.id][0] for y in outputs]), np.array([result[y.id][1] for y in outputs])
 
 
 def _called(function: Callable[..., Any], given: Sequence[Pair]) -> tuple[Any, Any]:
@@ -291,8 +291,8 @@ def _of_pairs(call: PairCall, given: Sequence[Any]) -> Any:
         return np.asarray(function(list(at[:count]), *at[count:]), dtype=float)
 
     at = [a for a, _ in operands]
-    found = value(at)
-    size = abs(found)  # a component of a body's force or moment may be what is left of the others
+    result = value(at)
+    size = abs(result)  # a component of a body's force or moment may be what is left of the others
     wrenches = 6 * call.function.bodies
     size[:wrenches] = np.repeat(size[:wrenches].reshape(-1, 6, *size.shape[1:]).max(axis=1), 6, axis=0)
     bounds = PAIR_ROUNDING * UNIT * size
@@ -302,4 +302,4 @@ def _of_pairs(call: PairCall, given: Sequence[Any]) -> Any:
             shift = NUDGE * (1.0 + abs(a))
             up, down = (value([*at[:k], a + s, *at[k + 1 :]]) for s in (shift, -shift))
             bounds = bounds + abs(up - down) / (2.0 * shift) * error
-    return list(zip(found, bounds, strict=True))
+    return list(zip(result, bounds, strict=True))

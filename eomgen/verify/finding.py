@@ -30,7 +30,7 @@ class Finding(NamedTuple):
     worst: float  #: the largest difference found, relative to the size of what was compared; nan where left out
     limit: float  #: the most that rounding allows there
     where: str = ""  #: body, joint, row or coordinate and the state of the worst figure
-    cases: int = 0  #: number of states compared
+    states_compared: int = 0  #: number of states compared
     note: str = ""  #: why the check does not apply, or failed to run
 
     @property
@@ -54,7 +54,7 @@ class Finding(NamedTuple):
             key: value if isfinite(value) else None for key, value in (("worst", self.worst), ("limit", self.limit))
         }
         own = {"check": self.check, "ok": self.ok, "left_out": self.left_out}
-        return own | figures | {"where": self.where, "cases": self.cases, "note": self.note}
+        return own | figures | {"where": self.where, "cases": self.states_compared, "note": self.note}
 
     @classmethod
     def skipped(cls, check: str, why: str) -> Finding:
@@ -90,12 +90,12 @@ class Verification(NamedTuple):
         rows = [HEADER, *(_cells(finding) for finding in self.findings)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(HEADER) - 1)]
         lines = []
-        room = min(WIDTH, terminal_width() or WIDTH)
+        columns = min(WIDTH, terminal_width() or WIDTH)
         for row, note in zip(rows, ("", *(f.note for f in self.findings)), strict=True):
             cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
             lines.append("  ".join([*cells, row[-1]]).rstrip())
             indent = " " * (widths[0] + 4)
-            lines += fold(note, room, indent, indent)
+            lines += fold(note, columns, indent, indent)
         return "\n".join(lines)
 
     def __str__(self) -> str:
@@ -142,7 +142,7 @@ class Comparison:
 
     def __init__(self, check: str, note: str = "") -> None:
         self.check, self.note = check, note
-        self.cases = 0
+        self.states_compared = 0
         self._share = -1.0
         self._unlimited = False  #: whether an entry had no finite limit
         self._worst: tuple[float, float, str] = (0.0, 0.0, "")
@@ -170,7 +170,7 @@ class Comparison:
         labels : sequence of str, optional
             One for each entry.
         """
-        self.cases += 1
+        self.states_compared += 1
         apart = np.abs(np.asarray(difference, dtype=float)).ravel()
         allowed = np.broadcast_to(np.asarray(limit, dtype=float), np.shape(difference)).ravel() + UNDERFLOW
         if not apart.size:
@@ -193,7 +193,7 @@ class Comparison:
         if self._share < 0.0 and self._unlimited:
             return Finding.skipped(self.check, NO_LIMIT)
         worst, limit, where = self._worst
-        return Finding(self.check, worst, limit if np.isfinite(limit) else 0.0, where, self.cases, self.note)
+        return Finding(self.check, worst, limit if np.isfinite(limit) else 0.0, where, self.states_compared, self.note)
 
 
 def size_of(values: ArrayLike) -> float:

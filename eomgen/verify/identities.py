@@ -34,16 +34,16 @@ Check = Callable[["BoundModel", Sequence[SystemState]], Finding]
 
 def identities(module: BoundModel, states: Sequence[SystemState]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
-    found = []
+    result = []
     for name, check in CHECKS.items():
         if module.info.no_inertia and check not in KINEMATIC:
-            found.append(Finding.skipped(name, "the model is for kinematics only"))
+            result.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
-            found.append(check(module, states))
+            result.append(check(module, states))
         except EomgenError as error:
-            found.append(failed(name, error))
-    return found
+            result.append(failed(name, error))
+    return result
 
 
 def _mass(module: BoundModel, c: SystemState) -> Array:
@@ -63,36 +63,36 @@ def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         )
     if module.info.indefinite:
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
-    found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
+    result = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in states:
         M = module.kernels.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
-        found.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
+        result.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
         smallest = float(algebra.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
-        found.add(c.number, [max(0.0, -smallest)], [0.0])
-    return found.finding()
+        result.add(c.number, [max(0.0, -smallest)], [0.0])
+    return result.finding()
 
 
 def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     check = "energy: T = v M v / 2"
     if not module.n_bodies:
         return Finding.skipped(check, "there are no bodies")
-    found = Comparison(check)
+    result = Comparison(check)
     for c in states:
         v, M = c.v[: module.n_v], module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
         T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(v @ M @ v) / 2.0
         size = float(np.abs(v) @ np.abs(M) @ np.abs(v)) / 2.0
-        found.add(c.number, [T - expected], [KERNEL * size], size)
-    return found.finding()
+        result.add(c.number, [T - expected], [KERNEL * size], size)
+    return result.finding()
 
 
 def _inverse(module: BoundModel, states: Sequence[SystemState]) -> Finding:
-    found = Comparison("inverse_dynamics: M a + h")
+    result = Comparison("inverse_dynamics: M a + h")
     for c in states:
         M, h = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u)
         expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
         size = size_of(np.abs(M) @ np.abs(c.a) + np.abs(h))
-        found.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.layout.v)
-    return found.finding()
+        result.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.layout.v)
+    return result.finding()
 
 
 def _rates(module: BoundModel, q: Array, v: Array) -> Array:
@@ -105,16 +105,16 @@ def _slopes(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     check = "constraint_jacobian: extrapolated differences"
     if not module.n_rows or module.layout.general_rates:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
-    found, n_h = Comparison(check), module.layout.n_h
+    result, n_h = Comparison(check), module.layout.n_h
     for c in states:
         C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[:n_h]
         for j, scale in enumerate(module.layout.scales.q):
             way = _rates(module, c.q, np.eye(module.layout.n_v)[j]) * scale
             slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))
             size = size_of(C) * scale
-            found.add(c.number, slope - C[:, j] * scale, error + KERNEL * size, size, module.constraint_labels[:n_h])
-    found.cases = len(states)
-    return found.finding()
+            result.add(c.number, slope - C[:, j] * scale, error + KERNEL * size, size, module.constraint_labels[:n_h])
+    result.states_compared = len(states)
+    return result.finding()
 
 
 def _along_q(module: BoundModel, c: SystemState, way: Array) -> Callable[[float], Array]:
@@ -123,21 +123,21 @@ def _along_q(module: BoundModel, c: SystemState, way: Array) -> Callable[[float]
 
 def _projection(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
-    found, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
+    result, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
     for c in states:
         x = module.project(c.x, t=c.t, p=c.p, u=c.u)
         again = module.project(x, t=c.t, p=c.p, u=c.u)
-        found.add(c.number, again - x, CLOSED * size_of(x), size_of(x), module.x_names)
+        result.add(c.number, again - x, CLOSED * size_of(x), size_of(x), module.x_names)
         for state, t, p, u in ((x, c.t, c.p, c.u), (module.x0(), 0.0, module.p, module.u)):
             gap = scales.residual(module.constraints(state[: module.n_q], t=t, p=p, u=u, rows="all"))
-            found.add(c.number, gap, CLOSED, 1.0, module.constraint_labels[: module.layout.n_h])
-    found.cases = len(states)
-    return found.finding()
+            result.add(c.number, gap, CLOSED, 1.0, module.constraint_labels[: module.layout.n_h])
+    result.states_compared = len(states)
+    return result.finding()
 
 
 def _balance(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
-    found = Comparison("rhs: forces in balance along free motions")
+    result = Comparison("rhs: forces in balance along free motions")
     for c in states:
         a = module.rhs(c.t, c.x, p=c.p, u=c.u)[module.n_q :]
         M, h, C = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
@@ -147,8 +147,8 @@ def _balance(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         condition = _condition(M, C, scale)
         # terms of M and h as large as the largest force may cancel in a direction without any force
         limit = KERNEL * (condition * size + size_of(size))
-        found.add(c.number, free.T @ (M @ a + h), limit, size_of(size))
-    return found.finding()
+        result.add(c.number, free.T @ (M @ a + h), limit, size_of(size))
+    return result.finding()
 
 
 def _null(J: Array) -> Array:
@@ -175,7 +175,7 @@ def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     check = "rhs: constraints stay satisfied"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
-    found = Comparison(check)
+    result = Comparison(check)
     for c in states:
         rate = module.rhs(c.t, c.x, p=c.p, u=c.u)
         time_scale = 1.0 / max(size_of(rate), 1.0)
@@ -184,8 +184,8 @@ def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         condition = _condition(_mass(module, c), C, module.layout.scales.q)
         noise = KERNEL * size_of(np.abs(C) @ np.abs(c.v))
         slope, error = extrapolate(_along_x(module, c, rate, time_scale), noise)
-        found.add(c.number, slope, error + KERNEL * condition * size, max(size, noise))
-    return found.finding()
+        result.add(c.number, slope, error + KERNEL * condition * size, max(size, noise))
+    return result.finding()
 
 
 def _along_x(module: BoundModel, c: SystemState, rate: Array, time_scale: float) -> Callable[[float], Array]:
@@ -208,7 +208,7 @@ def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         return Finding.skipped(
             check, "there is no degree of freedom" if not module.layout.n_dof else "derived with baumgarte="
         )
-    found = Comparison(check)
+    result = Comparison(check)
     for c in states:
         bound = module.bind(c.p, c.u)
         minimal = Minimal(bound)
@@ -217,8 +217,8 @@ def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         own = minimal.rhs(c.t, minimal.reduce(c.x))
         condition = _condition(_mass(module, c), _jacobian(module, c), layout.scales.q)
         size = size_of(bound.rhs(c.t, c.x))
-        found.add(c.number, own - full, CLOSED * condition * size, size, minimal.x_names)
-    return found.finding()
+        result.add(c.number, own - full, CLOSED * condition * size, size, minimal.x_names)
+    return result.finding()
 
 
 #: Name -> check; the name is what a check that raises is told by.
@@ -248,21 +248,21 @@ NAMES = {"jacobian": "x", "input_jacobian": "u", "parameter_jacobian": "p"}  #: 
 
 def jacobians(module: BoundModel, states: Sequence[SystemState]) -> list[Finding]:
     """One finding for each Jacobian of the complete right-hand side that the module has."""
-    found = []
+    result = []
     for name, by in NAMES.items():
         size = {"x": module.n_x, "u": module.n_u, "p": module.n_p}[by]
         exact = by == "x" or (module.layout.projects and not module.layout.general_rates)
         if size and exact and name in module.core.names:
             check = f"{name}: extrapolated differences of rhs"
             try:
-                found.append(_compare(module, check, name, by, states[:STATES]))
+                result.append(_compare(module, check, name, by, states[:STATES]))
             except EomgenError as error:
-                found.append(failed(check, error))
-    return found
+                result.append(failed(check, error))
+    return result
 
 
 def _compare(module: BoundModel, check: str, name: str, by: str, states: Sequence[SystemState]) -> Finding:
-    found, layout = Comparison(check), module.layout
+    result, layout = Comparison(check), module.layout
     names = {"x": layout.x, "u": module.u_names, "p": module.p_names}[by]
     left_out: set[str] = set()
     for c in states:
@@ -283,11 +283,11 @@ def _compare(module: BoundModel, check: str, name: str, by: str, states: Sequenc
             if compared is None:
                 left_out.add(label)
                 continue
-            found.add(c.number, *compared, size, pairs([f"{n}'" for n in layout.x], [label]))
-    found.cases = len(states)
+            result.add(c.number, *compared, size, pairs([f"{n}'" for n in layout.x], [label]))
+    result.states_compared = len(states)
     if left_out:
-        found.note = f"without {', '.join(sorted(left_out))}: no consistent state was found nearby"
-    return found.finding()
+        result.note = f"without {', '.join(sorted(left_out))}: no consistent state was found nearby"
+    return result.finding()
 
 
 def _scales(module: BoundModel, c: SystemState, by: str) -> Array:

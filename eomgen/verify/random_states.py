@@ -134,8 +134,8 @@ def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: 
     for k in range(HALVINGS):
         try:
             x = module.project(np.concatenate([reference + shift * 0.5**k, v]), t=t, p=p, u=u)
-            idle = bool(module.info.no_inertia)
-            if _closed(module, x, t, p, u) and (idle or np.isfinite(module.rhs(t, x, p=p, u=u)).all()):
+            massless = bool(module.info.no_inertia)
+            if _closed(module, x, t, p, u) and (massless or np.isfinite(module.rhs(t, x, p=p, u=u)).all()):
                 return x
         except EomgenError:
             continue
@@ -208,19 +208,19 @@ def record_calls(name: str, module: BoundModel | None) -> str:
     module : BoundModel or None
         None where nothing can be evaluated without a compiler, because the model calls functions in C.
     """
-    found: list[dict[str, Any]] = []
+    result: list[dict[str, Any]] = []
     if module is not None:
         try:
             x = np.asarray(module.x0(), dtype=float)
             start = SystemState(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
-            found.append({"id": "x0", "call": "x0", "arguments": [], "given": {}, **_judged(x, [])})
-            cases = [start, *random_states(module, STATES - 1, SEED)] if module.n_x else [start]
+            result.append({"id": "x0", "call": "x0", "arguments": [], "given": {}, **_judged(x, [])})
+            states_compared = [start, *random_states(module, STATES - 1, SEED)] if module.n_x else [start]
         except EomgenError:  # no state can be assembled: the package says so when it is called
-            cases = []
-        for number, case in enumerate(cases):
+            states_compared = []
+        for number, case in enumerate(states_compared):
             tried = [_record(module, call, case, number) for call in CALLS]
-            found += [one for one in tried if one is not None]
-    return json.dumps({"name": name, "cases": found}, separators=(",", ":"), allow_nan=False) + "\n"
+            result += [one for one in tried if one is not None]
+    return json.dumps({"name": name, "cases": result}, separators=(",", ":"), allow_nan=False) + "\n"
 
 
 def _record(module: BoundModel, call: str, case: SystemState, number: int) -> dict[str, Any] | None:

@@ -43,11 +43,11 @@ class Truth(PreciseState):
     def virtual(self) -> list[list[Twist]]:
         """Twist of every body in a unit of each velocity: (n_v, n_bodies)."""
         h = self.mp.mpf(FIRST)
-        found = []
+        result = []
         for j in range(self.n):
             ahead, behind = self.poses(self.displaced(j, h)), self.poses(self.displaced(j, -h))
-            found.append([bodies.difference(*x, h) for x in zip(ahead, behind, self.here, strict=True)])
-        return found
+            result.append([bodies.difference(*x, h) for x in zip(ahead, behind, self.here, strict=True)])
+        return result
 
     @cached_property
     def twists(self) -> list[Twist]:
@@ -104,11 +104,11 @@ class Truth(PreciseState):
             lambda: [x for load in loads for x in (*load.marker.frame.position, *load.force, *load.torque)],
             self.values,
         )
-        found = []
+        result = []
         for k, load in enumerate(loads):
             body, nine = load.marker.body, flat[9 * k : 9 * k + 9]
-            found.append((body, bodies.times(self.here[body].rotation, nine[:3]), nine[3:6], nine[6:9]))
-        return found
+            result.append((body, bodies.times(self.here[body].rotation, nine[:3]), nine[3:6], nine[6:9]))
+        return result
 
     def coordinate_loads(self, remainder: bool = False) -> list[tuple[str, Number]]:
         """Generalized forces along joint coordinates."""

@@ -59,24 +59,24 @@ def variant_findings(model: CheckedModel, seconds: float, seed: int = 0) -> list
         **{f"method {name}": partial(_derived, model, name) for name in METHODS if name != model.equations.method},
         "target numpy": partial(_interpreted, model, target),
     }
-    found = []
+    result = []
     for name, change in changes.items():
         check = f"variants: {name}"
         if perf_counter() > end:
-            found.append(Finding.skipped(check, f"{NOT_REACHED} in {seconds:g} s"))
+            result.append(Finding.skipped(check, f"{NOT_REACHED} in {seconds:g} s"))
             continue
         try:
-            found.append(_compared(model, check, change()))
+            result.append(_compared(model, check, change()))
         except (NotApplicable, ToolchainError) as why:
-            found.append(Finding.skipped(check, str(why)))
+            result.append(Finding.skipped(check, str(why)))
         except (EomgenError, ArithmeticError, LookupError) as error:  # though the model itself was not refused
-            found.append(failed(check, error))
-    return found
+            result.append(failed(check, error))
+    return result
 
 
 def _compared(model: CheckedModel, check: str, other: BoundModel) -> Finding:
     """Accelerations of another module at the states of this one, against those found in many digits."""
-    found = Comparison(check)
+    result = Comparison(check)
     if other.n_dof != model.module.n_dof:
         note = f"{other.n_dof} degrees of freedom instead of {model.module.n_dof}"
         return Finding(check, np.inf, 0.0, note=note)
@@ -90,8 +90,8 @@ def _compared(model: CheckedModel, check: str, other: BoundModel) -> Finding:
         rates = dict(zip(other.layout.v, other.rhs(case.t, x, p=case.p, u=case.u)[other.n_q :], strict=True))
         shared = [i for i, name in enumerate(names) if name in rates]
         actual = np.array([rates[names[i]] for i in shared])
-        found.add(k, actual - a[shared], limit[shared], size, [f"{names[i]}'" for i in shared])
-    return found.finding()
+        result.add(k, actual - a[shared], limit[shared], size, [f"{names[i]}'" for i in shared])
+    return result.finding()
 
 
 def _state_of(model: CheckedModel, case: SystemState, other: BoundModel) -> Array:
@@ -218,11 +218,11 @@ def _way_round(mechanism: Mechanism, topology: Topology, cut: int) -> list[int]:
     above = {branch.body: branch for branch in topology.branches}
 
     def down(body: int) -> list[int]:
-        found = []
+        result = []
         while body != GROUND:
-            found.append(above[body].joint)
+            result.append(above[body].joint)
             body = above[body].parent
-        return found
+        return result
 
     first, second = (down(end.body) for end in (mechanism.joints[cut].predecessor, mechanism.joints[cut].successor))
     return [k for k in (*first, *second) if (k in first) != (k in second)]

@@ -76,8 +76,8 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     states, seed = _read(states, seed, seconds)
     start = perf_counter()
     with inner_run():
-        found = _of_module(module, states, seed, start + seconds)
-    return Verification(module.name, tuple(found), perf_counter() - start)
+        result = _of_module(module, states, seed, start + seconds)
+    return Verification(module.name, tuple(result), perf_counter() - start)
 
 
 def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
@@ -97,15 +97,15 @@ def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[F
     if not module.n_x:
         return _of_fixed_bodies(module)
     random = random_states(module, states, seed)
-    found = identities(module, random)
+    result = identities(module, random)
     equations = getattr(module, "equations", None)
     if equations is None:
-        found += jacobians(module, random)
+        result += jacobians(module, random)
         why = "they need the equations, and a package does not contain them: verify the model that it was made from"
-        found.append(Finding.skipped("graph, free bodies, derivatives, runs, variants", why))
+        result.append(Finding.skipped("graph, free bodies, derivatives, runs, variants", why))
     else:
-        found += _with_equations(module, equations, random, seed, end)
-    return found
+        result += _with_equations(module, equations, random, seed, end)
+    return result
 
 
 def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
@@ -114,7 +114,7 @@ def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
     worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
     why = "the model has no coordinate: its bodies are fixed to ground"
     return [
-        Finding("poses: rotation matrices are orthonormal", worst, 16.0 * EPS, cases=1),
+        Finding("poses: rotation matrices are orthonormal", worst, 16.0 * EPS, states_compared=1),
         Finding.skipped("all that moves", why),
     ]
 
@@ -136,23 +136,23 @@ def _with_equations(
     from ..mechanics.methods.positive import FREE, note_lost_digits, smallest_share
     from .checked import CheckedModel
 
-    model, found = CheckedModel(module, equations, random), []
+    model, result = CheckedModel(module, equations, random), []
     parts = equations.kinematics, equations.mobility, equations.tree
-    idle = module.info.no_inertia
-    if idle:
-        why = f"the model is for kinematics only: {idle}"
-        found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs, variants", why))
+    massless = module.info.no_inertia
+    if massless:
+        why = f"the model is for kinematics only: {massless}"
+        result.append(Finding.skipped("bodies, joints, reactions, derivatives, runs, variants", why))
     elif equations.method not in FREE and (note := note_lost_digits(*parts)):
         share = smallest_share(*parts)
-        found.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
-    for group in KINEMATIC if idle else GROUPS:
+        result.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
+    for group in KINEMATIC if massless else GROUPS:
         check = getattr(import_module(f"{__package__}.{GROUPS[group]}"), f"check_{group}")
         try:
-            found += check(model)
+            result += check(model)
         except (EomgenError, ArithmeticError) as error:
-            found.append(failed(f"checks of {group}", error))
-    if not idle:
+            result.append(failed(f"checks of {group}", error))
+    if not massless:
         from .variants import variant_findings
 
-        found += variant_findings(model, max(LEAST, end - perf_counter()), seed)
-    return found
+        result += variant_findings(model, max(LEAST, end - perf_counter()), seed)
+    return result
