@@ -125,7 +125,7 @@ def cubic_piece(y0: Array, y1: Array, d0: Array, d1: Array, s: Array) -> Array:
 
 
 def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
-    """Coefficients (n + 1, 4) of :class:`~eomgen.expr.user_functions.Curve` from values and slopes at the points."""
+    """Coefficients (n + 1, 4) of :class:`~eomgen.expr.functions.Curve` from values and slopes at the points."""
     h = np.diff(x)
     rise = np.diff(y) / h
     t = (s[:-1] + s[1:] - 2.0 * rise) / h

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.pairs import PairCall
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable, substitute
 from ..expr.evaluate import evaluate
-from ..expr.pairs import PairCall
 
 if TYPE_CHECKING:
     from ..api.equations import Equations

@@ -19,9 +19,8 @@ from ..base.names import hint, joined
 from ..base.operations import operations_with
 from ..errors import UsageError, ill_placed, no_such
 from ..expr.core import LEAVES, Expr, Graph, reachable, symbols_of
-from ..expr.functions import Function, NativeCode
+from ..expr.functions import Curve, Function, NativeCode, Surface
 from ..expr.schedule import count
-from ..expr.user_functions import Curve, Surface
 from ..mechanics import Kinematics
 from ..mechanics.methods.positive import require_inertia
 from ..mechanics.methods.tree_equations import TreeEquations

@@ -1,6 +1,6 @@
 """The functions a program calls -> C files of their own: tables as constants, native sources as they are.
 
-The arithmetic is that of :mod:`eomgen.expr.user_functions`.  Everything is re-entrant: tables are constant.
+The arithmetic is that of :mod:`eomgen.expr.functions`.  Everything is re-entrant: tables are constant.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ..contact.pairs import pair_call
 from ..errors import incomplete
-from ..expr.functions import Function
-from ..expr.pairs import pair_call
-from ..expr.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
+from ..expr.functions import Curve, Function, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from .files import render
 from .program import Program
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from ..base.kernel_table import RECORD, WITNESS
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
+from ..contact.pair_features import CHOSEN, OTHER, OWN, PIECE
+from ..contact.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
+from ..contact.pairs import PairFunction, PairKind, PairPart
 from ..expr.core import symbols_of
-from ..expr.pair_features import CHOSEN, OTHER, OWN, PIECE
-from ..expr.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
-from ..expr.pairs import PairFunction, PairKind, PairPart
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render

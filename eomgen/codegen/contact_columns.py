@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..contact.pair_sums import POSE
+from ..contact.pairs import PairFunction, pair_call
 from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
 from ..expr.differentiate import jvp
-from ..expr.pair_sums import POSE
-from ..expr.pairs import PairFunction, pair_call
 from .terms import SystemTerms
 
 #: Blocks of M of the bodies and h, of the operands of the sums, and of the residual along wrenches on their bodies.

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 from ..base.kernel_table import DAE, NAMED
+from ..contact.pairs import pairs_of_bodies, without_pairs
 from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
-from ..expr.pairs import pairs_of_bodies, without_pairs
 from ..expr.schedule import count
 from ..mechanics.wrenches import inertial_terms
 from .contact_columns import COLUMNS, ContactColumns, contact_columns

@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+from ..contact.pairs import list_operands
 from ..expr.core import Expr, reachable, substitute
 from ..expr.differentiate import jacobian, jvp
-from ..expr.pairs import list_operands
 from ..expr.tensors import dot, total
 from .loop_systems import BodyLoops
 from .program import Block, Port

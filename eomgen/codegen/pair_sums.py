@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
+from ..contact.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
+from ..contact.pairs import PairCall, PairFunction, pair_call
 from ..errors import cannot
 from ..expr.core import Expr, Graph, reachable
-from ..expr.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
-from ..expr.pairs import PairCall, PairFunction, pair_call
 from .contact_columns import WRENCH
 from .loop_slopes import BY_BODIES
 from .program import Program

@@ -29,8 +29,8 @@ from ..elements.looks import (
 from ..errors import UsageError
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import evaluate
+from ..expr.functions import Curve
 from ..expr.schedule import record_tape
-from ..expr.user_functions import Curve
 from ..model.mechanism import JointSpec, Mechanism
 
 #: Symbols that stand for the parameters of a curve or a surface.

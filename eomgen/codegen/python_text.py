@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..base.operations import CONDITION, OPERATIONS
+from ..contact.pairs import PairCall, PairFunction, PairPart, pair_call
 from ..expr.core import symbols_of
 from ..expr.differentiate import square_under_root
-from ..expr.functions import Function
-from ..expr.pairs import PairCall, PairFunction, PairPart, pair_call
-from ..expr.user_functions import Curve, Surface
+from ..expr.functions import Curve, Function, Surface
 from .program import Block, Program
 from .statements import Pieces, PrintedFunction, cut, references
 

@@ -17,8 +17,8 @@ from ..elements.forces.force import View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import gradient
+from ..expr.functions import Surface
 from ..expr.records import dataclass
-from ..expr.user_functions import Surface
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import quadratic_form
 from .limits import ASTRAY, FOOT, STEEP

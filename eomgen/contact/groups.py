@@ -18,10 +18,10 @@ from ..elements.frames import Frame, Marker
 from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
-from ..expr.pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, PairLaw, meet, pair_kind
+from .pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
 from .point import CURVED
 from .profiles import never_reached
 from .shapes import PIECED, ContactShape, Feature, by_edges
@@ -49,7 +49,7 @@ from .states import (
 # -- the element -------------------------------------------------------------------------------------------------------
 
 # The law of one kind of pair is derived once, in a graph of its own; the sum over all pairs is one operation of the
-# model's graph (:mod:`~eomgen.expr.pairs`), so that equations do not grow with the number of pairs.
+# model's graph (:mod:`~eomgen.contact.pairs`), so that equations do not grow with the number of pairs.
 
 
 @dataclass(frozen=True)
@@ -295,7 +295,7 @@ class _SharedData:
         return self._places[x]
 
     def row(self, body: int, feature: Feature) -> tuple[int, ...]:
-        """A row of a table of shapes; see :class:`~eomgen.expr.pair_sums.PairSum`."""
+        """A row of a table of shapes; see :class:`~eomgen.contact.pair_sums.PairSum`."""
         frame = feature.frame
         entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
         bound = -1 if feature.bound is None else self.place(feature.bound)

@@ -15,13 +15,13 @@ from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, substitute
 from ..expr.differentiate import jvp
-from ..expr.pair_features import CHOSEN, EDGE, OTHER, OWN, PIECE
-from ..expr.pair_sums import POSE
-from ..expr.pairs import PairKind
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import BlockEllipsoid, EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .fields import FieldEllipsoid, FieldRound, HeightField, planted
 from .limits import NOWHERE
+from .pair_features import CHOSEN, EDGE, OTHER, OWN, PIECE
+from .pair_sums import POSE
+from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, BowlRound, EdgeRound, InsideRound, NotchRound

@@ -23,10 +23,10 @@ from ..elements.forces.force import View, where
 from ..elements.forces.normal_laws import NormalLaw, PartOfLaw
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.pair_features import FACING, OWN
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import FLAT_CORNER, NOWHERE
+from .pair_features import FACING, OWN
 from .point import Contact, Touch
 from .profiles import Point, dot, minus, times, unit
 
@@ -80,7 +80,7 @@ class _Matter(NamedTuple):
 
 
 def _matter(sizes: Sequence[Expr]) -> _Matter:
-    """The numbers of :mod:`~eomgen.expr.pair_features` in the polygon's own axes."""
+    """The numbers of :mod:`~eomgen.contact.pair_features` in the polygon's own axes."""
     graph = sizes[0].graph
     start, end, normal, before, after, *others = zip(sizes[0 : FACING + 8 : 2], sizes[1 : FACING + 8 : 2], strict=True)
     bend = graph.apply("max", dot(normal, after), dot(before, normal))
@@ -110,7 +110,7 @@ class _Parts(NamedTuple):
 class PolygonPolygon(Contact):
     """A convex polygon about the second marker on one about the first, in its x-y plane: one of two contact points.
 
-    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.expr.pair_features`);
+    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.contact.pair_features`);
     ``witness`` is 0 or 1.
     """
 

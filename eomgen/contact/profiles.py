@@ -15,10 +15,10 @@ from ..elements.forces.force import View, where
 from ..elements.frames import Frame
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
-from ..expr.pair_features import PIECE
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import EVEN, FLAT_CORNER, ROOM, SHARED
+from .pair_features import PIECE
 from .point import Contact, Touch
 
 # -- profiles ----------------------------------------------------------------------------------------------------------
@@ -401,7 +401,7 @@ def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
 
 
 def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
-    """Of each piece those that :mod:`~eomgen.expr.pair_features` reads."""
+    """Of each piece those that :mod:`~eomgen.contact.pair_features` reads."""
     found: list[Expr] = []
     for one in pieces:
         half, bend = (one.half, one.half.graph.zero) if one.kind == "edge" else (one.sizes[1], one.sizes[0])

@@ -11,10 +11,10 @@ from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.differentiate import jvp
-from ..expr.pair_features import EDGE
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .limits import PARALLEL
+from .pair_features import EDGE
 from .point import Contact, SphereSphere, Touch
 from .states import BLOCK, CORE
 

@@ -18,10 +18,10 @@ from ..elements.frames import Frame, Marker
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.pair_features import EDGE
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .fields import field_lines
+from .pair_features import EDGE
 from .profiles import (
     Point,
     ProfilePart,

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.files import write_whole
+from ..contact.pairs import opaque_names
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..expr.notation import Notation
-from ..expr.pairs import opaque_names
 from ..reading.document import DrawnPicture, Folded, Piece, Section, write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:

@@ -36,7 +36,7 @@ class Nodes:
         self.n_passes = 0
         self.reached: dict[frozenset[int], list[int]] = {}
         self._ids: dict[Node, int] = {}
-        self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
+        self.calls: dict[str, tuple[Any, tuple[int, ...]]] = {}
 
     def _const(self, value: float) -> int:
         if not math.isfinite(value):
@@ -290,7 +290,8 @@ class Graph(Nodes):
     roots : Roots, optional
         What :mod:`.differentiate` knows of its nodes.
     functions, calls : dict
-        Functions that expressions may call, by name; what each operation that is a call means: (Function, orders).
+        Functions that expressions may call, by name; what each operation that is a call means: (Function, orders),
+        or of a sum over pairs of shapes (:class:`~eomgen.contact.pairs.PairCall`, ()).
     """
 
     __slots__ = ("functions", "one", "roots", "zero")

@@ -8,7 +8,6 @@ from typing import Any
 from ..base.operations import OPERATIONS, operations_with
 from .core import LEAVES, Expr, Graph, common_graph, marked_again, reachable
 from .functions import raised
-from .pairs import is_pair_item, pair_call, push_pairs
 
 # -- partial derivatives of nodes --------------------------------------------------------------------------------------
 
@@ -312,11 +311,10 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
             d = g.make("select", c, tangents.get(a, zero), tangents.get(b, zero))
         elif row is not None and not row.slopes:
             continue
-        elif row is None and pair_call(g, operation) is not None:
-            found_slope = push_pairs(g, i, tangents)
-            if found_slope is None:
+        elif row is None and (call := g.calls[operation][0]).lists:
+            d = call.push(g, i, tangents)
+            if d is None:
                 continue
-            d = found_slope
         elif row is not None and len(node) == 2:
             da = tangent(node[1])
             if da is None:
@@ -387,7 +385,7 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
             adjoints[node[2]] = add(adjoints[node[2]], mul(w, node[1])) if node[2] in adjoints else mul(w, node[1])
         elif (
             operation == "absorb"
-            or is_pair_item(g, operation)
+            or _is_item(g, operation)
             or ((row := OPERATIONS.get(operation)) is not None and row.choice is not None)
         ):
             branches.append(i)
@@ -402,6 +400,11 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
                 if flag:
                     d = g.make("absorb", w, slope) if tame else mul(w, slope)
                     adjoints[k] = add(adjoints[k], d) if k in adjoints else d
+
+
+def _is_item(g: Graph, operation: str) -> bool:
+    """Whether a node is an entry of a list."""
+    return operation in g.calls and bool(g.calls[operation][0].item)
 
 
 def _active(g: Graph, order: Iterable[int], sources: Mapping[int, int]) -> dict[int, int]:
@@ -559,7 +562,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
         mask, node = rows[i], nodes[i]
         if node[0] in LEAVES:
             continue
-        if node[0] in branching or is_pair_item(g, node[0]):
+        if node[0] in branching or _is_item(g, node[0]):
             return False
         cost = 1 if node[0] in ("add", "sub", "neg") else 2
         for k in node[1:]:

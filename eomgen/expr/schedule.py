@@ -11,7 +11,6 @@ from typing import Any
 from ..base.operations import ARITHMETIC, OPERATIONS, operations_with
 from ..errors import cannot
 from .core import LEAVES, Expr, Graph, common_graph, reachable
-from .pairs import pair_call
 from .records import dataclass
 
 # -- numbers of operations ---------------------------------------------------------------------------------------------
@@ -76,7 +75,10 @@ def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
         return Operations()
     nodes = graph.nodes
     found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)) if i not in skipped)
-    found = _with_pairs(graph, found)
+    for name in found.keys() & graph.calls.keys():
+        n, counted = found.pop(name), graph.calls[name][0].counted(name)
+        if counted:
+            found[counted] += n
     bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
         multiplications=found["mul"] + found["absorb"],
@@ -86,18 +88,6 @@ def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
         functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
         choices={k: found[k] for k in sorted(found.keys() & bends)},
     )
-
-
-def _with_pairs(graph: Graph, found: Counter[str]) -> Counter[str]:
-    """The same, with sums over pairs of shapes under their names; that results are read from lists is no operation."""
-    calls = {name: call for name in found.keys() & graph.calls.keys() if (call := pair_call(graph, name)) is not None}
-    if not calls:
-        return found
-    rest = Counter({name: n for name, n in found.items() if name not in calls})
-    for name, call in calls.items():
-        if call.part not in ("item", "given"):
-            rest[f"pairs {call.function.element}({call.part})"] += found[name]
-    return rest
 
 
 # -- order of evaluation -----------------------------------------------------------------------------------------------

@@ -17,7 +17,6 @@ from sympy.matrices.matrixbase import MatrixBase
 from ..base.operations import CONDITION, OPERATIONS
 from ..errors import EomgenError
 from .core import LEAVES, Expr, Graph, common_graph, reachable
-from .pairs import PairCall, pair_call
 from .shown import is_tower, parts_of, shortened
 
 # -- from SymPy --------------------------------------------------------------------------------------------------------
@@ -392,26 +391,13 @@ def inlined_size(exprs: Sequence[Expr]) -> int:
 
 def raise_operation(graph: Graph, kind: str, operands: Sequence[Any]) -> Any:
     """An operation, or a call of a function of the graph, on SymPy expressions."""
-    summed = pair_call(graph, kind)
-    if summed is not None:
-        return _pair_node(summed, [as_number(x) for x in operands])
     if kind in graph.calls:
         function, orders = graph.calls[kind]
-        return _call(function.name, orders, [as_number(x) for x in operands])
+        operands = [as_number(x) for x in operands]
+        return function.in_sympy(operands) if function.lists else _call(function.name, orders, operands)
     row = OPERATIONS[kind]
     truths = len(operands) if row.kind == CONDITION and not row.jumps else int(row.chooses)
     return row.raised(sympy, *(_as_truth(x) if n < truths else as_number(x) for n, x in enumerate(operands)))
-
-
-def _pair_node(call: PairCall, operands: Sequence[Any]) -> Any:
-    """A node of a sum over pairs: an unknown function of all symbols that it depends on."""
-    if call.part == "sum":
-        return operands[0]
-    if call.part == "item":
-        return sympy.Function(f"{operands[0].func}_{call.numbers[0]}")(*operands[0].args)
-    symbols = sorted(set().union(*(x.free_symbols for x in operands)), key=str)
-    name = call.function.name if call.part == "given" else f"{call.name}_{len(call.numbers)}"
-    return sympy.Function(name)(*symbols)
 
 
 def _call(name: str, orders: Sequence[int], operands: Sequence[Any]) -> Any:

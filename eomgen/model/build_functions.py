@@ -19,9 +19,8 @@ from ..base.limits.numbers import APART, PERIODIC
 from ..base.splines import curve_coefficients, slopes
 from ..elements import kinds
 from ..errors import UsageError
-from ..expr.functions import Function, NativeCode
+from ..expr.functions import Curve, Function, NativeCode, Orders, Surface, Twin, up_to
 from ..expr.records import dataclass
-from ..expr.user_functions import Curve, Orders, Surface, Twin, up_to
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import FUNCTION, function_fields

@@ -12,9 +12,9 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.limits.numbers import EPS
 from ..base.operations import OPERATIONS, Operation
+from ..contact.pairs import PairCall
 from ..errors import MissingDependencyError
 from ..expr.core import Expr, common_graph, reachable
-from ..expr.pairs import PairCall
 from .limits import NUDGE, PAIR_ROUNDING
 
 # -- values by mpmath --------------------------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ class Digits:
                 if isinstance(function, PairCall):
                     if function.function not in loops:
                         loops[function.function] = function.function.evaluator(partial(_each, mp))
-                    call = _flat(function, loops[function.function])
+                    call = function.on_numbers(loops[function.function])
                 else:
                     call = _Local(mp, function, orders)
                 self._steps.append((None, call, tuple(slot[k] for k in args)))
@@ -125,7 +125,7 @@ class _Local:
         return total
 
     def _expand(self, centre: list[float]) -> None:
-        from ..expr.user_functions import up_to
+        from ..expr.functions import up_to
 
         self.centre, self.terms = centre, []
         for total in range(3):
@@ -172,11 +172,6 @@ def solve(matrix: list[Numbers], right: list[Numbers]) -> list[Numbers]:
                 values = [x - row[j] * y for x, y in zip(values, solution[j], strict=True)]
         solution[i] = [x / row[i] for x in values]
     return solution
-
-
-def _flat(call: PairCall, loops: Any) -> Any:
-    """A node of a sum over pairs on numbers of many digits."""
-    return call.on_numbers(loops)
 
 
 def _each(mp: Any, outputs: list[Expr], names: Sequence[str]) -> Any:

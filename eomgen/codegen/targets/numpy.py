@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...errors import cannot
-from ...expr.functions import Function
-from ...expr.user_functions import Twin
+from ...expr.functions import Function, Twin
 from ...expr.without_gc import timed, without_gc
 from ...toolchain.load import load_numpy
 from ..c import closed_at
@@ -33,15 +32,15 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
     """
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
-    imports = [f"from .expr.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
+    imports = [f"from .expr.functions import {', '.join(sorted(kinds))}"] if kinds else []
     definitions = [print_table(f, "Curve", "Surface") for f, _ in calls.values() if f.native is None]
     sums = used_sums(program)
     if sums:
-        imports.append("from .expr.pair_sums import PairSum")
+        imports.append("from .contact.pair_sums import PairSum")
         chosen = {len(kind.corners) for function, *_ in sums for kind in function.kinds} & {1, 2}
         if chosen:
             names = sorted({1: "nearest", 2: "facing"}[count] for count in chosen)
-            imports.append(f"from .expr.pair_features import {', '.join(names)}")
+            imports.append(f"from .contact.pair_features import {', '.join(names)}")
         definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions
 

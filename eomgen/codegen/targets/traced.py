@@ -17,7 +17,7 @@ from ...base.kernel_table import NAMED
 from ...base.limits.constraints import ACCEPTED, DIFFERENTIATED
 from ...base.scales import Space
 from ...errors import MissingDependencyError, cannot
-from ...expr.user_functions import Curve, Surface, bicubic, combined, cubic, hermite
+from ...expr.functions import Curve, Surface, bicubic, combined, cubic, hermite
 from ...toolchain.targets import TRACED_KERNELS
 from ...toolchain.trusted_files import load_source
 from ..c_functions import used_calls

@@ -9,11 +9,12 @@ from typing import Any, Literal
 
 from ..base.kernel_table import RECORD, WITNESS
 from ..errors import cannot
-from .core import Expr, Graph, Node, reachable, substitute
-from .functions import Function
+from ..expr.core import Expr, Graph, Node, reachable, substitute
+from ..expr.evaluate import Evaluator
+from ..expr.functions import Function
+from ..expr.records import dataclass
 from .pair_features import facing, nearest
 from .pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
-from .records import dataclass
 
 # -- pair kinds --------------------------------------------------------------------------------------------------------
 
@@ -40,12 +41,12 @@ class PairKind:
     symbols : tuple of str
         Numbers of the first shape, of the second, of the law, and then their rates.
     outputs, slopes : tuple of int
-        What a pair exerts (:data:`~eomgen.expr.pair_sums.RESULT` nodes), and its directional derivative.
+        What a pair exerts (:data:`~eomgen.contact.pair_sums.RESULT` nodes), and its directional derivative.
     touch : tuple of int
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
     witness : tuple of int
-        Where they touch: :data:`~eomgen.expr.pair_sums.WITNESS` nodes for each place.
+        Where they touch: :data:`~eomgen.contact.pair_sums.WITNESS` nodes for each place.
     held : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
@@ -140,7 +141,7 @@ class PairFunction:
     data : tuple of float or None
         Operands that follow the ``POSE`` numbers of each body, where they are numbers; states of pairs are the last.
     tables : tuple
-        Of shapes; see :class:`~eomgen.expr.pair_sums.PairSum`.
+        Of shapes; see :class:`~eomgen.contact.pair_sums.PairSum`.
     kinds : tuple of PairKind
     states : int
         How many states all pairs have together.
@@ -233,15 +234,11 @@ class PairFunction:
         return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            name: getattr(self, name) for name in self.__dataclass_fields__
-        }  # loops are made anew where they are used
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}  # loops are made anew
 
     @cached_property
     def in_floats(self) -> PairSum:
         """Its loops on floats and arrays."""
-        from .evaluate import Evaluator
-
         return self.evaluator(Evaluator)
 
 
@@ -260,8 +257,8 @@ class PairCall:
     function: PairFunction
     part: str
     numbers: tuple[int, ...] = ()
-    native: None = None
-    evaluator: None = None
+    native = evaluator = None
+    lists = True
 
     @property
     def name(self) -> str:
@@ -275,9 +272,6 @@ class PairCall:
     def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
         """Its value as a function of numbers, by given loops."""
 
-        def given(*operands: Any) -> Any:
-            return list(_unpacked(operands))
-
         def slope(*operands: Any) -> Any:
             flat = operands if len(operands) == 1 + len(self.numbers) else tuple(_unpacked(operands))
             return loops.slope_along(flat[0], self.numbers, flat[1:])
@@ -286,9 +280,63 @@ class PairCall:
             flat = operands if len(operands) > 1 else tuple(_unpacked(operands))
             return loops.meeting(flat[0], flat[1:])
 
-        made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
-        made["witnesses"] = loops.witnesses
+        made: dict[str, Callable[..., Any]] = {"sum": loops, "slope": slope, "meeting": meeting}
+        made |= {"given": lambda *operands: list(_unpacked(operands)), "witnesses": loops.witnesses}
         return made[self.part] if self.part in made else itemgetter(self.numbers[0])
+
+    def push(self, graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
+        """The tangent of its node from those of the nodes before it; None where there is none.
+
+        Raises
+        ------
+        UsageError
+            It is a derivative already.
+        """
+        ids, function = graph.nodes[i][1:], self.function
+        if self.item:
+            slope = tangents.get(ids[0])
+            if slope is None:
+                return None
+            moving = graph.calls[graph.nodes[slope][0]][0]
+            assert isinstance(moving, PairCall)
+            return _item(graph, function, slope, self.numbers[0]) if _acts(function, moving, self.numbers[0]) else None
+        if self.part == "given":
+            return None
+        if self.part in ("meeting", "witnesses"):
+            raise cannot(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
+        if self.part == "slope":
+            raise cannot(
+                f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "
+                "point_plane, sphere_plane or sphere_sphere, or do without second-order sensitivities"
+            )
+        operands = graph.nodes[ids[0]][1:]
+        moving_numbers = tuple(k for k, j in enumerate(operands) if j in tangents)
+        if not moving_numbers:
+            return None
+        name = f"pairs {function.name}(slope {' '.join(map(str, moving_numbers))})"
+        rates = [tangents[operands[k]] for k in moving_numbers]
+        return _node(graph, PairCall(function, "slope", moving_numbers), name, [ids[0], *rates])
+
+    @property
+    def item(self) -> bool:
+        """Whether it is an entry of a list."""
+        return self.part == "item"
+
+    def counted(self, operation: str) -> str:
+        """The name under which it is counted; that results are read from lists is no operation."""
+        return "" if self.part in ("item", "given") else f"pairs {self.function.element}({self.part})"
+
+    def in_sympy(self, operands: Sequence[Any]) -> Any:
+        """An unknown function of all symbols that it depends on."""
+        import sympy
+
+        if self.part == "sum":
+            return operands[0]
+        if self.item:
+            return sympy.Function(f"{operands[0].func}_{self.numbers[0]}")(*operands[0].args)
+        symbols = sorted(set().union(*(x.free_symbols for x in operands)), key=str)
+        name = self.function.name if self.part == "given" else f"{self.name}_{len(self.numbers)}"
+        return sympy.Function(name)(*symbols)
 
 
 def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:
@@ -314,12 +362,6 @@ def opaque_names(graph: Graph) -> list[str]:
     return sorted({*graph.functions, *sums})
 
 
-def is_pair_item(graph: Graph, operation: str) -> bool:
-    """Whether a node is an entry of a list of results."""
-    call = pair_call(graph, operation)
-    return call is not None and call.part == "item"
-
-
 def list_operands(graph: Graph, i: int) -> tuple[int, ...]:
     """A node itself, or what the list of operands that it is holds: a list is no number that a block can hand on."""
     call = pair_call(graph, graph.nodes[i][0])
@@ -327,8 +369,12 @@ def list_operands(graph: Graph, i: int) -> tuple[int, ...]:
 
 
 def _node(graph: Graph, call: PairCall, operation: str, ids: Sequence[int]) -> int:
-    graph.calls[operation] = (call, ())  # type: ignore[assignment]
+    graph.calls[operation] = (call, ())
     return graph._node((operation, *ids))
+
+
+def _list(graph: Graph, function: PairFunction, part: str, ids: Sequence[int]) -> int:
+    return _node(graph, PairCall(function, part), f"pairs {function.name}({part})", ids)
 
 
 def _item(graph: Graph, function: PairFunction, listed: int, k: int) -> int:
@@ -338,26 +384,23 @@ def _item(graph: Graph, function: PairFunction, listed: int, k: int) -> int:
 def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
     """The results of a sum over pairs as expressions."""
     ids = [x.id for x in operands]
-    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", ids)
-    total = _node(graph, PairCall(function, "sum"), f"pairs {function.name}(sum)", [given])
+    total = _list(graph, function, "sum", [_list(graph, function, "given", ids)])
     return [Expr(graph, _item(graph, function, total, k)) for k in range(function.results)]
 
 
 def pair_meeting(
     graph: Graph, function: PairFunction, operands: Sequence[Expr], accelerations: Sequence[Expr]
 ) -> list[Expr]:
-    """When shapes that are apart may meet, and more: see :meth:`~eomgen.expr.pair_sums.PairSum.meeting`."""
+    """When shapes that are apart may meet, and more: see :meth:`~eomgen.contact.pair_sums.PairSum.meeting`."""
     assert len(accelerations) == MOTION * function.bodies
-    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
-    ids = [given, *(x.id for x in accelerations)]
-    listed = _node(graph, PairCall(function, "meeting"), f"pairs {function.name}(meeting)", ids)
+    given = _list(graph, function, "given", [x.id for x in operands])
+    listed = _list(graph, function, "meeting", [given, *(x.id for x in accelerations)])
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
 
 
 def pair_witnesses(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
-    """Pairs that are near: see :meth:`~eomgen.expr.pair_sums.PairSum.witnesses`."""
-    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
-    listed = _node(graph, PairCall(function, "witnesses"), f"pairs {function.name}(witnesses)", [given])
+    """Pairs that are near: see :meth:`~eomgen.contact.pair_sums.PairSum.witnesses`."""
+    listed = _list(graph, function, "witnesses", [_list(graph, function, "given", [x.id for x in operands])])
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.witnesses)]
 
 
@@ -374,43 +417,6 @@ def without_pairs(outputs: Sequence[Expr], listed: Sequence[Expr]) -> list[Expr]
     rigid = {element for _, element in calls(listed)}
     items = [Expr(graph, i) for i, element in calls(outputs) if element in rigid]
     return substitute(outputs, dict.fromkeys(items, graph.zero)) if items else list(outputs)
-
-
-def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
-    """The tangent of a node of a sum over pairs from those of the nodes before it; None where there is none.
-
-    Raises
-    ------
-    UsageError
-        It is a derivative already.
-    """
-    operation, *ids = graph.nodes[i]
-    call = pair_call(graph, operation)
-    assert call is not None
-    function = call.function
-    if call.part == "item":
-        slope = tangents.get(ids[0])
-        if slope is None:
-            return None
-        moving = graph.calls[graph.nodes[slope][0]][0]
-        assert isinstance(moving, PairCall)
-        return _item(graph, function, slope, call.numbers[0]) if _acts(function, moving, call.numbers[0]) else None
-    if call.part == "given":
-        return None
-    if call.part in ("meeting", "witnesses"):
-        raise cannot(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
-    if call.part == "slope":
-        raise cannot(
-            f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "
-            "point_plane, sphere_plane or sphere_sphere, or do without second-order sensitivities"
-        )
-    operands = graph.nodes[ids[0]][1:]
-    moving_numbers = tuple(k for k, j in enumerate(operands) if j in tangents)
-    if not moving_numbers:
-        return None
-    name = f"pairs {function.name}(slope {' '.join(map(str, moving_numbers))})"
-    rates = [tangents[operands[k]] for k in moving_numbers]
-    return _node(graph, PairCall(function, "slope", moving_numbers), name, [ids[0], *rates])
 
 
 def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
