@@ -155,8 +155,7 @@ def build(description: Description) -> Mechanism:
     if lagrangian is None:
         check_energies(given, outputs, faults)
     _check_path_quantities(reader, forces)
-    if not faults:
-        check_dimensions(reader, joints)
+    check_dimensions(reader, joints)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
     if faults:

@@ -71,6 +71,8 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
     kinds = {c: k.kind for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True)}
     kinds |= {j.name: j.joint.coordinates[0].kind for j in joints if len(j.coordinates) == 1}
     for path, expression, local in reader.expressions:
+        if reader.faults.under(path):
+            continue
         section, entry, steps = _place(reader.description, path)
         field, values = _field(section, entry, steps)
 

@@ -7,7 +7,7 @@ are parameters or expressions of the model.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, NamedTuple
@@ -22,8 +22,8 @@ from ..expr.notation import literal
 from .build_elements import declare_contacts, declare_coordinates, element_states
 from .build_quantities import declare_states, declare_switches
 from .checks import check_keys, unknown_key
-from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
-from .fields import ADDED, COMPONENT
+from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin, place_of
+from .fields import ADDED, COMPONENT, fields_of
 from .names import ENERGIES, RATES, Namespace, callable_names, fault_of_name, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
 from .units import UnitError, read_unit
@@ -314,6 +314,12 @@ def add_instance(target: Description, component: Component, instance: Instance, 
     }
     renaming = Renaming(component.names, instance.prefix, texts, attached, component.closed)
     _copy_origins(target, component, instance, origins)
+
+    def note_attachment(name: str, where: str) -> None:
+        """What is wrong there with a marker in the place of an attachment is wrong where the instance gives it."""
+        target.origins[where] = Origin(f"{path}.at.{name}", "", "")
+        target.lines[where] = place_of(f"{path}.at.{name}", faults.lines)
+
     for section in SECTIONS:
         for entry in component.description.sections[section]:
             if section == "bodies" and entry.name == GROUND_NAME:
@@ -328,8 +334,13 @@ def add_instance(target: Description, component: Component, instance: Instance, 
                 made.name = f"{instance.prefix}{entry.name}"
                 made.path = f"{section}.{made.name}"
                 target.sections[section].append(made)
+                for key, kind in fields_of(section, entry.values).items():
+                    for name, where in _attachments_in(entry.values.get(key), key) if kind.holds in _HOLDERS else ():
+                        if name in instance.at:
+                            note_attachment(name, f"{made.path}.{where}")
     for name, (body, placed) in renaming.markers.items():
         _add_marker(target, body, name, placed)
+        note_attachment(name.removeprefix(instance.prefix), f"bodies.{body}.markers.{name}")
     _add_starts(target, component, instance, renaming)
     return True
 
@@ -365,6 +376,24 @@ def _attachments(
             fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy, "EG-MISSING")
             sound = False
     return found if sound else None
+
+
+#: What kinds of keys hold that may speak of an attachment.
+_HOLDERS = ("marker", "body")
+
+
+def _attachments_in(value: Any, path: str) -> Iterator[tuple[str, str]]:
+    """Names that may be those of attachments, and the paths at which what is given for them is read."""
+    if isinstance(value, str):
+        yield value, path
+    elif isinstance(value, Mapping) and isinstance(value.get("body"), str):
+        yield from ((value["body"], f"{path}.{key}") for key in ("body", "on"))
+    elif isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _attachments_in(part, f"{path}.{key}")
+    elif isinstance(value, list | tuple):
+        for k, part in enumerate(value):
+            yield from _attachments_in(part, f"{path}[{k}]")
 
 
 def _attached(target: Description, reference: Any) -> Attached | None:
@@ -441,6 +470,8 @@ def _copy_origins(target: Description, component: Component, instance: Instance,
         head, rest = _split(key)
         if head in origins:
             target.lines.setdefault(origins[head] + rest, place_in_file)
+            if rest and key in inner.origins:
+                target.origins[origins[head] + rest] = inner.origins[key]
     for name, prefix in inner.instances.items():
         target.instances[f"{instance.prefix}{name}"] = instance.prefix + prefix
 

@@ -44,10 +44,10 @@ class DescribedEntry:
 
 
 class Origin(NamedTuple):
-    """Where an entry that an instance of a component brought comes from.
+    """Where an entry that an instance of a component brought comes from, or a marker in the place of an attachment.
 
     ``place`` is the dotted path of the entry in the component, ``instance`` the name of the instance (``leg1``, or
-    ``leg1.knee``), ``prefix`` what stands before its names.
+    ``leg1.knee``), ``prefix`` what stands before its names; of a marker the path where the instance gives it alone.
     """
 
     place: str
@@ -79,7 +79,7 @@ class Description:
     instances : dict of str to str
         Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
     origins : dict of str to Origin
-        Path of an entry that an instance brought -> where it comes from.
+        Path of an entry that an instance brought, or of a marker in it -> where it comes from.
     incomplete : bool
         Whether components or instances have faults, so that names are missing.
     """
@@ -188,20 +188,31 @@ class Faults:
         return list_names_once(sorted(self._merge_instances(), key=lambda p: (p.file, p.line)))
 
     def _merge_instances(self) -> list[Problem]:
-        """Problems of what instances brought, at the entry of the component, with the names of the instances."""
+        """Problems of what instances brought, at the entry of the component, with the names of the instances.
+
+        Those of a marker that an instance gives for an attachment are at that marker, and no follower of them is told.
+        """
+        places = [(problem, *self._origin_of(problem.path)) for problem in self.problems]
+        attached = tuple(problem.message for problem, _, origin in places if origin is not None and not origin.instance)
         found: dict[Any, tuple[Problem, list[str]]] = {}
-        for problem in self.problems:
-            section, _, rest = problem.path.partition(".")
-            name = re.split(r"[.\[]", rest, maxsplit=1)[0]
-            origin = self.origins.get(f"{section}.{name}")
+        for problem, own, origin in places:
             if origin is None:
                 found[problem] = (problem, [])
-                continue
-            path = origin.place + rest[len(name) :]
-            alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
-            first = problem._replace(path=path)
-            found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
+            elif not origin.instance:
+                path = origin.place + problem.path[len(own) :]
+                found.setdefault((path, problem.message), (problem._replace(path=path), []))
+            elif not problem.message.startswith(attached):
+                path = origin.place + problem.path[len(own) :]
+                alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
+                first = problem._replace(path=path)
+                found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
         return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in found.values()]
+
+    def _origin_of(self, path: str) -> tuple[str, Origin | None]:
+        """The part of a path that an instance brought, and where that comes from."""
+        while path and path not in self.origins:
+            path = parent_of(path)
+        return path, self.origins.get(path)
 
 
 def list_names_once(problems: Sequence[Problem]) -> list[Problem]:

@@ -378,12 +378,13 @@ class Builder(ElementMethods):
         if twice := sorted({name for name in given if given.count(name) > 1}):
             raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
         numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
-        faults = Faults(Description())
-        named = named_attachments(part, self._references(at), "at", faults.add)
         name = prefix.rstrip("_") or part.name
+        self._note_line(f"add.{name}")
+        faults = Faults(Description(lines=self._description.lines))
+        named = named_attachments(part, self._references(at), "at", faults.add)
         instance = Instance(name, prefix, named or {}, numbers)
         if named is not None:
-            add_instance(self._description, part, instance, "add", faults)
+            add_instance(self._description, part, instance, f"add.{name}", faults)
         if faults:
             told = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
             raise UsageError(f"add {part.name}: {told}", code=faults.problems[0].code)

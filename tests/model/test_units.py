@@ -110,6 +110,7 @@ def test_all_are_reported_at_once_with_their_lines(tmp_path: Path) -> None:
 parameters:
   l: {value: 500, unit: mm}
   F: {value: 1, unit: kN}
+  k: {value: 1, unit: parsek}
 bodies:
   b: {mass: l, inertia: {zz: 1}}
 joints:
@@ -122,7 +123,8 @@ forces:
 """
     with pytest.raises(eg.ModelError) as caught:
         load(tmp_path, text).check()
-    assert [(p.path, p.line) for p in caught.value.problems] == [("bodies.b.mass", 6), ("forces.t.value", 13)]
+    told = [("parameters.k.unit", 5), ("bodies.b.mass", 7), ("forces.t.value", 14)]
+    assert [(p.path, p.line) for p in caught.value.problems] == told
 
 
 @pytest.mark.parametrize(

@@ -377,6 +377,8 @@ def test_what_a_language_cannot_hold_is_changed_or_refused(tmp_path: Path) -> No
     assert refused.code in (1, 2)
     assert "format 'c' cannot hold the tables or functions of this model: push" in refused.err
     assert "push" in command.run("derive", tmp_path / "tabular.yaml", "--format", "text").out
+    m.stop("end", "rail", upper=2, stiffness=7)
+    assert "{7 (s - 2)^(3/2) if s > 2; 0 otherwise}" in " ".join(str(m.derive()).split())
     solution = m.derive().explain("short")
     assert solution.difference is None
     assert "push" in solution.markdown

@@ -178,7 +178,7 @@ class _Contact(Constraint):
     ``point`` is fixed to a body without mass that turns about the cam's axis by that angle.
     """
 
-    sentence = "The follower touches the contour of the cam at the polar angle $\theta$."
+    sentence = r"The follower touches the contour of the cam at the polar angle $\theta$."
     formula = r"\mathbf{p} = r(\theta) \mathbf{e}_r"
     cam: Marker
     follower: Marker

@@ -13,8 +13,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...base.limits.numbers import ALIKE
-from ..core import LEAVES, Expr, Graph, operands, reachable, substitute
+from ..core import LEAVES, Expr, Graph, is_comparison, operands, reachable, substitute
 from ..identity import dependence, is_rounding, with_bounds
+from .atoms import CHOICE
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone
@@ -24,6 +25,7 @@ OPEN = ("add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt")  #: operations 
 MOST = 4_000_000  #: values that are looked at
 LONG = 20_000  #: operations from which expressions need names for what they share
 WORK = 100_000  #: nodes that are formed anew to leave out symbols
+CHOICES = 100  #: choices between values up to which their conditions are looked for in their branches
 
 Given = Sequence[tuple[str, Expr]]
 
@@ -51,7 +53,7 @@ def joined_nodes(
     roots = [*(x for _, x in given), *exprs]
     if not roots:
         return [], []
-    graph = roots[0].graph
+    roots, graph = with_known_conditions(roots), roots[0].graph
     opened = Opened(graph, [x.id for x in roots])
     order = reachable(graph, [*opened.roots, *opened.operands])
     own = [name for name, _ in given]
@@ -67,6 +69,20 @@ def joined_nodes(
     ids = opened.closed(found)
     made = _copied(graph, ids)
     return made[len(own) :], list(zip(own, made, strict=False))
+
+
+def with_known_conditions(exprs: Sequence[Expr]) -> list[Expr]:
+    """Expressions whose choices take their condition for true in the first branch, for false in the second."""
+    graph, new = exprs[0].graph, dict[Expr, Expr]()
+    choices = [i for i in reachable(graph, [x.id for x in exprs]) if graph.nodes[i][0] == CHOICE]
+    if len(choices) > CHOICES:
+        return list(exprs)
+    for i in choices:  # those inside come first
+        condition, yes, no = substitute([Expr(graph, k) for k in operands(graph.nodes[i])], new)
+        if is_comparison(condition):
+            (yes,), (no,) = substitute([yes], {condition: graph.one}), substitute([no], {condition: graph.zero})
+        new[Expr(graph, i)] = graph.apply(CHOICE, condition, yes, no)
+    return substitute(exprs, new)
 
 
 class Opened:
