@@ -142,6 +142,28 @@ def depths(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) ->
     return found
 
 
+class Record(NamedTuple):
+    """Two shapes that are near each other: kinds, normal from the first to the second, depth, middle of the overlap."""
+
+    kinds: tuple[str, str]
+    normal: np.ndarray
+    depth: float
+    middle: np.ndarray
+
+
+def near(mod: eg.Module, q: np.ndarray) -> list[Record]:
+    """What the module lists of its contacts, with the shape of the first body as the first."""
+    count, *numbers = mod.kernels.near_pairs(q)
+    labels = [text.split(" on ") for _, text in mod.info.contact_shapes]
+    found = []
+    for row in np.reshape(numbers, (-1, 14))[: int(count)]:
+        (one, _), (other, body) = (labels[int(k)] for k in row[:2])
+        swapped = body.startswith("b0")
+        kinds = (other, one) if swapped else (one, other)
+        found.append(Record(kinds, -row[2:5] if swapped else row[2:5], row[5], row[6:9]))
+    return found
+
+
 # -- a ball shot at a fixed shape: it flies on a known parabola, so that geometry alone says whether it touches --------
 #: Depth, relative to the thinner of the two, from which on the ball has to be turned.
 GRAZING = 0.02

@@ -1,4 +1,4 @@
-"""MuJoCo as a judge of MJCF models: what it says of random states, in the coordinates of our model.
+"""MuJoCo as a judge of MJCF models, by random states in the coordinates of our model, and of distances of shapes.
 
 MuJoCo turns free and ball joints by quaternions, scalar part first, with the angular velocity in body axes as their
 rate.  Our Euler parameters have the same velocities; our Euler angles x-y'-z'' have their own rates: with MuJoCo's
@@ -7,13 +7,15 @@ v = J v_ours and v' = J v'_ours + J' v_ours its equations become ours.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from model_files import described
 from robot_comparison import State, angle_rates, angle_rates_slope, draw_parameters
+from scipy.spatial.transform import Rotation
 
 TURNS = {  # coordinates and velocities of a joint that turns freely
     "euler_angles": (["_1", "_2", "_3"], ["_1_dot", "_2_dot", "_3_dot"]),
@@ -121,3 +123,79 @@ class Judge:
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = self.data.body(body).xmat.reshape(3, 3), self.data.body(body).xpos
         return pose
+
+
+# -- distances of shapes -----------------------------------------------------------------------------------------------
+
+EDGE = 0.05  #: part of a cuboid's least length that rounds its edges
+ROUNDED = "rounded"  #: a cuboid without the layer of its rounded edges
+ALONG_X = Rotation.from_euler("y", np.pi / 2)
+SMALL = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)  #: angles by which axes beside axes are turned
+
+
+class Scene(NamedTuple):
+    """Two shapes, the first about the origin: how far apart, both rotations, the centre of the second."""
+
+    gap: float
+    turns: tuple[Rotation, Rotation]
+    centre: np.ndarray
+
+
+class Distances:
+    """Two shapes: gaps as MuJoCo's convex routines find them; in the plane those of prisms far longer than wide."""
+
+    def __init__(self, kinds: Sequence[str], shapes: Sequence[Mapping[str, Any]], layer: float = 0.0) -> None:
+        mujoco.set_mju_user_warning(lambda text: None)
+        self.planar, self.layer = kinds[0] in ("circle", "segment", "box"), layer
+        bodies = ""
+        for kind, shape in zip(kinds, shapes, strict=True):
+            x, y, z, w = (ALONG_X if kind == "segment" else Rotation.identity()).as_quat()
+            geom, sizes = self._geom(kind, shape)
+            numbers = " ".join(repr(float(size)) for size in sizes)
+            bodies += f'<body><freejoint/><geom type="{geom}" size="{numbers}" quat="{w} {x} {y} {z}"/></body>'
+        option = '<option ccd_tolerance="1e-15" ccd_iterations="500"/>'
+        self.mj = mujoco.MjModel.from_xml_string(f"<mujoco>{option}<worldbody>{bodies}</worldbody></mujoco>")
+        self.data = mujoco.MjData(self.mj)
+
+    @staticmethod
+    def _geom(kind: str, shape: Mapping[str, Any]) -> tuple[str, Sequence[float]]:
+        if kind in ("circle", "sphere"):
+            return "sphere", [shape["radius"]]
+        if kind in ("segment", "capsule"):
+            return "capsule", [shape["radius"], 0.5 * shape["length"]]
+        if kind == "ellipsoid":
+            return "ellipsoid", shape["semi_axes"]
+        size = np.array([*shape["size"], 10.0][:3])
+        return "box", list(0.5 * size - (EDGE * size.min() if kind == ROUNDED else 0.0))
+
+    def gap(self, turns: Sequence[Rotation], centre: np.ndarray) -> float:
+        """Negative where they overlap."""
+        for k, (place, turn) in enumerate(zip(([0.0] * 3, centre), turns, strict=True)):
+            x, y, z, w = turn.as_quat()
+            self.data.qpos[7 * k : 7 * k + 7] = [*place, w, x, y, z]
+        mujoco.mj_kinematics(self.mj, self.data)
+        return float(mujoco.mj_geomDistance(self.mj, self.data, 0, 1, 10.0, None)) - self.layer
+
+    def scenes(self, gaps: Sequence[float], count: int) -> Iterator[Scene]:
+        """Turned at random or axes nearly beside axes, along an axis or beside it; apart by each gap in turn."""
+        rng = np.random.default_rng(3)
+        axes = np.eye(3)[: 2 if self.planar else 3]
+        for k in range(count):
+            one, other = (self._turn(rng.uniform(-np.pi, np.pi, 3)) for _ in "ab")
+            small = rng.choice(SMALL) * rng.standard_normal(3)
+            if k % 2:
+                quarter = rng.integers(4) * np.pi / 2 * (np.eye(3)[2] if self.planar else axes[rng.integers(3)])
+                other = one * Rotation.from_rotvec(quarter) * self._turn(small)
+            way = one.apply(axes[rng.integers(len(axes))] + small if k % 4 > 1 else rng.standard_normal(3))
+            way *= (1.0, 1.0, 0.0 if self.planar else 1.0)
+            way, reach, wanted = way / np.linalg.norm(way), 0.4, gaps[k % len(gaps)]
+            for _ in range(60):
+                found = self.gap((one, other), reach * way)
+                if abs(found - wanted) < 1e-13:
+                    break
+                reach -= found - wanted
+            if abs(found - wanted) < 1e-11:  # else it leads where the least way out is another
+                yield Scene(found, (one, other), reach * way)
+
+    def _turn(self, angles: np.ndarray) -> Rotation:
+        return Rotation.from_rotvec([0.0, 0.0, angles[2]] if self.planar else angles)

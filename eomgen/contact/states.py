@@ -65,7 +65,7 @@ _FIRST = {
 #: What is met by each of these.
 MET = {
     "round": ("round",),
-    "rod": ("round", "rod"),
+    "rod": ("round", "rod", "rounded_corner"),
     "ellipsoid": ("round", "rod", "ellipsoid"),
     BLOCK: ("round", "ellipsoid"),
     CORE: ("rounded_corner", "tip"),

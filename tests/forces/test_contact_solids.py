@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+from contact_scenes import near
 from flying_bodies import ELASTIC, STIFF, check_slopes, depth_of, flying, state
 from force_judges import differences
 from models import IN_C
+from mujoco_judge import EDGE, ROUNDED, Distances
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 
@@ -30,20 +33,34 @@ ALL = [
 ]
 
 
+#: Place and turn of each of these on its body.
+MARKERS = [
+    (np.array([0.25 * k - 0.4, 0.02 * k, 0]), Rotation.from_euler("xyz", (0.2 * k, 0.5, -0.3))) for k in range(len(ALL))
+]
+
+
 def every_pair() -> eg.Model:
     """Two bodies that each bear one shape of every kind, beside each other and turned."""
     m, bodies = flying(2)
     groups = [
-        [{**shape, "on": body.at(0.25 * k - 0.4, 0.02 * k, 0, rpy=(0.2 * k, 0.5, -0.3))} for k, shape in enumerate(ALL)]
+        [
+            {**shape, "on": body.at(*place, rpy=tuple(turn.as_euler("xyz")))}
+            for shape, (place, turn) in zip(ALL, MARKERS, strict=True)
+        ]
         for body in bodies
     ]
     m.contacts("touch", *groups, {**ELASTIC, "friction": 0.3, "smoothing": 0.01})
     return m
 
 
+@cache
+def on_numbers() -> eg.Module:
+    return every_pair().compile(target="numpy")
+
+
 def test_every_pair_in_both_targets() -> None:
     """Momentum is kept, forces at rest are slopes of the energy, Jacobians are differences, C gives the numbers."""
-    mod, quick = every_pair().compile(target="numpy"), every_pair().compile(optimize=0)
+    mod, quick = on_numbers(), every_pair().compile(optimize=0)
     rng, met = np.random.default_rng(5), 0
     while met < 10:
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
@@ -60,6 +77,67 @@ def test_every_pair_in_both_targets() -> None:
         assert np.abs(differences(quick, x) - J).max() <= 1e-4 * np.abs(J).max()
         if met < 3:
             assert np.abs(mod.jacobian(0.0, x) - J).max() <= 1e-8 * np.abs(J).max()
+
+
+def support(shape: dict[str, Any], n: np.ndarray) -> float:
+    """How far a shape reaches along a direction from its centre."""
+    if "semi_axes" in shape:
+        return float(np.linalg.norm(n * shape["semi_axes"]))
+    if "size" in shape:
+        return float(np.abs(n) @ shape["size"]) / 2
+    return float(shape.get("radius", 0.0) + abs(n[2]) * shape.get("length", 0.0) / 2)
+
+
+def outside(shape: dict[str, Any], p: np.ndarray) -> float:
+    """Above 0 for points out of a shape."""
+    if "semi_axes" in shape:
+        return float(np.linalg.norm(p / shape["semi_axes"]) - 1.0) * min(shape["semi_axes"])
+    if "size" in shape:
+        return float((np.abs(p) - np.array(shape["size"]) / 2).max())
+    along = np.clip(p[2], -shape.get("length", 0.0) / 2, shape.get("length", 0.0) / 2)
+    return float(np.linalg.norm(p - (0, 0, along)) - shape["radius"])
+
+
+CURVATURE = 0.08**2 / 0.2
+#: Depths up to which a pair's answer is the least way out and unique: until axes of capsules cross, and the sum of the
+#: least radii of curvature.  Rounded edges that are deeper than their layers have another answer by definition.
+DEEP = {
+    ("sphere", "sphere"): 0.24, ("sphere", "capsule"): 0.17, ("sphere", "ellipsoid"): 0.12 + CURVATURE,
+    ("sphere", "cuboid"): 0.17, ("capsule", "capsule"): 0.1, ("capsule", "ellipsoid"): 0.05 + CURVATURE,
+    ("capsule", "cuboid"): 0.05, ("ellipsoid", "ellipsoid"): 2 * CURVATURE, ("ellipsoid", "cuboid"): CURVATURE,
+    ("cuboid", "cuboid"): 0.01,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", DEEP, ids="-".join)
+def test_gaps_are_those_of_mujoco(pair: tuple[str, str]) -> None:
+    """Apart, grazing and deep: the normal has supports as far apart as the gap, witness points are of the shapes.
+
+    Rounded edges meet by pairs of their own, each with its normal, of which the deepest is the least way out.
+    """
+    mod, kinds = on_numbers(), [shape["shape"] for shape in ALL]
+    numbers = [kinds.index(kind) for kind in pair]
+    shapes = [ALL[k] for k in numbers]
+    edged = "cuboid" in pair and pair[0] in ("capsule", "cuboid")
+    names = [ROUNDED if edged and kind == "cuboid" else kind for kind in pair]
+    judge = Distances(names, shapes, EDGE * 0.12 * names.count(ROUNDED))
+    gaps = [1e-9, -1e-9, 1e-6, -1e-6, 0.01, *(-part * DEEP[pair] for part in (0.02, 0.2, 0.5, 0.95))]
+    met = 0
+    for gap, frames, centre in judge.scenes(gaps, 40):
+        turns = [frame * MARKERS[k][1].inv() for frame, k in zip(frames, numbers, strict=True)]
+        places = [at - turn.apply(MARKERS[k][0]) for at, turn, k in zip((0, centre), turns, numbers, strict=True)]
+        found = [one for one in near(mod, state(mod, places, turns)[: mod.n_q]) if one.kinds == pair]
+        deepest = max(found, key=lambda one: one.depth)
+        assert deepest.depth == pytest.approx(-gap, abs=1e-9)
+        met += 1
+        if edged:
+            continue
+        n, half = deepest.normal, 0.5 * deepest.depth * deepest.normal
+        reach = support(shapes[0], frames[0].inv().apply(n)) + support(shapes[1], frames[1].inv().apply(-n))
+        assert n @ centre - reach == pytest.approx(gap, abs=1e-9)
+        witnesses = frames[0].inv().apply(deepest.middle + half), frames[1].inv().apply(deepest.middle - half - centre)
+        assert max(outside(shape, p) for shape, p in zip(shapes, witnesses, strict=True)) < 1e-9
+    assert met > 20
 
 
 EGG = {"shape": "ellipsoid", "semi_axes": (0.2, 0.1, 0.08)}
@@ -84,9 +162,18 @@ def touched(shape: dict[str, Any], n: np.ndarray, rng: np.random.Generator) -> n
     return shape["radius"] * n + np.array([0.0, 0.0, along])
 
 
+def curvature(shape: dict[str, Any]) -> float:
+    """The least radius of curvature, which is 0 of a cuboid."""
+    axes = shape.get("semi_axes")
+    return float(min(axes) ** 2 / max(axes) if axes else shape.get("radius", 0.0))
+
+
 @pytest.mark.parametrize(("first", "second"), PAIRS, ids=lambda shape: shape["shape"])
 def test_known_normals(first: dict[str, Any], second: dict[str, Any]) -> None:
-    """Both are put so that they overlap a little at points of a chosen normal, in turned frames; middles and ends."""
+    """Both are put so that they overlap at points of a chosen normal, in turned frames; middles and ends.
+
+    Depths go nearly up to the sum of the least radii of curvature, to which the least way out is unique.
+    """
     m, (a, b) = flying(2)
     m.contacts("touch", {**first, "on": a.at(0.03, 0.01, 0, rpy=(0.2, 0.5, -0.3))}, {**second, "on": b}, ELASTIC)
     mod = m.compile(target="numpy")
@@ -101,12 +188,16 @@ def test_known_normals(first: dict[str, Any], second: dict[str, Any]) -> None:
             axis = frame.inv().apply(turns[1].apply((0, 0, 1)))
             n = np.cross(axis, (0, 0, 1) if middle[1] else n)
         n /= np.linalg.norm(n)
-        out, depth = frame.apply(n), rng.uniform(1e-4, 3e-3)
+        out, depth = frame.apply(n), rng.choice((1e-4, 3e-3, 0.95 * (curvature(first) + curvature(second))))
         back = turns[1].inv().apply(-out) * (1, 1, 0 if middle[0] else 1)
         places = frame.apply(touched(first, n, rng)), turns[1].apply(touched(second, back, rng))
         place = turns[0].apply((0.03, 0.01, 0)) + places[0] - places[1] - depth * out
         x = state(mod, [(0, 0, 0), place], turns)
         assert depth_of(mod, x) == pytest.approx(depth, abs=1e-11)
+        (record,) = (one for one in near(mod, x[: mod.n_q]) if one.depth > 0.0)
+        np.testing.assert_allclose(record.normal, out, atol=1e-9)
+        surface = turns[0].apply((0.03, 0.01, 0)) + places[0]
+        np.testing.assert_allclose(record.middle, surface - 0.5 * depth * out, atol=1e-9)
         force, push = -mod.bias(0.0, x), STIFF * depth**1.5
         np.testing.assert_allclose(force[6:9], push * out, atol=1e-7 * push)
         assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * push

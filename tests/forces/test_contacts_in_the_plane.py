@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
+from mujoco_judge import Distances
 from refusals import refused, refuses
 from sweeps import part_of
 
@@ -92,6 +93,39 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
         moment = q[0] * force[1] - q[1] * force[0] + q[3] * force[4] - q[4] * force[3] + force[2] + force[5]
         assert abs(moment) <= 1e-12 * np.abs(force).max()
     assert met >= 8
+
+
+#: Depths up to which a pair's answer is the least way out: until the axes of segments cross.
+DEEP = {
+    ("circle", "circle"): 0.2, ("circle", "segment"): 0.13, ("circle", "box"): 0.17, ("segment", "segment"): 0.06,
+    ("segment", "box"): 0.03, ("box", "box"): 0.14,
+}  # fmt: skip
+
+
+def test_gaps_are_those_of_mujoco() -> None:
+    """Apart, grazing and deep, turned at random and nearly parallel.
+
+    Boxes that are apart are listed where edges lie beside each other only.
+    """
+    kinds = ("circle", "segment", "box")
+    m, bodies = scenes.planar("pairs", 2, (0, 0, 0))
+    away = {kind: 4.0 * k for k, kind in enumerate(kinds)}
+    groups = [[on(PLANAR[kind], body.at(away[kind], 0, 0)) for kind in kinds] for body in bodies]
+    m.contacts("touch", *groups, ELASTIC)
+    mod = m.compile(target="numpy")
+    for pair, deep in DEEP.items():
+        gaps = [1e-9, -1e-9, 1e-6, -1e-6, 0.01, *(-part * deep for part in (0.02, 0.2, 0.5, 0.95))]
+        gaps = [gap for gap in gaps if gap < 0.0] if pair == ("box", "box") else gaps
+        met = 0
+        for gap, turns, centre in Distances(pair, [PLANAR[kind] for kind in pair]).scenes(gaps, 45):
+            q = []
+            for kind, turn, place in zip(pair, turns, (np.zeros(3), centre), strict=True):
+                q += [*(place - turn.apply((away[kind], 0, 0)))[:2], turn.as_rotvec()[2]]
+            found = scenes.near(mod, np.array(q))
+            depths = [one.depth for one in found if one.kinds == pair]
+            assert max(depths) == pytest.approx(-gap, abs=1e-9), pair
+            met += 1
+        assert met > 20, pair
 
 
 def test_depth_of_a_bouncing_ball() -> None:
