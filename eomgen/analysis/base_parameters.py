@@ -130,7 +130,7 @@ def fit_base(
     if module.layout.n_c:
         raise cannot(
             f"model {module.name!r} has loops or other constraints, whose forces are in tau too; fit() of base "
-            "parameters takes trees, mod.fit(data, parameters) takes all"
+            "parameters needs a tree; use mod.fit(data, parameters)"
         )
     measured = np.asarray(read_numbers("tau", tau), dtype=float)
     own = base.regressor(q, v, a)
@@ -140,7 +140,7 @@ def fit_base(
     names = (*base.names, *further)
     data = _Data(np.concatenate([own, *(column[:, None] for column in further.values())], axis=1), measured - rest)
     if data.count <= len(names):
-        raise ill_shaped(f"{data.count} finite values of tau cannot tell {len(names)} parameters")
+        raise ill_shaped(f"{data.count} finite values of tau cannot determine {len(names)} parameters")
     if sigma is not None:
         spread = np.asarray(read_numbers("sigma", sigma), dtype=float) * np.ones(module.n_v)
         if not (spread > 0.0).all():
@@ -227,20 +227,20 @@ def _not_inertial(
         columns[name] = (second - first) / size
         allowed = LINEAR * max(whole, float(np.nanmax(np.abs(third), initial=0.0)))
         if np.nanmax(np.abs(third - 2.0 * second + first), initial=0.0) > allowed:
-            raise cannot(f"forces are not linear in {name}; mod.fit(data, parameters) finds such parameters")
+            raise cannot(f"forces are not linear in {name}; use mod.fit(data, parameters)")
         if np.nanmax(np.abs(second - first), initial=0.0) <= allowed:
             raise cannot(
-                f"{name} changes no force beside those of inertia and gravity, which the base parameters hold already"
+                f"{name} changes only forces of inertia and gravity, which the base parameters include already"
             )
         if np.nanmax(np.abs(regressor(module, *motion, p=values | {name: 2.0 * size}) - regressor(module, *motion))):
-            raise cannot(f"{name} changes the geometry; mod.fit(data, parameters) finds such parameters")
+            raise cannot(f"{name} changes the geometry; use mod.fit(data, parameters)")
         rest = rest - values[name] * columns[name]
     doubled = {name: 2.0 * (values[name] or 1.0) for name in also}
     every = np.asarray(inertial_remainder(module, *motion, p=values | doubled, u=u))
     total = sum((doubled[name] * column for name, column in columns.items()), rest)
     largest = max(whole, float(np.nanmax(np.abs(every), initial=0.0)))
     if np.nanmax(np.abs(every - total), initial=0.0) > LINEAR * largest:
-        raise cannot(f"forces are not linear in {', '.join(also)} together; find one of each product only")
+        raise cannot(f"forces are not linear in {', '.join(also)} together; fit only one factor of each product")
     return rest, columns
 
 

@@ -313,7 +313,7 @@ class _Problem:
             if name not in allowed:
                 raise unknown("parameter, input, coordinate or rate", name, allowed)
         if len(set(self.names)) < len(self.names) or not self.names:
-            raise incomplete("parameters must name what is to be found, each once")
+            raise incomplete("parameters must name the unknowns, each once")
         self.initial_names = tuple(name for name in self.names if name in self.states)
         self.sigma: dict[str, float] = {}
         self._check_starts()
@@ -322,12 +322,12 @@ class _Problem:
     def _check_starts(self) -> None:
         for one in self.experiments:
             if self.initial_names and not (one.initial is None or isinstance(one.initial, Mapping)):
-                raise incomplete("initial must be given by name where initial values are to be found")
+                raise incomplete("give initial by name if initial values are unknowns")
             if one.inputs is not None:
                 require_mapping("inputs", one.inputs)
             for name in self.names:
                 if one.inputs and name in one.inputs:
-                    raise at_odds(f"input {name} is given, and cannot be found too; leave it out of one of them")
+                    raise at_odds(f"input {name} has a value and is an unknown too; leave it out of one of them")
 
     def warn_of_fixed(self) -> None:
         """Warn, once for all runs, of initial values that are not given and cannot follow from the parameters."""
@@ -436,7 +436,7 @@ def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, 
         require_mapping("bounds", given)
     for name, pair in (given or {}).items():
         if name not in problem.names:
-            raise unknown("parameter that is to be found", name, problem.names)
+            raise unknown("fitted parameter", name, problem.names)
         k = problem.names.index(name)
         try:
             low[k], high[k] = (float(x) for x in pair)

@@ -87,8 +87,8 @@ def refuse_inputs(layout: Layout) -> None:
     if layout.n_u:
         raise cannot(
             f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; derivatives "
-            f"by the inputs ({', '.join(layout.u)}) of such a model are not derived; use jacobian(t, x), which is A of "
-            "the full form"
+            f"by the inputs ({', '.join(layout.u)}) of such a model are not available; use jacobian(t, x), which is A "
+            "of the full form"
         )
 
 

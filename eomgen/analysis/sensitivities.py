@@ -578,7 +578,7 @@ def _require_same(result: Trajectory, single: Trajectory) -> None:
         if len(ours) != len(theirs):
             raise SimulationError(
                 f"event {name} is found {len(theirs)} times by simulate, but {len(ours)} times together with the "
-                "derivatives, because it comes and goes within one step of the solver; give max_step",
+                "derivatives, because it appears and disappears within one step of the solver; give max_step",
                 code="EG-EVENT",
             )
 

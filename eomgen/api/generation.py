@@ -64,8 +64,8 @@ def generate(
     row = find_target(target)
     if not (row.package or row.whole):
         raise cannot(
-            f"target {target!r} is for a session, by compile(target={target!r}); for a machine without a compiler "
-            "generate a wheel: --target cython --wheel, or eomgen.toolchain.wheel.build_wheel(folder)"
+            f"target {target!r} works only in a session, by compile(target={target!r}); for a machine without a "
+            "compiler generate a wheel: --target cython --wheel, or eomgen.toolchain.wheel.build_wheel(folder)"
         )
     equations = derive_as(Equations, model, method, independent, baumgarte)
     if row.whole:

@@ -114,7 +114,7 @@ def load_example(name: str, **options: Unpack[LoadOptions]) -> Model:
         near = hint(str(name), models, quoted=False) or f"there are: {', '.join(models)}"
         raise no_such(f"no example {shown(name)}; {near}")
     if file.suffix == ".py":
-        raise bad_file(f"{name} is a script and no model; copy it by 'eomgen examples {name}' and run it")
+        raise bad_file(f"{name} is a script, not a model; copy it by 'eomgen examples {name}' and run it")
     return load(file, **options)
 
 

@@ -96,7 +96,7 @@ class Model(Builder):
     def _small_figure(self) -> Any:
         count = len(self.description.sections["bodies"])
         if count > SMALL:
-            raise too_large(f"{count} bodies take a while to draw; draw() does it")
+            raise too_large(f"{count} bodies take long to draw; draw() draws them")
         from ..show.draw import small_figure
 
         return small_figure(self.compile(target="numpy"))

@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Raises
     ------
     SystemExit
-        Always, unless the process itself ends: 0 fine; 1 the model is at fault; 2 usage or file not found; 3 compiler
+        Always, unless the process itself ends: 0 success; 1 error in the model; 2 usage or file not found; 3 compiler
         or package; 4 the integration; 5 a verification that failed; 130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM.
     """
     try:

@@ -45,7 +45,7 @@ time_option = click.option("--time", "t", type=Number(), default=0.0, show_defau
 def linearize(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool) -> None:
     """Linearize a model about its initial state, or about an equilibrium.
 
-    States are independent displacements and velocities along the constraints, so that these add no eigenvalues.
+    States are independent displacements and velocities along the constraints, so constraints add no eigenvalues.
     """
     module = work.module
     x = module.equilibrium(work.position(), t).x if at_rest else module.x0(work.initial, t=t)
@@ -115,7 +115,7 @@ def consistent(
     rough = module.x0(t=t)
     for name, value in (work.initial or {}).items():
         if name not in names:
-            raise no_such(f"--set {name}: the names of a rough state are {', '.join(names)}")
+            raise no_such(f"--set {name}: a state has the names {', '.join(names)}")
         rough[names.index(name)] = value
     weights: Any = "mass" if mass else parse_settings(weight, "--weight", "theta=100") or None
     result = module.consistent(rough, t, weights=weights, hold=hold)
@@ -243,11 +243,13 @@ def impact(
     closed: bool,
     as_json: bool,
 ) -> None:
-    """Find the state after an impact at the initial state, without friction unless it is given."""
+    """Find the state after an impact at the initial state; friction acts with --slip."""
     from ..analysis.impact import check_friction, check_gaps
 
     if not gap and not stop:
-        raise incomplete("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")
+        raise incomplete(
+            "give --gap NAME=RESTITUTION for a gap that closes, or --stop NAME for a coordinate that is locked"
+        )
     module, layout = work.module, work.module.layout
     gaps, locked = check_gaps(layout, parse_settings(gap, "--gap", "s=0.5"), stop, ("--gap", "--stop"))
     rough = check_friction(layout, dict(map(_read_friction, slip)), gaps, "--slip")
@@ -281,7 +283,7 @@ def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
     help="Time limit for all checks in s; variants get what is left.",
 )
 def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
-    """Check a compiled model against independent computations; exit with 5 if a limit is broken."""
+    """Check a compiled model against independent computations; exit with 5 if a limit is exceeded."""
     with stage("verify"):
         result = work.module.verify(states=states, seed=seed, seconds=seconds)
     head = {"name": work.equations.name, "method": work.equations.method}

@@ -22,16 +22,16 @@ VERBS = {
     "ensemble": "Run a model many times with different values.",
     "view": "Show how a mechanism moves, in a browser or as a file.",
     "kinematics": "Analyse the motion over a range, without forces.",
-    "check": "Report a model's topology, mobility and faults.",
+    "check": "Report a model's topology, mobility and errors.",
     "derive": "Derive the equations of motion and count their operations.",
     "explain": "Write the worked solution: every step to the equations, then numbers.",
     "linearize": "Linearize a model: A, B, C, D, eigenvalues.",
     "modes": "Find natural frequencies, mode shapes and damping ratios.",
-    "equilibrium": "Find a static equilibrium, and parameters for which it is one.",
+    "equilibrium": "Find a static equilibrium, or parameters that balance a position.",
     "sensitivity": "Differentiate a run by parameters, inputs and initial values.",
-    "consistent": "Find the consistent state that is nearest to a rough one.",
+    "consistent": "Find the consistent state nearest to a rough one.",
     "reactions": "Find forces and moments in all joints.",
-    "inverse": "Find the forces of chosen drives that make a motion.",
+    "inverse": "Find the forces of drives that produce a motion.",
     "impact": "Find the state after an impact, its impulses and energy loss.",
     "verify": "Check a compiled model against independent computations.",
     "generate": "Write a package that needs no eomgen.",
@@ -90,7 +90,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 @click.group(
     cls=Verbs,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="`eomgen VERB --help` explains a verb.  Exit codes: 0 fine; 1 the model is at fault; 2 usage or file not "
+    epilog="`eomgen VERB --help` explains a verb.  Exit codes: 0 success; 1 error in the model; 2 usage or file not "
     "found; 3 compiler or package missing; 4 the integration failed; 5 verify found a difference.",
 )
 @click.option(

@@ -92,7 +92,7 @@ def ensemble(
     values = _read(cases, module) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
-        raise incomplete("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
+        raise incomplete("all runs are equal: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
     sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial or {}), "parameters": {}, "inputs": {}}
     for name, column in values.items():
         kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
@@ -143,7 +143,7 @@ def _read(path: Path, module: Module) -> dict[str, list[float]]:
     heads = [split_head(head) for head in rows[0]]
     names = [name for name, _ in heads]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise at_odds(f"--cases {path}: the table has the names {', '.join(twice)} twice")
+        raise at_odds(f"--cases {path}: the names {', '.join(twice)} appear twice in the table")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):

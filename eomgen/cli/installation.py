@@ -90,7 +90,7 @@ def doctor(as_json: bool) -> None:
             click.echo(f"{mark}  " + visible(f"{f.name:<{width}}{f.detail}"))
             if not f.ok:
                 say("\n".join(" " * (width + 4) + line for line in f.remedy.splitlines()))
-        say("all that is needed works" if well else "something that is needed does not work")
+        say("everything required works" if well else "something required does not work")
     if not well:
         sys.exit(TOOLCHAIN)
 
@@ -155,7 +155,9 @@ def _compiles() -> Check:
         what, _, rest = str(error).partition("\n")
         return Check("small model", False, what, rest)
     if abs(acceleration + 9.81 * sin(0.5)) > UNMOVED:
-        return Check("small model", False, f"a pendulum accelerates by {acceleration}", "try another compiler by CC=")
+        return Check(
+            "small model", False, f"wrong acceleration of a pendulum: {acceleration}", "try another compiler by CC="
+        )
     return Check("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
 
 

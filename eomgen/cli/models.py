@@ -50,9 +50,9 @@ def _print_schema(context: click.Context) -> None:
     help="Draw the mechanism at its initial position (svg, png, pdf; needs matplotlib).",
 )
 def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) -> None:
-    """Report bodies, joints, loops, constraints, rank and degrees of freedom of a model, and all its faults.
+    """Report bodies, joints, loops, constraints, rank and degrees of freedom of a model, and all its errors.
 
-    Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
+    Errors are printed as FILE:LINE: path: message; the exit code is then 1.
     """
     if draw is not None:
         require_plotting(draw, "--draw")
@@ -75,7 +75,7 @@ def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) 
 def convert(source: Source, out: Path | None, as_json: bool) -> None:
     """Write a robot (or a model file, tidied) as a model file.
 
-    What the model file cannot hold is told on stderr, and in comments at its top.
+    Properties that a model file cannot express are listed on stderr, and in comments at its top.
     """
     require_folder("--out", out)
     model = source.load()
@@ -100,7 +100,7 @@ def convert(source: Source, out: Path | None, as_json: bool) -> None:
     type=click.Choice(FORMATS),
     help="Write named intermediates, M and f of M v' = f for reading or for another program.",
 )
-@file_option("--out", "File to write the format into.")
+@file_option("--out", "Output file of --format.")
 def derive(source: Source, equations: bool, form: str | None, out: Path | None, as_json: bool) -> None:
     """Derive the equations of motion; parameters need no values.
 
@@ -189,7 +189,7 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
     """Write the worked solution of a model.
 
     Mechanism, motion of each body, constraints, forces, the steps of the method, the equations, and one state with
-    numbers, line by line.  At the end stands the largest difference between shown formulas and the compiled module.
+    numbers, line by line.  The document ends with the largest difference between its formulas and the module.
     """
     require_document_folder("--out", out)
     derived = source.derive()
@@ -198,7 +198,7 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
         document.save(out)
     values: dict[str, Any] = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
     values |= {"sections": [s.title for s in document.sections], "difference": document.difference}
-    difference = f"largest difference between shown formulas and the compiled module: {document.difference or 0.0:.1e}"
+    difference = f"largest difference between the formulas and the compiled module: {document.difference or 0.0:.1e}"
     show(as_json, values, str(out), *([] if document.difference is None else [difference]), files=None)
 
 
@@ -211,7 +211,7 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
     type=click.Choice(PRECISIONS),
     default="double",
     show_default=True,
-    help="Type of the numbers of a C library; float is for processors that know single precision alone.",
+    help="Type of the numbers of a C library; float is for processors with single precision only.",
 )
 @click.option(
     "--fmi",

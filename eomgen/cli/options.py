@@ -180,7 +180,7 @@ def parse_span(option: str, word: str, form: str, example: str) -> tuple[str, fl
         raise no_number(f"{option} {word}: {remedy}{error}") from None
     count = parts[2].strip() if len(parts) == 3 else None
     if count is not None and not (count.isdecimal() and 1 <= int(count) <= MOST_POINTS):
-        raise off_range(f"{option} {word}: the count is 1 to {MOST_POINTS}, a whole number of points, not {count!r}")
+        raise off_range(f"{option} {word}: the count must be a whole number from 1 to {MOST_POINTS}, not {count!r}")
     return name.strip(), low, high, None if count is None else int(count)
 
 

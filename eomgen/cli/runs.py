@@ -56,9 +56,9 @@ def run(
     source: Source, end: float | None, out: Path | None, plot: Path | None, picture: Picture, animate: Path | None,
     as_json: bool, solver: dict[str, Any],
 ) -> None:  # fmt: skip
-    """Derive, compile and simulate a model, and report it.
+    """Derive, compile and simulate a model, and report the run.
 
-    Integrator, tolerances, end time and initial values are those of the model file where no option gives others.
+    Integrator, tolerances, end time and initial values are those of the model file unless an option sets them.
     """
     _check_files(out, plot, picture)
     require_folder("--animate", animate)
@@ -235,7 +235,7 @@ SHOWN = 9  #: of them on the screen
     help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
 )
 @click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
-@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
+@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, return the part that can.")
 @file_option("--out", "Write all columns to FILE.npz, .csv, .nc or .parquet.")
 @file_option("--plot", "Draw them, e.g. to FILE.png.")
 @picture_options
@@ -354,9 +354,9 @@ def view(
 ) -> None:  # fmt: skip
     """Show how a mechanism moves: over a range of its coordinates, or in a run.
 
-    Without --out a page is written to the folder of temporary files and a browser opens it; it needs no network.  In it
-    the model itself runs, with sliders, where there is a compiler for WebAssembly (pip install ziglang) and neither
-    --range nor an option of the picture asks for a film.
+    Without --out a browser opens a page in the folder of temporary files, which needs no network.  With a compiler for
+    WebAssembly (pip install ziglang) the model itself runs there, with sliders; with --range or an option of the
+    picture the page is an animation.
     """
     import webbrowser
     from tempfile import gettempdir
@@ -389,7 +389,7 @@ def view(
     opened = out is None and webbrowser.open(Path(written).absolute().as_uri())
     show(as_json, {"name": work.module.name, "points": len(motion), "opened": opened}, files=[written])
     if not as_json and out is None and not opened:
-        say("no browser was found here; open that file in one, or give --out FILE")
+        say("no browser was found; open that file in a browser, or give --out FILE")
 
 
 def _live_page(module: Any, motion: Any, file: Path) -> Path | None:
@@ -397,5 +397,5 @@ def _live_page(module: Any, motion: Any, file: Path) -> Path | None:
     try:
         return Path(module.page(file, motion))
     except (ModelError, ToolchainError) as error:
-        say(f"note: the page shows the run alone: {error}", err=True)
+        say(f"note: the page shows only the run: {error}", err=True)
         return None

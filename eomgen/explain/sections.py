@@ -563,7 +563,7 @@ def counts(author: Author) -> Section:
 
 def difference(found: Difference | None, reason: str) -> Section:
     """How far the shown formulas are from the compiled module, folded where they agree."""
-    title = "Shown and compiled"
+    title = "Formulas and compiled code"
     if found is None:
         return Section(title, (Sentence(f"Not compared: {reason}"),))
     if not found.each:

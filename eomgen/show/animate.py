@@ -53,9 +53,7 @@ def with_arrows(scene: Scene, module: Any, motion: MotionFrames, wanted: Sequenc
         known = [*joints, *(one["name"] for one in elements)]
         for name in wanted:
             if name not in known:
-                raise no_such(
-                    f"no joint, spring or damper {name!r} whose force is to be shown; there are {', '.join(known)}"
-                )
+                raise no_such(f"no joint, spring or damper {name!r} with a force to draw; there are {', '.join(known)}")
 
     def chosen(name: str) -> bool:
         return wanted is True or (not isinstance(wanted, bool) and name in wanted)

@@ -74,7 +74,7 @@ def draw(
     """See :func:`eomgen.runtime.drawing.draw`."""
     if named:
         if x is not None and not isinstance(x, Mapping):
-            raise at_odds(f"give either a state or values by name, not both; {', '.join(named)} came beside {shown(x)}")
+            raise at_odds(f"give either a state or values by name, not both: {', '.join(named)} and {shown(x)}")
         x = {**(x or {}), **named}
     scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
     return draw_scene(scene, ax)

@@ -1,6 +1,6 @@
 """The command ``eomgen``: its verbs, options and exit codes, and what goes to stdout, to stderr and into ``--json``.
 
-0 fine; 1 the model is at fault; 2 usage or file not found; 3 compiler or package; 4 the integration; 5 a verification.
+0 success; 1 error in the model; 2 usage or file not found; 3 compiler or package; 4 the integration; 5 a verification.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ SLIPS: list[tuple[list[Any], str]] = [
     (["generate", PENDULUM, "--out", "x", "--target", "fmu", "--wheel"], "--wheel is for target cython"),
     (["examples", "pendulun"], "did you mean pendulum?"),
     (["examples", "pendulum", "--all"], "leave out pendulum"),
-    (["ensemble", CRANK], "nothing differs between the runs"),
+    (["ensemble", CRANK], "all runs are equal"),
     (["ensemble", CRANK, "--vary", "r=1"], "--vary r=1: write NAME=LOW:HIGH"),
     (["ensemble", CRANK, "--vary", "theta=0:x"], "--vary theta=0:x: write NAME=LOW:HIGH with two numbers"),
     (["ensemble", CRANK, "--vary", "radius=1:2"], "no coordinate or rate 'radius'"),
@@ -133,7 +133,7 @@ SLIPS: list[tuple[list[Any], str]] = [
     (["ensemble", CRANK, "--grid", "theta=0:1:2", "--vary", "r=1:2"], "leave out --cases, --vary and --count"),
     (["kinematics", FOUR_BAR, *NUMPY], "give --range: 1 degree of freedom is left, for example of theta"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta"], "write NAME=START:END"),
-    (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1:0"], "the count is 1 to"),
+    (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1:0"], "the count must be a whole number from 1 to"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1:3", "--range", "t=0:1:4"], "must be equal"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1", "--range", "theta=0:2"], "each name once"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1", "--out", "x.txt"], "written as .npz or .csv"),
@@ -147,12 +147,12 @@ SLIPS: list[tuple[list[Any], str]] = [
     (["equilibrium", CRANK, *NUMPY, "--hold", "theta="], "--hold theta=: write name=value"),
     (["equilibrium", CRANK, *NUMPY, "--hold", "nothing"], "no coordinate 'nothing'"),
     (["consistent", CRANK, *NUMPY, "--weight", "s"], "--weight s"),
-    (["consistent", CRANK, *NUMPY, "--set", "C=1"], "the names of a rough state are"),
+    (["consistent", CRANK, *NUMPY, "--set", "C=1"], "a state has the names"),
     (["sensitivity", CRANK, *NUMPY, "--end", "0.1", "--by", "l9"], "l9"),
     (["sensitivity", CRANK, *NUMPY, "--end", "0.1", "--out", "by.txt"], ".csv"),
     (["reactions", CRANK, *NUMPY, "--out", "r.csv"], "--end"),
     (["inverse", CRANK, *NUMPY, "--actuated", "thet"], "did you mean 'theta'"),
-    (["impact", CRANK, *NUMPY], "give --gap NAME=RESTITUTION for what closes, or --stop NAME"),
+    (["impact", CRANK, *NUMPY], "give --gap NAME=RESTITUTION for a gap that closes, or --stop NAME"),
     (["impact", CRANK, *NUMPY, "--gap", "s"], "--gap s: write name=value, for example --gap s=0.5"),
     (["impact", CRANK, *NUMPY, "--gap", "s=2"], "--gap: the restitution of s must be between 0 and 1"),
     (["impact", CRANK, *NUMPY, "--stop", "q"], "--stop: no coordinate or output 'q'"),

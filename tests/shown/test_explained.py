@@ -52,7 +52,7 @@ def lines(text: str) -> dict[str, str]:
 
 def compared(document: Any) -> dict[str, float]:
     """Formula -> its difference, as the table at the end says."""
-    rows = re.findall(r"^\| `(.+?)` \| ([-+.e\d]+) \|$", section(document, "Shown and compiled"), re.M)
+    rows = re.findall(r"^\| `(.+?)` \| ([-+.e\d]+) \|$", section(document, "Formulas and compiled code"), re.M)
     return {name: float(value) for name, value in rows}
 
 
