@@ -163,7 +163,8 @@ cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u b
     int n_pieces, n_in, n_out
     cnp.npy_intp columns
     bint nan
-    const double *c
+    const double *c  # constants, and how many numbers after them those of the next column are; 0: they are all the same
+    cnp.npy_intp c_step
     double *w
     double *x
     double *y
@@ -204,7 +205,7 @@ cdef int call_one(const Batch *batch, cnp.npy_intp column, double *result) noexc
     if batch.nan:
         for i in range(batch.n_out):
             batch.y[i] = NAN
-    code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
+    code = batch.call(t, batch.x, batch.u, batch.c + column * batch.c_step, batch.y, batch.w)
     for i in range(batch.n_out):
         result[i * batch.columns + column] = entry(batch.y[i], code)
     return code

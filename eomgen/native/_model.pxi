@@ -565,12 +565,13 @@ cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) n
     cdef double *x = c + width * batch.table.n_const
     cdef double *y = x + width * batch.n_in
     cdef double *w = y + width * batch.n_out
-    cdef Piece constants = Piece(<char *>batch.c, batch.table.n_const, sizeof(double), 0)
-    spread(&constants, 0, 0, width, c)
+    cdef Piece constants = Piece(<char *>batch.c, batch.table.n_const, sizeof(double), batch.c_step * sizeof(double))
     while first < batch.columns and (failed < 0 or batch.nan):
         last = min(first + width, batch.columns) - 1
         if first == 0 or batch.time.column != 0:
             spread(&batch.time, first, last, width, t)
+        if first == 0 or batch.c_step != 0:
+            spread(&constants, first, last, width, c)
         if first == 0 or batch.inputs.column != 0:
             spread(&batch.inputs, first, last, width, u)
         k = 0

@@ -342,6 +342,39 @@ def test_the_bits_of_a_loop(crank: Any) -> None:
     compare(shares(crank, 0.5, columns, 14, t_eval=[0.1, 0.5], **TIGHT))
 
 
+def test_loops_of_many_runs_close_as_that_of_one(crank: Any) -> None:
+    """Also through a dead centre of what is given, and out of reach."""
+    r, theta = np.linspace(0.09, 0.11, 7), np.linspace(-3, 4, 7)
+    for initial, parameters in (
+        ({}, {"r": r, "l": 0.3 + r}),
+        ({"theta": theta, "theta_dot": 1.0}, {"l": 0.3 + r}),
+        ({"s": np.linspace(0.2, 0.5, 7), "s_dot": 0.1}, {}),
+        ({"theta_dot": theta}, {"r": [*r[:6], 1.0]}),
+        ({"B": 0.2}, {"l": 0.3 + r}),
+    ):
+        runs = crank.simulate_many((0, 1e-9), initial or None, parameters, t_eval=[0.0])
+        for k in range(7):
+            case = runs.case(k)
+            if runs.ok[k]:
+                alone = crank.x0(case["initial"], p=case["parameters"])
+                np.testing.assert_allclose(runs.samples[:, 0, k], alone, rtol=0, atol=1e-12)
+            else:
+                with pytest.raises(eg.EomgenError) as refused:
+                    crank.x0(case["initial"], p=case["parameters"])
+                assert str(refused.value) in [one.message for one in runs.failures() if one.run == k]
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_parameters_by_column(target: str) -> None:
+    crank = compiled("slider_crank", target)
+    x, p = np.repeat(crank.x0()[:, None], 9, axis=1), crank.p[:, None] * np.linspace(0.9, 1.1, 9)
+    each = np.array([crank.rhs(0.0, x[:, k], p=p[:, k]) for k in range(9)]).T
+    np.testing.assert_allclose(crank.rhs(0.0, x, p=p), each, rtol=1e-13, atol=1e-13)
+    refuses("EG-SHAPE p rhs (6, 9)", crank.rhs, 0.0, x[:, 0], p=p)
+    p[0, 4] = np.nan
+    refuses("EG-NOT-FINITE rhs theta", crank.rhs, 0.0, x, p=p)
+
+
 def test_a_run_that_fails_holds_up_no_other() -> None:
     """s'' = 2 s^3 from s = s' = 1 ends at t = 1; from 0.5 at t = 2 (s = 1/(2 - t))."""
     s = np.array([0.5, 1.0, 0.5, 0.25, 1.0, 0.5, 0.25, 0.5, 0.5])

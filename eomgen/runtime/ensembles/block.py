@@ -27,7 +27,8 @@ from ..runs.events import WAIT, Events
 from ..runs.integrate import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO
 from ..runs.simulate import simulate
 from ..storage import BROKEN, read_arrays, sealed
-from .variations import UNASSEMBLED, Variations, assemble_states
+from .starts import UNASSEMBLED, assemble_states
+from .variations import Variations
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -142,11 +143,7 @@ class Runs:
         y = np.full((module.n_y, x.shape[1]), np.nan)
         if further and good.size:
             outputs, u = module.kernels.kernel("outputs", nan=True), self.inputs_at(t, x)
-            if varied.p.ndim == 1:
-                y[:, good] = outputs(t[good], x[:, good], p=varied.p, u=np.ascontiguousarray(u[:, good]))
-            else:
-                for k in good:
-                    y[:, k] = outputs(float(t[k]), x[:, k], p=varied.column(int(k))["p"], u=u[:, k])
+            y[:, good] = outputs(t[good], x[:, good], p=varied.column(good).get("p"), u=u[:, good])
         return np.concatenate([x, y[further]]) if further else x
 
 
@@ -353,7 +350,7 @@ def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -
         part[:, good] = runs.module.project(part[:, good], t=at[good], **given)
         states[:, :, columns] = part
 
-    for k, reason in runs.varied.in_groups(runs.module.layout, led, bring).items():
+    for k, reason in runs.varied.in_groups(runs.module.layout, [*range(runs.count)], led, bring).items():
         block.status[k], block.words[k], states[:, :, k] = FAILED, reason, np.nan
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,22 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.algebra import Array
+from ...base.algebra import Array, Indices
 from ...base.names import place_of_marker
 from ...base.value_rules import read_count
-from ...errors import AssemblyError, EomgenError, UsageError, at_odds, ill_shaped, incomplete, no_number
+from ...errors import AssemblyError, EomgenError, at_odds, ill_shaped, incomplete, no_number
 from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_size, without_dots
 from ..initial import Initial
-from ..kernels import Kernels
-from ..layout import silent, values_at, warn_of_fixed
-from ..refusals import require_switched
-from ..runs.events import at_next_samples, require_agreement
-from ..runs.run_arguments import find_state
+from ..layout import warn_of_fixed
 from ..trajectory import last_state
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
-    from ..inputs import Forcing
     from ..layout import Layout
 
 
@@ -78,11 +73,6 @@ def grid_axes(grid: Mapping[str, Any]) -> dict[str, Array]:
 # -- variations --------------------------------------------------------------------------------------------------------
 
 
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
-
-UNASSEMBLED = -111  #: status of a run whose initial values could not be assembled
-
-
 @dataclass(frozen=True)
 class Variations:
     """What differs between runs, and what does not.
@@ -117,22 +107,22 @@ class Variations:
         values = () if self.states is not None else self.values.values()
         return self.p.ndim > 1 or self.u.ndim > 1 or self.states is not None or any(np.ndim(x) for x in values)
 
-    def alike(self, layout: Layout) -> list[list[int]]:
-        """The runs by what of their parameters and inputs decides where they can start."""
+    def alike(self, layout: Layout, runs: Sequence[int]) -> list[list[int]]:
+        """Runs by what of their parameters and inputs decides where they can start."""
         p, u = self.p, self.u
         if not any(place_of_marker(n) or layout.plain(n) in layout.y for n in (*self.values, *layout.initial_outputs)):
             p, u = p[layout.start_parameters], u[layout.constraint_inputs]
-        if p.ndim == u.ndim == 1:
-            return [list(range(self.count))] * (self.count > 0)
-        rows = np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)])
+        rows = np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)]).T
         groups: dict[bytes, list[int]] = {}
-        for k, row in enumerate(np.ascontiguousarray(rows.T)):
-            groups.setdefault(row.tobytes(), []).append(k)
+        for k in runs:
+            groups.setdefault(rows[k].tobytes(), []).append(k)
         return list(groups.values())
 
-    def in_groups(self, layout: Layout, singly: bool, work: Callable[[list[int]], None]) -> dict[int, str]:
+    def in_groups(
+        self, layout: Layout, runs: list[int], singly: bool, work: Callable[[list[int]], None]
+    ) -> dict[int, str]:
         """Work on runs that are alike together, or on each; the runs for which it fails, with the reason."""
-        left = [[k] for k in range(self.count)] if singly else self.alike(layout)
+        left = [[k] for k in runs] if singly else self.alike(layout, runs)
         reasons = dict[int, str]()
         while left:
             columns = left.pop()
@@ -145,8 +135,8 @@ class Variations:
                     left += [[k] for k in columns]
         return reasons
 
-    def column(self, k: int) -> dict[str, Any]:
-        """Parameters and inputs of one run, as ``Module.bind`` takes them."""
+    def column(self, k: int | Indices) -> dict[str, Any]:
+        """Parameters and inputs of one run, as ``Module.bind`` takes them, or of some as calls of kernels do."""
         given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
         return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
 
@@ -206,118 +196,6 @@ def collect_variations(
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
     return Variations(k, p, u, states, values)
-
-
-def assemble_states(
-    module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
-) -> tuple[Array, Mask, list[str]]:
-    """The initial states of all runs, on the constraints.
-
-    Parameters
-    ----------
-    t : float
-        Time of the start (s).
-    forcing_of : callable
-        The inputs of a run by its number.
-
-    Returns
-    -------
-    x : (n_x, k) array
-        NaN for a run that cannot be assembled.
-    failed : (k,) bool array
-    words : list of str
-        Why, for each of these in order.
-    """
-    with silent():  # for all runs, when their values were collected
-        x, reasons = _assemble_all(module, varied, t, forcing_of)
-    if module.info.clocks:
-        for k in set(range(varied.count)) - reasons.keys():
-            x[:, k] = at_next_samples(module.bind(**varied.column(k)), t, x[:, k])
-    if module.layout.switches:
-        _refuse_disagreement(module, varied, t, x, reasons)
-    failed = np.array([k in reasons for k in range(varied.count)], dtype=bool)
-    return x, failed, [reasons[k] for k in sorted(reasons)]
-
-
-def _refuse_disagreement(module: BoundModel, varied: Variations, t: float, x: Array, reasons: dict[int, str]) -> None:
-    """Add the runs at whose start a constraint declared closed does not hold, or one is half closed."""
-    layout, by_name = module.layout, varied.states is None and bool(module.info.rows_to_hold)
-    for k in set(range(varied.count)) - reasons.keys():
-        try:
-            require_switched(layout, x[layout.n_x - layout.n_states :, k])
-            if by_name:
-                require_agreement(module.bind(**varied.column(k)), t, x[:, k], varied.values)
-        except UsageError as error:
-            reasons[k], x[:, k] = str(error), np.nan
-
-
-@np.errstate(all="ignore")
-def _assemble_all(
-    module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
-) -> tuple[Array, dict[int, str]]:
-    """The states (n_x, k), and why runs have none; what several runs have in common is solved for once."""
-    layout = module.layout
-    free = not module.n_rows and not layout.space
-    if varied.states is not None and free:
-        return np.array(varied.states), {}
-    bound = layout.loops or layout.initial_outputs or any(name not in layout.x for name in varied.values)
-    if varied.states is None and free and not bound:  # named values are entries of the state, whatever the others are
-        return _assemble_entries(module, varied, t)
-    x = np.full((module.n_x, varied.count), np.nan)
-    led = forcing_of(0).constrained
-
-    def assemble(columns: list[int]) -> None:
-        k = columns[0]
-        if led:  # constraints depend on inputs that vary
-            values = {name: float(value[k] if np.ndim(value) else value) for name, value in varied.values.items()}
-            given: Any = (values or None) if varied.states is None else varied.states[:, k]
-            x[:, k] = find_state(module.rebound(**varied.column(k)), given, t, forcing_of(k))
-        elif varied.states is not None:
-            x[:, columns] = module.project(varied.states[:, columns], t=t, **varied.column(columns[0]))
-        else:
-            x[:, columns] = _assemble_named(module, varied, columns, t)
-
-    if not (led or varied.differ) and varied.count:
-        assemble([*range(varied.count)])
-        return x, {}
-    return x, varied.in_groups(module.layout, led, assemble)
-
-
-def _assemble_entries(module: BoundModel, varied: Variations, t: float) -> tuple[Array, dict[int, str]]:
-    """The states where each named value is an entry of them, whatever the others are."""
-    late = {name: value for name, value in values_at(module.layout, varied.p).items() if np.ndim(value)}
-    values = late | varied.values
-    scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in values.items()}
-    shared: dict[str, Any] = {name: a for name, a in (("p", varied.p), ("u", varied.u)) if a.ndim == 1}
-    x = np.repeat(module.x0(scalars, t=t, **shared)[:, None], varied.count, axis=1)
-    for name, value in values.items():
-        if np.ndim(value):
-            x[module.x_names.index(name)] = value
-    unknown = {  # of what follows from parameters
-        k: f"{module.x_names[int(np.argmin(np.isfinite(x[:, k])))]} is no number at the start"
-        for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist()
-    }
-    return x, unknown
-
-
-def _assemble_named(module: BoundModel, varied: Variations, columns: list[int], t: float) -> Array:
-    """The states of runs that differ, as far as starts can tell, in their named values alone."""
-    kernels = Kernels(module.core, module.layout, **varied.column(columns[0]))
-    initial = Initial(kernels, t, varied.values)
-    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()})
-             for k in columns]  # fmt: skip
-    alike: dict[tuple[float, ...], list[int]] = {}
-    for i, one in enumerate(given):
-        alike.setdefault(tuple(one.positions.values()), []).append(i)
-    x = np.empty((module.n_x, len(columns)))
-    for places in alike.values():
-        first = given[places[0]]
-        q = initial.assembled(first.positions)
-        rates = {name: np.array([given[i].rates[name] for i in places]) for name in first.rates}
-        v = initial.velocities(q, rates if first.positions or rates else None)
-        x[: module.n_q, places] = q[:, None]
-        x[module.n_q :, places] = v if v.ndim > 1 else v[:, None]
-    return x
 
 
 def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
