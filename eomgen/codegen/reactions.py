@@ -173,7 +173,7 @@ def _with_every_choice(expressions: Sequence[Expr]) -> list[Expr]:
 def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
     """A law whose choices make so many pieces that it is not judged whether it has one solution."""
     message = f"its law of a reaction has more than {MANY} pieces, made by abs, max, min, conditions and their products"
-    remedy = "write it as a sum of terms with fewer of them, which are judged one by one, or as a smooth function"
+    remedy = "write it as a sum of terms with fewer pieces each, or as a smooth function"
     return mechanism.problem(f"forces.{force}", message, remedy, "EG-TOO-LARGE")
 
 
@@ -197,7 +197,7 @@ def refuse_joints(kinematics: Kinematics) -> None:
             remedy = "coefficient is known of revolute, prismatic and cylindrical joints; give coulomb instead"
             problems.append(mechanism.problem(f"forces.{force.name}", message, remedy, "EG-UNSUPPORTED"))
         elif force.thrust_radius is not None and free[2]:
-            message = f"thrust_radius is given, and joint {spec.name!r} slides along its axis, so it carries no thrust"
+            message = f"thrust_radius is given, and joint {spec.name!r} slides along its axis, so it has no thrust"
             problems.append(
                 mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out", "EG-UNSUPPORTED")
             )
@@ -242,7 +242,7 @@ def refuse_without_inertia(kinematics: Kinematics, moved: Sequence[str], laws: L
     places = [q.path for q in mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
     places += [f"constraints.{s.constraint.name}" for s in mechanism.switched if s.constraint is not None]
     place, verb = (f"forces.{' and '.join(laws)}", "depend") if laws else (places[0], "depends")
-    message = f"{verb} on reactions, and moving {', '.join(moved)} meets no inertia"
+    message = f"{verb} on reactions, and motion of {', '.join(moved)} has no inertia"
     remedy = "give every body mass, or inertia about its joint"
     raise ModelError([mechanism.problem(place, message, remedy, "EG-UNSUPPORTED")])
 

@@ -287,7 +287,7 @@ SOIL: Fields = {
         dimension=SPEED,
     ),
     "settling": Scalar(
-        "time (s) in which cells of a bed come to hold what is put into them, and in which they follow fast sliding",
+        "time constant (s) with which cells of a bed reach the initial sinkage and follow fast sliding",
         default=SETTLING,
         dimension=TIME,
     ),
@@ -299,7 +299,7 @@ SOIL: Fields = {
 #: Of contacts with friction that has states.
 LATERAL: Fields = {
     "lateral": Flag(
-        "whether sliding across the plane of planar shapes has states too; mechanisms of the plane need none (false)",
+        "whether planar shapes have states of lateral sliding; plane mechanisms need none (false)",
         default=True,
     ),
 }

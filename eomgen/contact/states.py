@@ -278,8 +278,8 @@ def _outline(how: str) -> Fields:
     return {
         "points": Corners(f"3 to {CORNERS} points [x, y] around the solid{how} (m)", required=True, dimension=LENGTH),
         "depth": Scalar(
-            "how far inside the outline its pieces tell by themselves which is nearest (m); half of the narrowest "
-            "place, of points that are numbers, unless given",
+            "depth inside the outline up to which its pieces determine the nearest one (m); by default, with points "
+            "that are numbers, half of the narrowest width",
             dimension=LENGTH,
         ),
     }
@@ -302,7 +302,7 @@ _SIZES: dict[str, Fields] = {
     "plate": {
         "length": Scalar("length along x of the marker (m)", required=True, dimension=LENGTH),
         "width": Scalar("width across the plane (m)", required=True, dimension=LENGTH),
-        "points": Scalar(f"at how many points it is felt, 1 to {POINTS}", default=PLATE, level=NUMBER, dimension=NONE),
+        "points": Scalar(f"number of contact points, 1 to {POINTS}", default=PLATE, level=NUMBER, dimension=NONE),
     },
     "half_plane": {},
     "bed": {
@@ -322,8 +322,8 @@ _SIZES: dict[str, Fields] = {
         "tip_radius": Scalar("radius of the tips (m)", required=True, dimension=LENGTH),
         "seat_angle": Scalar("angle over which the arc of a seat goes, 130 deg unless given (rad)", dimension=NONE),
         "depth": Scalar(
-            "how far inside the teeth pieces tell by themselves which is nearest (m); half of the least width of teeth "
-            "unless given",
+            "depth inside the teeth up to which the pieces determine the nearest one (m); half of the least width of "
+            "teeth by default",
             dimension=LENGTH,
         ),
     },

@@ -171,7 +171,7 @@ class Author:
             found += [self.line(*entry) for entry in entries]
             rest = len(value) - len(entries)
             if rest:
-                same = ", or stand above the diagonal of a symmetric matrix" if symmetric else ""
+                same = ", or are above the diagonal of a symmetric matrix" if symmetric else ""
                 found.append(Sentence(f"The other {rest} entries of ${left}$ are 0{same}."))
         if size > FOLD or len(found) > LINES:
             return [Folded(f"${left}$: {size} terms and factors", tuple(found))]

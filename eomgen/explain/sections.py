@@ -378,7 +378,7 @@ def states(author: Author) -> Section | None:
     rates = [(name, x) for name, x in zip(k.state_names, k.state_rates, strict=True) if name not in held]
     if not k.state_names:
         return None
-    text = "Beside the coordinates and velocities the model has states of its own, with these equations of first order."
+    text = "Besides coordinates and velocities the model has states with these first-order equations."
     pieces: list[Piece] = [Sentence(text), *_lines(author, "rates of first-order states", rates, "S_", "_dot")]
     if k.sampled:
         told = (

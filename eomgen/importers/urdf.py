@@ -68,7 +68,7 @@ _REASONS = {
     "xacro": (LEFT, "elements of xacro that it did not expand"),
     "dialect": (LEFT, "words of other formats and simulators"),
     "soft": (LEFT, "soft bodies"),
-    "looks": (HARMLESS, "what it looks like; shapes become `display`"),
+    "looks": (HARMLESS, "appearance; shapes become `display`"),
     "measure": (HARMLESS, "sensors"),
     "label": (HARMLESS, "labels"),
 }

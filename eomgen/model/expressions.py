@@ -37,7 +37,7 @@ _JOINED = re.compile(r"(?<![A-Za-z0-9_])\.?[0-9][0-9A-Za-z_.]*?(and|or|not|if|is
 #: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
 _KEYWORDS = {"in": "_n", "from": "_rom"}
 _KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
-_UNFINISHED = "close the bracket; between { } of a model file an expression with commas must stand in quotes"
+_UNFINISHED = "close the bracket; between { } of a model file put an expression with commas in quotes"
 _HINTS = {
     "%": "there is no remainder operator",
     "'": "text is not allowed in an expression",

@@ -76,7 +76,7 @@ STATE: Fields = {
         level=k.LAW,
     ),
     "sampled": k.Scalar(
-        "instead of rate: its new value at each sampling time, held in between; without it a run's controllers give it",
+        "instead of rate: its new value at each sampling time, constant in between; else a run's controller sets it",
         level=k.LAW,
     ),
     "period": k.Scalar("time from one sampling time to the next (s)", dimension=TIME),
@@ -181,8 +181,8 @@ BODY: Fields = {
     "mass": k.Scalar("mass (kg); 0 for a body without mass", dimension=MASS),
     "com": k.Vector("centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "inertia": k.Inertia(
-        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say; of a mapping what is "
-        "missing is 0, and products have the tensor's own sign; one moment alone is that of a body moving in a plane",
+        "inertia (kg m^2) about the centre of mass in body axes, or as set by about and axes; in a mapping "
+        "missing entries are 0, and products have the sign of the tensor; a single moment suffices in plane motion",
         default=(0, 0, 0),
         dimension=MOMENT_OF_INERTIA,
     ),

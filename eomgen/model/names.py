@@ -70,7 +70,7 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         return f"{quoted(name)} is not a name", IDENTIFIER_RULE
     if not _IDENTIFIER.match(name):
         cut = name.count(")") > name.count("(")  # by a comma: {shake: hypot(x, y)}
-        remedy = "an expression with commas must stand in quotes between { }; " if cut else ""
+        remedy = "put an expression with commas in quotes between { }; " if cut else ""
         return f"{quoted(name)} is not an identifier", remedy + IDENTIFIER_RULE
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"

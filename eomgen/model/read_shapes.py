@@ -56,7 +56,7 @@ def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: 
     elif all(x.value is not None for x in corners):
         depth = reader.graph.constant(half_gap(numbers))
     else:
-        reader.faults.missing(f"{path}.depth", "points with parameters do not tell it; give a length")
+        reader.faults.missing(f"{path}.depth", "points with parameters do not determine it; give a length")
         depth = reader.stand_in
     return (depth, *(x for point in points for x in point))
 

@@ -123,8 +123,8 @@ class ReadingView(Displayed):
             lacks = not name.startswith("_") and not hasattr(type(self), name)
             if lacks and hasattr(type(self.source), name):
                 raise UnavailableError(
-                    f"a view of equations has no {name!r}: values are put into what is read, not into what is "
-                    f"compiled and counted; take it of the equations themselves, which are .source of the view",
+                    f"a view of equations has no {name!r}: a view is for reading, not for compiling and "
+                    f"counting; use the equations, .source of the view",
                 )
             return find_lacking(self, "a view of equations", name)
 

@@ -109,7 +109,7 @@ def _names(x: Expr) -> set[str]:
 
 
 STILL = "nothing is free to move: the position follows from constraints and time"
-SAMPLED = "sampled states, held until the next time t, where they become one after the other"
+SAMPLED = "sampled states, constant until the next time t, where they take these values one after the other"
 
 
 class PrintedEquations:

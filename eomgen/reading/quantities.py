@@ -346,7 +346,9 @@ class Quantities:
 
     def _require_separate(self, what: str) -> None:
         if self.kinematics.mechanism.written is not None:
-            raise UnavailableError(f"{what} are not known apart: given equations tell their sum alone, which is force")
+            raise UnavailableError(
+                f"{what} are not known separately: for equations of your own only their sum is, force"
+            )
 
     @cached_property
     def tree_quadratic_velocity(self) -> Row:

@@ -46,7 +46,7 @@ def load_show(part: str) -> ModuleType:
         if error.name != f"{package}.show":
             raise
         raise MissingDependencyError(
-            f"{package} draws nothing by itself; where eomgen is, Module.of({package}) draws and animates"
+            f"{package} does not draw; where eomgen is installed, Module.of({package}) draws and animates"
         ) from None
 
 

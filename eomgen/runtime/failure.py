@@ -166,7 +166,9 @@ class Fail:
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif name == "resets" and (switches := self.layout.switches):
             held = ", ".join(one for one, state in switches.items() if x[self.layout.x.index(state)] > 0.5)
-            blame = f": values are no numbers, or contradict what is closed ({held or 'none'}), closes or holds always"
+            blame = (
+                f": not finite, or contrary to a constraint that is closed ({held or 'none'}), closes or never opens"
+            )
             remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no degree of freedom"

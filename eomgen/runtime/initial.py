@@ -268,7 +268,7 @@ class StartBranch:
         if not undecided.shape[1]:
             shown = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.v, v, strict=True) if n in self.names)
             return AssemblyError(
-                f"{where}, and no motion goes on with the given velocities {shown or 'there'}; give those of one "
+                f"{where}, and no motion continues with the velocities {shown or 'there'}; give those of one "
                 "branch, or start a little beside this position",
                 code="EG-UNDETERMINED",
             )

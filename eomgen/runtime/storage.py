@@ -71,7 +71,7 @@ def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str,
     if SEAL not in found:
         raise ValueError("it has no seal, which is another format, as that of earlier versions")
     if str(found.pop(SEAL)) != _seal(found, key):
-        raise ValueError("its arrays are not those that eomgen sealed it with")
+        raise ValueError("its arrays differ from those that eomgen wrote")
     return found
 
 

@@ -186,7 +186,7 @@ TYPES = table(
             ),
             "offset": Scalar("value of that sum, an expression of parameters", default=0),
             "equation": Scalar(
-                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, "
+                "instead of coordinates, an expression that must be 0: of t, parameters, inputs, coordinates, "
                 "places and velocities of markers; with velocities the constraint is nonholonomic and must be linear "
                 "in them",
                 level=OUTPUT,

@@ -125,7 +125,7 @@ def _rack(e: Entry) -> Rack | None:
 
 
 _JOINTS = JointPair(
-    "two joints of one degree, or coordinates, whose axes are carried by the same part", required=True, measure="angle"
+    "two joints of one degree, or coordinates, with the same predecessor", required=True, measure="angle"
 )
 _RADII = Two("base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
 _TEETH = Two("numbers of teeth", dimension=NONE)

@@ -30,8 +30,8 @@ SWITCHING: Fields = {
 
 #: How a condition of a joint without coordinates is written that holds for a time.
 IN_PLACE_OF_JOINTS = (
-    "joints without coordinates hold for good, save for welds; for a time use a constraint of type hold: axes: xyz, "
-    "turning: xyz holds as a weld, axes: xyz alone as a ball joint, axes: xy, turning: z in the plane"
+    "joints without coordinates, except welds, cannot open; use a constraint of type hold: axes: xyz, turning: xyz "
+    "acts as a weld, axes: xyz without turning as a ball joint, axes: xy, turning: z in the plane"
 )
 
 
@@ -127,9 +127,9 @@ def _lock(e: Entry) -> Constraint | None:
 TYPES = table(
     ElementType(
         "hold",
-        "a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch.",
+        "a marker fixed on another body at its place of closing: a foot on the ground, a grasp, a clutch.",
         {
-            "between": Pair("marker whose body holds, and the marker that is held", required=True),
+            "between": Pair("marker of the holding body, and the marker that it holds", required=True),
             "axes": Choice(
                 "axes of the first marker along which the second does not move", default="xyz", choices=AXES
             ),

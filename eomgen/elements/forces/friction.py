@@ -498,7 +498,7 @@ class ReactionFriction(Force):
     """
 
     sentence = (
-        "Friction in a joint that grows with the force $N$ the joint carries: it opposes the rate $v$ of the "
+        "Friction in a joint that grows with the reaction $N$ of the joint: it opposes the rate $v$ of the "
         "coordinate; $v_s$ smooths its change of sign."
     )
     formula = r"F = -\left(c(v) + \mu(v) N\right) \mathrm{tanh}(v/v_s) - b v"
@@ -527,9 +527,7 @@ class ReactionFriction(Force):
 
 #: Keys of friction by the joint's reaction.
 BY_REACTION: Fields = {
-    "coefficient": Scalar(
-        "friction coefficient, times the force across its axis that the joint carries", level=LAW, dimension=NONE
-    ),
+    "coefficient": Scalar("friction coefficient, times the joint reaction across the axis", level=LAW, dimension=NONE),
     "static_coefficient": Scalar("the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE),
     "radius": Scalar("radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
     "thrust_radius": Scalar(
@@ -569,7 +567,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if found.joint is None:
         e.fault(
             "joint",
-            f"{found.name!r} is no coordinate of a joint, so it carries no reaction",
+            f"{found.name!r} is not a coordinate of a joint, so it has no reaction",
             "give coulomb",
             "EG-REFERENCE",
         )

@@ -81,7 +81,7 @@ def assemble_with_inputs(layout: Layout, forcing: Forcing, t: float, assembled: 
     names = ", ".join(layout.u[i] for i in places)
     given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
     raise AssemblyError(
-        f"the inputs {names} change with the state that the constraints give, and no state that fits both was found at "
+        f"the inputs {names} depend on the state, and no state that satisfies them and the constraints was found at "
         f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
         "give initial values nearer to such a state, or write the inputs in t",
         [],
@@ -325,8 +325,8 @@ def warn_of_depth(module: BoundModel, t: float, x: Array, u: Any) -> None:
     if found is not None:
         warnings.warn(
             f"{module.name} starts with shapes inside each other; {found}. Stiff contacts drive them apart at once, "
-            "and a bed of soil bears what is deep in it as if it had sunk there: change the initial values, or put "
-            "only shapes into groups that are apart",
+            "and a bed of soil carries shapes deep in it as if they had sunk there: change the initial values, or put "
+            "only shapes that are apart into groups",
             PenetrationWarning,
             stacklevel=calls_within() + 1,
         )
