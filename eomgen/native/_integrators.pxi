@@ -1,6 +1,6 @@
 # Runs whose steps are taken by an object in Python with the calls of SciPy's OdeSolver; all else is done in C.
 
-cdef extern from "eomgen_loop.h" nogil:
+cdef extern from "eomgen_steppers.h" nogil:
     enum: EOMGEN_END, EOMGEN_STEP_TOO_SMALL
     double eomgen_longest(eomgen_run *) noexcept
 

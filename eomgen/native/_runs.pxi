@@ -274,14 +274,14 @@ def march(Context context not None, t, h, x, u=None, out=None, error=ValueError)
     return status, result
 
 
-# Runs: whole trajectories by eomgen_loop.h, with a call of Python every few milliseconds.
+# Runs: whole trajectories by eomgen_steppers.h, with a call of Python every few milliseconds.
 
 from cpython.exc cimport PyErr_CheckSignals
 from libc.math cimport INFINITY, isnan
 
 from time import perf_counter
 
-cdef extern from "eomgen_loop.h" nogil:
+cdef extern from "eomgen_steppers.h" nogil:
     ctypedef struct eomgen_events:
         int n, n_model, n_tape, n_resets, crowd, for_slope
         eomgen_function values, resets, project

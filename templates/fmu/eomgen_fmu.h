@@ -2,7 +2,7 @@
 #ifndef EOMGEN_FMU_H
 #define EOMGEN_FMU_H
 
-#include "eomgen_loop.h"
+#include "eomgen_steppers.h"
 #include "fmu_model.h"
 
 /* Results of functions, as FMI numbers its status. */

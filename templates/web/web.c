@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "eomgen_loop.h"
+#include "eomgen_steppers.h"
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 

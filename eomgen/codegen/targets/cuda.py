@@ -32,11 +32,6 @@ if TYPE_CHECKING:
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
-#: Where the steppers have them; rk4_step is in the text of the model.
-SOURCES = {"dop853": "steppers/plain", "rk4": "steppers/rk4"}
-#: What else is compiled of the steppers, in order.
-STEPPERS = ("steppers/control", "steppers/loop")
-EVENTS = ("steppers/events",)
 _FUNCTION = re.compile(r"^static (int|flag|void|double) ", re.MULTILINE)
 _OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTILINE)
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
@@ -62,15 +57,12 @@ def emit_device_text(program: Program) -> str:
         )
     unrolled = replace(program, limits=replace(program.limits, rolled=sys.maxsize))  # threads have little memory
     sources = dict(emit_c(unrolled, lanes=False, separate=False))
-    parts = (*STEPPERS, *(EVENTS if program.metadata.get("events") else ()))
-    texts = {**sources, **read_layer(), "steppers": read_sources((*parts, "ensembles/ensembles"))}
-    texts |= {name: read_sources([part]) for name, part in SOURCES.items()}
-    texts["eomgen_methods.h"] = read_sources(["steppers/dop853"])
+    texts = {**sources, **read_layer(), "eomgen_methods.h": read_sources(["steppers/runge_kutta"])}
+    texts["steppers"] = read_sources(["steppers/control", "steppers/loop", "ensembles/ensembles"])
     there: set[str] = set()
     model = _flattened([name for name in sources if name.endswith(".c")], texts, there)
-    header = _flattened(["eomgen_real.h", "eomgen_steppers.h", "eomgen_loop.h"], texts, there)
-    methods = {name: _flattened([name], texts, there) for name in SOURCES}
-    steppers = _flattened(["steppers"], texts, there)
+    header = _flattened(["eomgen_real.h", "eomgen_steppers.h"], texts, there)
+    methods, steppers = (_flattened([name], texts, there) for name in ("eomgen_methods.h", "steppers"))
     if program.metadata.get("events"):  # all in one takes NVRTC a minute
         steppers = _OF_STEPPERS.sub(r"EOMGEN_APART \1 ", steppers)
     if program.drivers:  # which call each other in many places; a tree's rhs is inlined, so that it runs in registers

@@ -337,7 +337,7 @@ def model_context(program: Program, start: Sequence[float], token: str) -> dict[
 
 #: Sources that are the same for all models.
 _COMMON = ("eomgen_fmu.c", "fmu_runs.c")
-_STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_steppers.c")
+_STEPPERS = ("eomgen_steppers.h", "eomgen_methods.h", "eomgen_steppers.c")
 
 
 def emit_fmu(program: Program, start: Sequence[float], version: str) -> dict[str, str]:

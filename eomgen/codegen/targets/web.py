@@ -56,7 +56,7 @@ from .fmu import refuse_impacts
 KERNELS = ("rhs", "energy", "constraints", "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs",
            "events", "resets", "alignment", "scales")  # fmt: skip
 METHODS = {"DOP853": "dop853", "RK45": "rk45", "Radau": "radau"}  #: with watched steps; DOP853 stands for others
-STEPPERS = ("eomgen_steppers.h", "eomgen_loop.h", "eomgen_methods.h", "eomgen_steppers.c")
+STEPPERS = ("eomgen_steppers.h", "eomgen_methods.h", "eomgen_steppers.c")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-mexec-model=reactor", "-s", "-DEOMGEN_LANES=0",
          "-DEOMGEN_PORTABLE", "-DEOMGEN_WITHOUT_METADATA")  # fmt: skip
 SECONDS = 1800.0  #: that the compiler may take: the first time zig builds its C library, once for all

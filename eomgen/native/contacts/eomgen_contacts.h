@@ -9,7 +9,7 @@
 
        P_n - max(0, P_n - r y_n),      P_t - (P_t - s y_t) brought into the disc of radius mu max(0, P_n - r y_n),
 
-   which a Newton method with the derivatives of the branch at hand solves (newton.c). Contacts may be more than there are
+   which a Newton method with the derivatives of the branch at hand solves (impulses.c). Contacts may be more than there are
    freedoms: each round solves for contacts that are a little softer about the impulses of the round before (the proximal
    point method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the
    solution as it is. Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics

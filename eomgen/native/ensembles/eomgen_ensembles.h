@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "eomgen_loop.h"
+#include "eomgen_steppers.h"
 
 /* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_advance or this. */
 enum { EOMGEN_BAD_PARAMETERS = -110 };

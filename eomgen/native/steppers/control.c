@@ -300,3 +300,5 @@ void eomgen_play(const eomgen_tape *tape, double t, const double *y, const doubl
     }
 }
 #endif
+
+#include "eomgen_methods.h"

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from ..bound_model import BoundModel
     from ..inputs import Forcing
 
-GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
+GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_steppers.h
 PAUSE = 3  #: the loop stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
 

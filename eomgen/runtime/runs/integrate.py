@@ -112,7 +112,7 @@ def takes_jacobian(solver: Any) -> bool:
     return "jac" in signature(solver.__init__).parameters
 
 
-ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
+ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_steppers.h
 STATUS = {ENDED: 0, TERMINAL: 1}  #: SciPy's
 TOO_SMALL = "Required step size is less than spacing between numbers."
 MESSAGES = {
