@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..base.algebra import Array
 from ..base.limits.constraints import STATE
 from ..base.results import Result, same_keys
 from ..base.texts import number
-from ..errors import AssemblyError, ill_placed, ill_shaped
+from ..errors import AssemblyError, PartitionError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
 from ..runtime.initial import Initial
 from ..runtime.kernels import constraint_system
@@ -22,7 +23,7 @@ from .balance import Balance, balance_forces, force_slopes
 from .limits import DIFFERENCES
 from .linear import linearize
 from .linearization import Linearization, SecondOrder, stability_of_matrix, stiffness_errors, verdict, without_noise
-from .search import Search, SearchPoint, find_balance
+from .search import REACH, Search, SearchPoint, find_balance, newton
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -183,7 +184,8 @@ def equilibrium(
 ) -> Equilibrium:
     """Find a position at rest in which all forces are in balance (by virtual work) and no first-order state changes.
 
-    Newton's iteration is tried first, then the motion in a viscous fluid, then damped Gauss-Newton steps.
+    Newton's iteration is tried first, then the motion in a viscous fluid, then damped Gauss-Newton steps.  Angles in
+    loops are those to which a motion from the declared position leads, not whole turns away.
 
     Parameters
     ----------
@@ -243,7 +245,30 @@ def equilibrium(
             "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
     point, steps = find_balance(search, q)
-    return describe(search, point, steps)
+    return describe(search, reached(search, point) if module.layout.n_h else point, steps)
+
+
+def reached(search: Search, point: SearchPoint) -> SearchPoint:
+    """The same position with its angles as a motion from the declared position leads there.
+
+    Steps of a search may turn a rocker right round, which no motion does.  In another assembly mode, to which none
+    leads, they are those nearest to the declared position.
+    """
+    layout, q = search.layout, point.q
+    initial = Initial(point.module.kernels, search.t)
+    with suppress(AssemblyError, PartitionError):
+        reference = initial.reference()
+        angles = [layout.q.index(name) for name in layout.q if layout.unit(name) == "rad"]
+        there = nearest = q.copy()
+        nearest[angles] -= 2.0 * np.pi * np.round((q - reference)[angles] / (2.0 * np.pi))
+        for ends in (nearest, q):
+            with suppress(AssemblyError):
+                found = initial.follow(reference, {layout.q[i]: float(ends[i]) for i in layout.independent_q})
+                there = there if initial.apart(found, q) else found
+        if not np.allclose(there, q, atol=1.0):
+            turned, _, balanced = newton(search, search.at(there, point.s, point.unknowns), reach=REACH)
+            return turned if balanced and not initial.apart(turned.q, q) else point
+    return point
 
 
 def _states(module: BoundModel, guess: Any) -> Array:

@@ -613,11 +613,12 @@ class Initial:
         for here in found:  # which grows: the legs of a platform flip one by one
             for start in starts(here, system.free, self.place, tries if len(found) <= many or here is first else 0):
                 q, residual = close(system, start)
-                if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
+                if closed(residual) and self.system.aligned(q) and all(self.apart(q, other) for other in found):
                     found.append(q)
         return found
 
-    def _apart(self, a: Array, b: Array) -> bool:
+    def apart(self, a: Array, b: Array) -> bool:
+        """Whether two positions differ by more than full turns of angles."""
         kinds = self.layout.coordinate_kinds if self.layout.general_rates else self.layout.velocity_kinds
         gap = np.abs(self.place.distance(a, b))
         turns = np.array([kind != "length" for kind in kinds], dtype=bool)

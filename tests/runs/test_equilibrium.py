@@ -29,6 +29,15 @@ def test_the_iftomm_four_bar() -> None:
     assert upright.stability == "unstable"
 
 
+@pytest.mark.parametrize("guess", [{"psi": 9.0}, {"psi": -6.0}, {"bend": -9.0}, {"bend": 4.5}, {"corner": 7.5}])
+def test_no_link_is_turned_right_round(guess: dict[str, float]) -> None:
+    """In a parallelogram both cranks have the same angle and the coupler none."""
+    mod = compiled("spring_four_bar")
+    found = mod.equilibrium(guess)
+    np.testing.assert_allclose([found["psi"], -found["bend"], found["corner"]], found["phi"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(mod.x0(phi=found["phi"])[:3], found.q, rtol=0, atol=1e-9)
+
+
 def energy(phi: float, free: float) -> float:
     """Potential of the four-bar, from the reference's formula."""
     return float(2 * 9.81 * np.sin(phi) + 12.5 * (2 * np.cos(phi / 2) - free) ** 2)
