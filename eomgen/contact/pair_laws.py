@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 
 from ..elements.forces.force import MarkerLoad, View, where
 from ..elements.forces.friction import DryFriction
-from ..elements.forces.normal_laws import ElasticPart, NormalLaw
+from ..elements.forces.normal_laws import NormalLaw, PartlyDamped
 from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, substitute
@@ -105,7 +105,7 @@ def touching(
     if kinds[0] == "half":
         return SpherePlane(*laws, radius)
     if kinds[0] in HOLLOWS:
-        elastic = (law.name, *markers, ElasticPart(normal), None)
+        elastic = (law.name, *markers, PartlyDamped(normal, radius.graph.zero), None)
         return (NotchRound if kinds[0] == "notch" else BowlRound)(*elastic, first, radius)
     if part_of(kinds[0]) == INSIDE:
         return InsideRound(*laws, first, radius)

@@ -41,18 +41,8 @@ class Entry:
     """An entry on its way to an element.
 
     Every method reads one key, notes what is wrong with it as a fault of that key, and returns None or a stand-in then,
-    so that one pass finds all faults.
-
-    Attributes
-    ----------
-    reader : Reader
-        What is read of the model so far (:class:`~eomgen.model.values.Reader`).
-    values : dict
-        What the user gave, by key.
-    element_type : ElementType
-        Its type, and ``fields`` all keys of that.
-    stand_in : Expr
-        In place of an expression that is at fault.
+    so that one pass finds all faults.  ``reader`` is what is read of the model so far
+    (:class:`~eomgen.model.values.Reader`), ``values`` what the user gave by key, ``fields`` all keys of its type.
     """
 
     def __init__(self, reader: Any, name: str, path: str, values: dict[str, Any]) -> None:
@@ -186,35 +176,17 @@ class Entry:
 
 
 class ElementType(NamedTuple):
-    """A type of element.
+    """A type of element."""
 
-    Attributes
-    ----------
-    name : str
-        The word in model files, and the method of Model.
-    doc : str
-        What it is, in one sentence that goes on from "Add".
-    keys : Fields
-        Its keys besides ``type``, in the order of the method's arguments.
-    read : callable
-        Entry -> the element; None where the entry has a fault, which is noted.  Joints are read otherwise.
-    one_of : tuple of str
-        Keys of which exactly one is given.
-    remedies : mapping of str to str
-        What to do instead, for keys that people give something of another kind.
-    ends : tuple of str
-        What the arguments of the method are called that a key of two markers or joints has.
-    states : callable
-        The entry's values -> its first-order states, as suffixes of its name, and their units.
-    """
-
-    name: str
-    doc: str
-    keys: Fields
+    name: str  #: the word in model files, and the method of Model
+    doc: str  #: what it is, in one sentence that goes on from "Add"
+    keys: Fields  #: besides ``type``, in the order of the method's arguments
+    #: Entry -> the element; None where the entry has a fault, which is noted.  Joints are read otherwise.
     read: Callable[[Entry], Any] | None = None
-    one_of: tuple[str, ...] = ()
-    remedies: Mapping[str, str] = {}
-    ends: tuple[str, str] = ("a", "b")
+    one_of: tuple[str, ...] = ()  #: keys of which exactly one is given
+    remedies: Mapping[str, str] = {}  #: what to do instead, for keys that people give something of another kind
+    ends: tuple[str, str] = ("a", "b")  #: arguments of the method for a key of two markers or joints
+    #: The entry's values -> its first-order states, as suffixes of its name, and their units.
     states: Callable[[Mapping[str, Any]], Mapping[str, str]] = lambda values: {}
 
     def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
@@ -261,19 +233,8 @@ def element(
 ) -> ElementType:
     """The type of elements whose fields are read from their keys one by one, in this order.
 
-    Parameters
-    ----------
-    kind : type
-        The class: name, what it acts on (with ``where``), its keys.
-    name, doc : str
-        As of :class:`ElementType`.
-    where : Where, optional
-    keys : Fields, optional
-        Other keys for the same fields, in their order.
-    check : callable, optional
-        Notes what is wrong with the entry beside its keys.
-    **more
-        What else an ElementType has.
+    The class says what it acts on (with ``where``) and its keys, unless ``keys`` has others for the same fields;
+    ``check`` notes what is wrong with the entry beside its keys, ``more`` is what else an ElementType has.
     """
     own = keys_of(kind) if keys is None else keys
 

@@ -188,16 +188,9 @@ class Field:
         return next((self.parts[word] for word in reversed(words) if word in self.parts), None)
 
     def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
-        """The dimension of a scalar in an entry, None if it is not known.
+        """The dimension of a scalar in an entry of these values, None if it is not known.
 
-        Parameters
-        ----------
-        values : mapping
-            The entry.
-        place : tuple
-            Indices of the scalar in the field.
-        length : bool
-            Whether the coordinate that the entry acts on is a length.
+        ``place`` are the indices of the scalar in the field; ``length`` says that the entry acts on a length.
         """
         found = None if self.dimension is None else self.dimension.along(length)
         if found is not None and self.exponent and length:

@@ -17,65 +17,33 @@ Points = tuple[tuple[float, ...], ...]
 
 
 class SymbolPart(NamedTuple):
-    """A solid of a joint's symbol, in sizes of a symbol.
+    """A solid of a joint's symbol, in sizes of a symbol."""
 
-    Attributes
-    ----------
-    shape : {'box', 'cylinder', 'sphere'}
-    size : tuple of float
-        Edges of a box; radius and length of a cylinder; radius of a sphere.
-    axis : {'x', 'y', 'z'}
-        Where a cylinder lies, in the axes of the marker.
-    on : {'P', 'S'}
-        Marker it is fixed to.
-    """
-
-    shape: str
-    size: tuple[float, ...]
-    axis: str = "z"
-    on: str = "S"
+    shape: str  #: box, cylinder or sphere
+    size: tuple[float, ...]  #: edges of a box; radius and length of a cylinder; radius of a sphere
+    axis: str = "z"  #: where a cylinder lies, in the axes of the marker
+    on: str = "S"  #: marker it is fixed to: P or S
 
 
 class JointLook(NamedTuple):
-    """The symbol of a type of joint.
-
-    Attributes
-    ----------
-    pieces : tuple of SymbolPart
-    slides : bool
-        Whether S slides along z of P: a rail is drawn, or a cylinder with its rod.
-    bar : bool
-        Whether a rod without mass joins the two origins.
-    """
+    """The symbol of a type of joint."""
 
     pieces: tuple[SymbolPart, ...] = ()
-    slides: bool = False
-    bar: bool = False
+    slides: bool = False  #: whether S slides along z of P: a rail is drawn, or a cylinder with its rod
+    bar: bool = False  #: whether a rod without mass joins the two origins
 
 
 class Drawn(NamedTuple):
-    """Lines from marker to marker, or at a joint.
+    """Lines from marker to marker, or at a joint."""
 
-    Attributes
-    ----------
-    stops : tuple of Marker and WrapCylinder
-        What it runs over, in order; one marker: lines about its z axis.
-    coordinate : str
-        Or the coordinate of a joint that it acts on: lines about an angle, lines between the markers along a length.
-    along : tuple of Points
-        Lines from the first stop to the last: part of the way (0 .. 1), and two distances across in sizes of a symbol.
-        Without them a straight line over all stops.
-    about : tuple of Points
-        Lines in the plane across the axis, in sizes of a symbol.
-    walls : tuple of Expr
-        Values of a coordinate that is a length, at which there are walls across its axis (m).
-    """
-
-    stops: tuple[Marker | WrapCylinder, ...] = ()
+    stops: tuple[Marker | WrapCylinder, ...] = ()  #: what it runs over, in order; one marker: lines about its z axis
+    #: Or the coordinate of a joint that it acts on: lines about an angle, lines between the markers along a length.
     coordinate: str = ""
+    #: Lines from the first stop to the last: part of the way (0 .. 1), and two distances across in sizes of a symbol;
+    #: without them a straight line over all stops.
     along: tuple[Points, ...] = ()
-    about: tuple[Points, ...] = ()
-    walls: tuple[Expr, ...] = ()
+    about: tuple[Points, ...] = ()  #: lines in the plane across the axis, in sizes of a symbol
+    walls: tuple[Expr, ...] = ()  #: values of a coordinate that is a length, at which walls stand across its axis (m)
 
 
 class Pull(NamedTuple):

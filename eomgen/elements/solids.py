@@ -31,15 +31,9 @@ from .kinds import Fields, Scalar, Vector
 
 @dataclass(frozen=True)
 class Solid(ABC):
-    """A solid of uniform density.
+    """A solid of uniform density."""
 
-    Attributes
-    ----------
-    lengths : mapping of str to Vec3
-        Dimensions (m); a single one is repeated three times.
-    """
-
-    lengths: Mapping[str, Vec3]
+    lengths: Mapping[str, Vec3]  #: dimensions (m); a single one is repeated three times
 
     type_name: ClassVar[str]
     dimensions: ClassVar[Fields]  #: its keys
@@ -266,22 +260,10 @@ class MeshProperties:
 
 
 def measure_mesh(path: str) -> MeshProperties:
-    """Mass properties of the solid that a mesh bounds.
+    """Mass properties of the solid that an STL file, text or binary, bounds.
 
-    Parameters
-    ----------
-    path : str
-        An STL file, text or binary.
-
-    Returns
-    -------
-    MeshProperties
-
-    Raises
-    ------
-    UsageError
-        There is no such file, it is no STL file, or its triangles do not bound a solid: the surface has holes, its
-        triangles are wound inconsistently or inside out.  Also when trimesh is not installed.
+    Raises UsageError where there is no such file, it is no STL file, trimesh is not installed, or its triangles do not
+    bound a solid: the surface has holes, its triangles are wound inconsistently or inside out.
     """
     path = as_name("path", path)
     try:

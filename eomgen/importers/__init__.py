@@ -16,28 +16,10 @@ __all__ = ["RobotOptions", "describe_file"]
 
 
 def describe_file(path: str | os.PathLike[str], **options: Any) -> Description:
-    """The raw data of a URDF or MJCF file, by its root element.
+    """The raw data of a URDF or MJCF file, by its root element; options are those of :class:`RobotOptions`.
 
-    Parameters
-    ----------
-    path : str or path
-    **options
-        Fields of :class:`RobotOptions`.
-
-    Returns
-    -------
-    Description
-
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    UsageError
-        An option that is not there, or not a value it takes.
-    ModelError
-        The file is no robot: every fault found, with its line.
-    MissingDependencyError
-        A package is needed.
+    Raises FileNotFoundError; UsageError for an option that is not there, or a value that it does not take; ModelError
+    with every fault and its line; MissingDependencyError.
     """
     chosen = make_options(options)
     root = read_xml(path)

@@ -187,12 +187,8 @@ _WRAP_JOINT = 1  # mjtWrap
 def read_mjcf(root: XmlElement, options: RobotOptions) -> Robot:
     """The robot of an MJCF file.
 
-    Raises
-    ------
-    MissingDependencyError
-        mujoco is not installed.
-    ModelError
-        MuJoCo refuses the file, crashes on it, or needs too much time or memory; with the line where it says one.
+    Raises ModelError where MuJoCo refuses the file, crashes on it, or needs too much time or memory, with the line
+    where it says one; MissingDependencyError.
     """
     if options.floating:
         raise at_odds(f"{root.file}: an MJCF file itself defines which bodies float; leave floating out")

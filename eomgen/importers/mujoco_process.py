@@ -29,13 +29,9 @@ KEPT = ("SYSTEMROOT", "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 def compile_model(path: str, folder: str, memory: int, seconds: int, wait: int) -> tuple[dict[str, Any], Any]:
     """What a process of its own makes of an MJCF file in a folder, which holds all files that it names.
 
-    Returns
-    -------
-    answer : dict
-        ``names`` by kind of element, ``flags`` (bits of mjtDisableBit), ``warnings``; or why there is no model:
-        ``missing``, ``refused``, ``memory``, or ``code``, with which the process ended (None if it took too long).
-    arrays : mapping
-        The arrays of MjModel and its counts by their names, those of ``opt`` with ``opt_`` before.
+    The answer has ``names`` by kind of element, ``flags`` (bits of mjtDisableBit) and ``warnings``; or why there is no
+    model: ``missing``, ``refused``, ``memory``, or ``code``, with which the process ended (None if it took too long).
+    Beside it stand the arrays of MjModel and its counts by their names, those of ``opt`` with ``opt_`` before.
     """
     import numpy as np
 

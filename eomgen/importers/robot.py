@@ -124,12 +124,7 @@ class RobotOptions:
 
 
 def make_options(given: dict[str, Any]) -> RobotOptions:
-    """Checked options; ``lock`` as a mapping, ``actuate`` as a tuple unless it is True or False.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Checked options; ``lock`` as a mapping, ``actuate`` as a tuple unless it is True or False."""
     known = [field.name for field in fields(RobotOptions)]
     for key in given:
         if key not in known:
@@ -368,7 +363,6 @@ class Robot:
 
     name: str
     file: str
-    root: str = ""
     links: dict[str, RobotLink] = field(default_factory=dict)
     joints: dict[str, RobotJoint] = field(default_factory=dict)
     loops: list[Loop] = field(default_factory=list)

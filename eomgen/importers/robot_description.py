@@ -117,13 +117,7 @@ class Bodies:
 
 
 def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
-    """Sort the links into bodies.
-
-    Raises
-    ------
-    ModelError
-        The robot has faults: all of them, those of its elements included.
-    """
+    """Sort the links into bodies; raises ModelError with all faults of the robot, those of its elements included."""
     _lock(robot, options)
     _check_ends(robot)
     root = _root(robot)
@@ -338,13 +332,7 @@ _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2)
 
 
 def describe_robot(robot: Robot, options: RobotOptions) -> Description:
-    """The raw data of a robot.
-
-    Raises
-    ------
-    ModelError
-        The robot has faults.
-    """
+    """The raw data of a robot; raises ModelError if it has faults."""
     return _Writer(robot, options, build_bodies(robot, options)).describe()
 
 

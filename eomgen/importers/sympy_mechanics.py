@@ -57,13 +57,7 @@ class Forms:
 
 
 def read_forms(method: Any) -> Forms:
-    """The equations of a method object.
-
-    Raises
-    ------
-    UsageError
-        Another object, or its equations are not formed yet.
-    """
+    """The equations of a method object; UsageError for another object, or equations that are not formed yet."""
     from sympy.physics.mechanics import JointsMethod, KanesMethod, LagrangesMethod, System
 
     for kind, part in ((System, "eom_method"), (JointsMethod, "method")):

@@ -52,14 +52,8 @@ class XmlElement:
 def read_xml(path: str | os.PathLike[str]) -> XmlElement:
     """The root element of an XML file.
 
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    UsageError
-        It is not a plain file, or the path is none, such as one with NUL.
-    ModelError
-        Not XML, a document type or an entity, or too large; with the line.
+    Raises FileNotFoundError; UsageError for what is no plain file, or no path; ModelError with the line for what is not
+    XML, a document type or an entity, or too large.
     """
     name = os.fsdecode(path)
     with open_plain(name) as file:
@@ -132,16 +126,9 @@ class ConstructRow(NamedTuple):
 class Constructs:
     """The elements and attributes of a format: the notes of a load and the tables of the documentation.
 
-    Parameters
-    ----------
-    text : str
-        Lines ``element[, element]: word attributes``; an element is a path of tags, e.g. ``link/inertial``.
-    reasons : mapping
-        Word -> fate and reason.
-    path_of : callable
-        (path of the parent, empty of the root; tag) -> the path of an element.
-    everywhere : mapping
-        Attribute that any element may have -> word.
+    The text has lines ``element[, element]: word attributes``, an element being a path of tags, e.g. ``link/inertial``;
+    ``reasons`` has the fate and the reason of each word, ``everywhere`` the words of attributes that any element may
+    have.  ``path_of`` gives the path of an element from that of its parent, empty of the root, and its tag.
     """
 
     def __init__(

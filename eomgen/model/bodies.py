@@ -26,7 +26,7 @@ from ..expr.core import Expr, symbols_of
 from ..expr.identity import DRAWS, TRIES, is_rounding, random_point, with_bounds
 from ..expr.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..expr.vectors import Mat3, Vec3
-from .checks import check_keys, unknown_key
+from .checks import check_keys
 from .description import DescribedEntry, items, place_of
 from .fields import BODY, SOLID, SOLID_KEYS, solid_fields
 from .mechanism import Body, BodyShape, JointSpec
@@ -41,12 +41,7 @@ def check_bodies(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Note masses and inertias that no body can have, as far as the values of parameters tell.
 
-    Returns
-    -------
-    negative : tuple of str
-        Names of bodies with a negative mass or moment that are taken as they are.
-    notes : tuple of str
-        What of them is to be noted.
+    Returns the names of bodies with a negative mass or moment that are taken as they are, and notes on them.
     """
     notes: list[str] = []
     negative: dict[str, None] = {}
@@ -185,22 +180,11 @@ def _point(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
 
 
 def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
-    faults = reader.faults
-    kind = values.get("type")
-    if not isinstance(kind, str) or kind not in SOLID:
-        if kind is None:
-            faults.missing(f"{path}.type", f"give one of {', '.join(SOLID)}")
-        else:
-            faults.add(f"{path}.type", f"no solid of type {kind!r}", nearest(str(kind), SOLID, "types"), "EG-CHOICE")
+    faults, kind = reader.faults, reader.type_of(path, values, SOLID, "solid")
+    if not kind:
         return None
     fields = solid_fields(kind)
-    for key in values:
-        if key not in fields:
-            message = f"a {kind} has no {key!r}" if key in SOLID_KEYS else "unknown key"
-            faults.add(f"{path}.{key}", message, unknown_key(key, fields), "EG-NAME-UNKNOWN")
-    for key, field in fields.items():
-        if field.required and key not in values:
-            faults.missing(f"{path}.{key}", f"give {field.says}: {field.doc}")
+    check_keys(path, values, fields, faults, f"a {kind}", SOLID_KEYS)
     density = "line_density" if "line_density" in fields else "density"
     if ("mass" in values) == (density in values):
         wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
@@ -281,13 +265,7 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
 
 
 def _locate(reader: Reader, file: str) -> str:
-    """The path of a file beside the model file, below its folder; from Python any path.
-
-    Raises
-    ------
-    UsageError
-        A model file names a file outside its own folder.
-    """
+    """The path of a file beside the model file, below its folder, or UsageError; from Python any path."""
     model = place_of("", reader.faults.lines)[0]
     return beside(model, file) if model else file
 

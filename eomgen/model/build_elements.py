@@ -7,24 +7,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from ..base.value_rules import NOT_NEGATIVE, TURN
+from ..base.value_rules import TURN
 from ..elements import kinds
 from ..elements.constraints import Constraint
 from ..elements.constraints.cams import Profile
-from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.constraints.switching import SWITCHING
 from ..elements.element_type import ElementType, Entry, Types
 from ..elements.forces import FORCES
 from ..elements.joints import JOINTS, Joint
 from ..elements.kinds import LIMITS, Law, Scalar
 from ..errors import ModelError
-from ..expr.core import Expr, symbols_of
+from ..expr.core import symbols_of
 from ..expr.records import dataclass
-from ..expr.shown import quoted, shown
-from .checks import check_keys, check_names, unknown_key
+from .checks import check_keys, check_names
 from .description import DescribedEntry, Description, items
-from .fields import joint_fields
+from .fields import JOINT_DATA, joint_fields
 from .mechanism import STATE_RATE, FirstOrderState, JointSpec
-from .names import nearest
 from .placement import TURNS, turn_matrix
 from .requirements import Requirements
 from .sympy_face import name_of
@@ -78,13 +76,6 @@ def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
     if value is not None and value < 0:
         reader.fault(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
     return value or 0.0
-
-
-def read_armature(reader: Reader, path: str, given: Any) -> Expr:
-    """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
-    value = reader.expression(path, given)
-    reader.requirements.inside(path, value, NOT_NEGATIVE, "an inertia must be 0 or positive")
-    return value
 
 
 WELD = "weld"
@@ -152,8 +143,9 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
     """Check types, keys and coordinates of all joints and take the coordinates into the namespace."""
     result = []
     for entry in check_names(entries, "joint", reader.faults):
-        type_name = _type(reader, entry)
-        if type_name is None:  # its coordinates are known all the same, so that their users are not at fault too
+        at_fault = reader.faults.under(entry.path)
+        type_name = "" if at_fault else reader.type_of(entry.path, entry.values, JOINTS, "joint")
+        if not type_name:  # its coordinates are known all the same, so that their users are not at fault too
             for key in ("coordinate", "coordinates"):
                 if key in entry.values:
                     for name in coordinate_names("", entry.name, {key: entry.values[key]})[0]:
@@ -219,36 +211,15 @@ def _with_data(reader: Reader, spec: JointSpec, path: str, values: dict[str, Any
     if len(spec.coordinates) == 1 and "dry_friction" in values:
         data["dry_friction"] = read_dry_friction(reader, f"{path}.dry_friction", values["dry_friction"])
     if len(spec.coordinates) == 1 and "armature" in values:
-        data["armature"] = read_armature(reader, f"{path}.armature", values["armature"])
+        data["armature"] = JOINT_DATA["armature"].read(reader, f"{path}.armature", values["armature"])
     return replace(spec, **data) if data else spec
-
-
-def _type(reader: Reader, entry: DescribedEntry) -> str | None:
-    path, given = f"{entry.path}.type", entry.values.get("type")
-    if reader.faults.under(entry.path):
-        return None
-    if isinstance(given, str) and given in JOINTS:
-        return given
-    if given is None:
-        reader.faults.missing(path, f"give one of {', '.join(JOINTS)}")
-    else:
-        reader.fault(path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"), "EG-CHOICE")
-    return None
 
 
 def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
     """The joint itself, with its options; keys are checked."""
     fields = joint_fields(type_name)
-    for key in entry.values:
-        if key not in fields:
-            others = set().union(*map(joint_fields, JOINTS))
-            elsewhere = key in others
-            message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
-            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING else unknown_key(key, fields)
-            reader.fault(f"{entry.path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
-    for key, field in fields.items():
-        if field.required and key not in entry.values and key != "type":
-            reader.faults.missing(f"{entry.path}.{key}", f"give {field.says}")
+    others = set[str]().union(*map(joint_fields, JOINTS)) if entry.values.keys() - fields.keys() else ()
+    check_keys(entry.path, entry.values, fields, reader.faults, f"a {type_name} joint", others)
     if {"coordinate", "coordinates"} <= entry.values.keys():
         reader.fault(f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT")
     kind = JOINTS[type_name]
@@ -337,10 +308,8 @@ def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     """The type, if the entry has one and says in one way what it acts on; its keys are checked."""
     if e.at_fault():
         return None
-    given = e.values.get("type")
-    if not isinstance(given, str) or given not in types:
-        message = "is missing" if given is None else f"no {what} of type {quoted(given)}"
-        e.fault("type", message, nearest(shown(given), types, "types"), "EG-CHOICE")
+    given = e.reader.type_of(e.path, e.values, types, what)
+    if not given:
         return None
     found = types[given]
     if _misunderstood(e, found):

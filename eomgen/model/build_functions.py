@@ -24,7 +24,7 @@ from ..expr.records import dataclass
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import FUNCTION, function_fields
-from .names import fault_of_name, nearest
+from .names import fault_of_name
 from .quantities import QUANTITIES
 from .values import Reader, is_number
 
@@ -42,15 +42,7 @@ class Signature(NamedTuple):
 
 
 def find_signature(text: str, name: str) -> Signature | None:
-    """Where and how a C function is defined; None if that cannot be seen, as behind a macro.
-
-    Parameters
-    ----------
-    text : str
-        C source.
-    name : str
-        Of the function.
-    """
+    """Where and how C source defines a function; None if that cannot be seen, as behind a macro."""
     bare = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
     pattern = rf"(?P<given>[A-Za-z_]\w*(?:\s+[A-Za-z_]\w*|\s*\*)*)[\s*]*\b{name}\s*\((?P<taken>[^()]*)\)\s*[{{;]"
     for found in re.finditer(pattern, bare):
@@ -258,14 +250,10 @@ def _arity_meant(entry: DescribedEntry) -> int:
 
 
 def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
-    faults, path = reader.faults, entry.path
-    given = entry.values.get("type")
-    if not isinstance(given, str) or given not in FUNCTION:
-        message = "is missing" if given is None else f"no function of type {given!r}"
-        faults.add(f"{path}.type", message, nearest(str(given), FUNCTION, "types"), "EG-CHOICE")
-        return None
-    check_keys(path, entry.values, function_fields(given), faults)
-    if faults.under(path):
+    given = reader.type_of(entry.path, entry.values, FUNCTION, "function")
+    if given:
+        check_keys(entry.path, entry.values, function_fields(given), reader.faults)
+    if reader.faults.under(entry.path):
         return None
     return (
         build_native(reader, entry) if given == "native" else read_table(reader, entry.name, entry.path, entry.values)

@@ -65,22 +65,7 @@ from .visit import undotted
 
 
 def build(description: Description) -> Mechanism:
-    """Check a description and lower it to one graph.
-
-    Parameters
-    ----------
-    description : Description
-        What the user said.
-
-    Returns
-    -------
-    Mechanism
-
-    Raises
-    ------
-    ModelError
-        The description has faults; all of them are listed.
-    """
+    """Check a description and lower it to one graph; raises ModelError with all of its faults."""
     description = with_locks(undotted(description))
     faults = Faults(description)
     if description.incomplete:

@@ -327,13 +327,7 @@ def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[li
 def build_clocks(
     reader: Reader, groups: Sequence[Sequence[DescribedEntry]], new: Mapping[str, Expr]
 ) -> tuple[tuple[Clock, ...], tuple[Event, ...]]:
-    """The clocks and their events.
-
-    Parameters
-    ----------
-    new : mapping of str to Expr
-        Sampled state -> its new value.
-    """
+    """The clocks and their events; ``new`` has the new value of each sampled state."""
     graph, time = reader.graph, reader.graph.symbol("t")
     clocks, events = [], []
     for entries in groups:
@@ -379,10 +373,7 @@ def declare_states(
 ) -> tuple[list[DescribedEntry], list[list[DescribedEntry]]]:
     """Take in the names of all states before any expression is read: the usable entries, the sampled ones by clock.
 
-    Parameters
-    ----------
-    bare : bool
-        Whether a Lagrangian or equations came instead of bodies and joints, which have no states beside them.
+    Bare equations, without bodies and joints, have no states beside them.
     """
     if entries and bare:
         message = "a bare Lagrangian, or equations, have no states beside them"

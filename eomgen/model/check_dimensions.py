@@ -55,14 +55,7 @@ def named(dimension: Dimension) -> str:
 
 
 def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
-    """Note a fault for every expression whose dimension is not what its field asks for, or whose terms differ.
-
-    Parameters
-    ----------
-    reader : Reader
-        After all expressions and units were read.
-    joints : tuple of JointSpec
-    """
+    """Note a fault for every expression whose dimension is not what its field asks for, or whose terms differ."""
     units = reader.units
     if not units:
         return

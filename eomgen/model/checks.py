@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
+from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.frames import GROUND
 from ..elements.kinds import Fields
 from .description import DescribedEntry, Faults
@@ -12,11 +13,15 @@ from .mechanism import Body, JointSpec
 from .names import fault_of_name, nearest
 
 
-def check_keys(path: str, values: Mapping[str, Any], fields: Fields, faults: Faults) -> None:
-    """Note keys that a table does not know, and required ones that are missing."""
+def check_keys(
+    path: str, values: Mapping[str, Any], fields: Fields, faults: Faults, of: str = "", others: Container[str] = ()
+) -> None:
+    """Note keys that a table does not know, those of ``others`` as what ``of`` has not, and required ones not given."""
     for key in values:
         if key not in fields:
-            faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields), "EG-NAME-UNKNOWN")
+            message = f"{of} has no {key!r}" if key in others else "unknown key"
+            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING and key in others else unknown_key(key, fields)
+            faults.add(f"{path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
             faults.missing(f"{path}.{key}", f"give {field.says}")

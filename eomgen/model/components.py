@@ -81,19 +81,9 @@ class Attached(NamedTuple):
 class Renaming(Visitor):
     """A component's names as an instance has them, its attachments the markers given, its parameters put in.
 
-    Parameters
-    ----------
-    own : DeclaredNames
-    prefix : str
-        Put before every name of the component.
-    values : mapping of str to str
-        Parameters and inputs in whose place an expression of the model stands.
-    attached : mapping of str to Attached
-        By attachment, ground among them.
-    closed : bool
-        Whether the component knows no names but its own.
-    fault : callable, optional
-        Told path, message and remedy of names that it does not declare.
+    ``prefix`` is put before every name of the component; ``values`` are expressions of the model in the place of
+    parameters and inputs, ``attached`` markers by attachment, ground among them.  A ``closed`` component knows no names
+    but its own; ``fault`` notes those that it does not declare.
     """
 
     def __init__(
@@ -201,15 +191,7 @@ class InstanceValue(NamedTuple):
 def read_instance_value(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
     """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
 
-    Parameters
-    ----------
-    entry : DescribedEntry
-        The parameter or input of the component.
-    given
-        As the instance has it.
-    path : str
-        Where that is.
-    fault : callable
+    ``entry`` is the parameter or input of the component, ``given`` what the instance has for it, at ``path``.
     """
     if not isinstance(given, Mapping):
         return InstanceValue(given)
@@ -245,27 +227,13 @@ def read_instance_value(entry: DescribedEntry, given: Any, path: str, fault: Fau
 
 @dataclass
 class Component:
-    """A part of a mechanism that models take in, as often as they like.
+    """A part of a mechanism that models take in, as often as they like."""
 
-    Attributes
-    ----------
-    name : str
-        How messages call it.
-    place : str
-        Dotted path of its entries in messages.
-    description : Description
-        Its entries, values numbers and texts; instances in it are expanded.
-    attachments : tuple of str
-        Names that stand for markers of the model.
-    closed : bool
-        Whether it knows no names but its own: it has a file of its own, or is a Model.
-    """
-
-    name: str
-    place: str
-    description: Description
-    attachments: tuple[str, ...] = ()
-    closed: bool = True
+    name: str  #: in messages
+    place: str  #: dotted path of its entries in messages
+    description: Description  #: its entries, values numbers and texts; instances in it are expanded
+    attachments: tuple[str, ...] = ()  #: names that stand for markers of the model
+    closed: bool = True  #: whether it knows no names but its own: it has a file of its own, or is a Model
 
     def __post_init__(self) -> None:
         self.names = DeclaredNames(self.description)
@@ -618,15 +586,8 @@ Open = Callable[[str], Description | None]
 class Components:
     """The components of one model file, each read when it is first added.
 
-    Parameters
-    ----------
-    given : object
-        The section ``components``.
-    lines : mapping
-        Dotted path -> (file, line) in the model file.
-    fill, open_file : callable
-        Read what stands in the model file, and files that it names.
-    faults : Faults
+    ``lines`` are those of the model file by dotted path; ``fill`` and ``open_file`` read what stands in it, and files
+    that it names.
     """
 
     def __init__(

@@ -57,43 +57,23 @@ class Origin(NamedTuple):
 
 @dataclass
 class Description:
-    """Everything said about a model so far, and where.
+    """Everything said about a model so far, and where."""
 
-    Attributes
-    ----------
-    values : dict
-        What stands outside the sections: name, doc, gravity, independent, initial,
-        guess, simulation, lagrangian.
-    sections : dict of list of DescribedEntry
-        One list for each of :data:`SECTIONS`, in the order of the description; names may still repeat.
-    motions : dict
-        Label of an unnamed marker whose motion was asked for -> its reference (a mapping of body, at, rpy).
-    lines : dict
-        Dotted path -> (file, line), filled when the model comes from a file.
-    problems : list of Problem
-        Faults found while the description was made.
-    notes : list of str
-        What an import left out or changed.
-    renamed : dict
-        Section -> name in an imported file, or in SymPy -> name in the model, where they differ.
-    instances : dict of str to str
-        Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
-    origins : dict of str to Origin
-        Path of an entry that an instance brought, or of a marker in it -> where it comes from.
-    incomplete : bool
-        Whether components or instances have faults, so that names are missing.
-    """
-
+    #: What stands outside the sections: name, doc, gravity, independent, initial, guess, simulation, lagrangian.
     values: Values = field(default_factory=dict)
+    #: One list for each of :data:`SECTIONS`, in the order of the description; names may still repeat.
     sections: dict[str, list[DescribedEntry]] = field(default_factory=lambda: {name: [] for name in SECTIONS})
+    #: Label of an unnamed marker whose motion is used -> its reference (a mapping of body, at, rpy).
     motions: dict[str, Values] = field(default_factory=dict)
-    lines: dict[str, tuple[str, int]] = field(default_factory=dict)
-    problems: list[Problem] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    lines: dict[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line)
+    problems: list[Problem] = field(default_factory=list)  #: faults of what the description was made from
+    notes: list[str] = field(default_factory=list)  #: what an import left out or changed
+    #: Section -> name in an imported file, or in SymPy -> name in the model, where they differ.
     renamed: dict[str, dict[str, str]] = field(default_factory=dict)
-    instances: dict[str, str] = field(default_factory=dict)
+    instances: dict[str, str] = field(default_factory=dict)  #: instance of a component -> prefix: ``leg1`` -> ``leg1_``
+    #: Path of an entry that an instance brought, or of a marker in it -> where it comes from.
     origins: dict[str, Origin] = field(default_factory=dict)
-    incomplete: bool = False
+    incomplete: bool = False  #: whether components or instances have faults, so that names are missing
 
     def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
         """Append an entry to a section."""

@@ -269,12 +269,7 @@ def differentiate(graph: Graph, bare: Lagrangian, clock: Mapping[Expr, Expr]) ->
     """Lagrange's equations d/dt (dL/dv) - dL/dq = Q - dD/dv as M v' = f (Shabana, Computational Dynamics, sec. 4.4).
 
     T holds the terms of L of second degree in the velocities, and V = -L(v = 0): T + V is then the energy
-    v . dL/dv - L, in which terms linear in the velocities cancel.
-
-    Parameters
-    ----------
-    clock : mapping of Expr to Expr
-        The rates of all that is prescribed.
+    v . dL/dv - L, in which terms linear in the velocities cancel.  ``clock`` has the rates of all that is prescribed.
     """
     L, velocities = bare.expression, tuple(f"{name}_dot" for name in bare.coordinates)
     q, v = ([graph.symbol(name) for name in names] for names in (bare.coordinates, velocities))

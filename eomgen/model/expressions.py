@@ -78,27 +78,10 @@ def allowed() -> str:
 
 
 def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
-    """The graph expression of a text.
+    """The graph expression of a text as in a model file, e.g. ``"m_r*l**2/12"``.
 
-    Parameters
-    ----------
-    text : str
-        An expression as in a model file, e.g. ``"m_r*l**2/12"``.
-    graph : Graph
-        Where its nodes are made.
-    resolve : callable
-        Gives the expression of a name.
-    locate : callable, optional
-        Gives the expression of a marker's motion; without it such calls are refused.
-
-    Returns
-    -------
-    Expr
-
-    Raises
-    ------
-    ExpressionError
-        The text is not an allowed expression; the error says what, in which column, and what is allowed.
+    ``resolve`` gives the expression of a name, ``locate`` that of a marker's motion; without it such calls are refused.
+    An ExpressionError says what is not allowed, in which column, and what is.
     """
     if len(text) > LENGTH:
         raise ExpressionError(
@@ -344,12 +327,7 @@ def _label(node: ast.expr) -> str:
 
 
 def constant(text: str, what: str) -> float:
-    """The value of an expression of numbers; names have none.
-
-    Raises
-    ------
-    UsageError
-    """
+    """The value of an expression of numbers; UsageError for names, which have none."""
     allowed = "write numbers, pi and functions of them"
 
     def resolve(name: str) -> Expr:

@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..base.value_rules import NOT_NEGATIVE
 from ..contact import CONTACTS
 from ..elements import kinds as k
 from ..elements.constraints import CONSTRAINTS
@@ -222,6 +223,8 @@ JOINT_DATA: Fields = {
     "armature": k.Scalar(
         "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
         dimension=ENERGY.times(TIME, 2).times(REACH, -2),
+        allowed=NOT_NEGATIVE,
+        remedy="an inertia must be 0 or positive",
     ),
 }
 LAGRANGIAN: Fields = {
@@ -355,10 +358,7 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
 def acts_on_length(section: str, values: Mapping[str, Any], field: k.Field, is_length: Callable[[str], bool]) -> bool:
     """Whether an entry acts on a length rather than an angle, where the dimension of a field depends on it.
 
-    Parameters
-    ----------
-    is_length : callable
-        Name of a coordinate, or of a joint of one, -> whether it is a length.
+    ``is_length`` says it of a coordinate, or of a joint of one, by name.
     """
     for key in (field.along, "coordinate"):
         if values.get(key) is not None and section in ("forces", "constraints"):

@@ -14,48 +14,26 @@ from .visit import rewritten
 
 
 class Names(NamedTuple):
-    """What a text may name.
+    """What a text may name."""
 
-    Attributes
-    ----------
-    x, p : sequence of str
-        States and parameters, in order.
-    moving : mapping of str to str
-        Coordinate -> the state that is its rate.
-    plain : callable
-        ``leg1.hip`` of an instance of a component -> ``leg1_hip``.
-    """
-
-    x: Sequence[str]
-    p: Sequence[str]
-    moving: Mapping[str, str]
-    plain: Callable[[str], str]
+    x: Sequence[str]  #: states, in order
+    p: Sequence[str]  #: parameters, in order
+    moving: Mapping[str, str]  #: coordinate -> the state that is its rate
+    plain: Callable[[str], str]  #: ``leg1.hip`` of an instance of a component -> ``leg1_hip``
 
 
 class RecordedText(NamedTuple):
-    """An expression of time, states and parameters as plain data.
-
-    Attributes
-    ----------
-    slopes : callable
-        Places of the derivatives that do not vanish, among those by t, x and p, and their tape.
-    rate : callable
-        (name, rate) -> the derivative along the motion, which must not need accelerations.
-    """
+    """An expression of time, states and parameters as plain data."""
 
     tape: Tape
+    #: Places of the derivatives that do not vanish, among those by t, x and p, and their tape.
     slopes: Callable[[], tuple[list[int], Tape]]
+    #: (name, rate) -> the derivative along the motion, which must not need accelerations.
     rate: Callable[[str, str], RecordedText]
 
 
 def record_text(text: str, names: Names, unknown: Callable[[str], Exception]) -> RecordedText:
-    """An expression as in a model file: ``"theta - pi/2"``.
-
-    Raises
-    ------
-    ExpressionError
-        It is no expression.
-    """
+    """An expression as in a model file, ``"theta - pi/2"``; ExpressionError if it is none."""
     graph, known = Graph(), ("t", *names.x, *names.p)
 
     def resolve(name: str) -> Expr:

@@ -73,11 +73,6 @@ class Body:
     plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
     about: Vec3 | None = None  #: the point that the inertia was given about, if not the centre of mass
 
-    @property
-    def checked(self) -> bool:
-        """Whether mass and inertia must be those of a possible body."""
-        return self.check == "error"
-
 
 @dataclass(frozen=True)
 class JointSpec:

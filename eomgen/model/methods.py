@@ -79,13 +79,7 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
 
 
 def signature_of(found: ElementType) -> Signature:
-    """The signature of the method.
-
-    Raises
-    ------
-    UsageError
-        Two keys would have arguments of one name.
-    """
+    """The signature of the method; UsageError if two keys would have arguments of one name."""
     every = arguments_of(found)
     names = ["self", "name", *(one.name.lstrip("*") for one in every)]
     twice = next((name for name in names if names.count(name) > 1), None)

@@ -51,20 +51,10 @@ IDENTIFIER_RULE = "a name must start with a letter and contain only letters a to
 
 
 def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
-    """What is wrong with a name.
+    """Message and remedy of what is wrong with a name; None if it can be used.
 
-    Parameters
-    ----------
-    name : object
-        The name as given; anything but text is a fault.
-    symbol : bool
-        Whether the name will stand in expressions by itself (parameter, input, coordinate, output), so that names
-        with a meaning of their own are refused too.
-
-    Returns
-    -------
-    (message, remedy) or None
-        None if the name can be used.
+    A ``symbol`` will stand in expressions by itself (parameter, input, coordinate, output), so that names with a
+    meaning of their own are refused too.
     """
     if not isinstance(name, str):
         return f"{quoted(name)} is not a name", IDENTIFIER_RULE

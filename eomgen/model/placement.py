@@ -36,19 +36,7 @@ def axis_word(direction: Numbers) -> str:
 
 
 def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
-    """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF.
-
-    Parameters
-    ----------
-    graph : Graph
-    rpy : three Expr
-        Roll, pitch, yaw (rad).
-
-    Returns
-    -------
-    Mat3
-        Takes marker axes to body axes.
-    """
+    """R = Rz(yaw) Ry(pitch) Rx(roll), marker axes to body axes: turned about fixed axes, roll first, as in URDF."""
     return vec.matrix(graph, matrix_from_roll_pitch_yaw(rpy))
 
 

@@ -202,13 +202,7 @@ class Named(NamedTuple):
 
     @classmethod
     def read(cls, call: Call) -> Named:
-        """The quantity of a call.
-
-        Raises
-        ------
-        ExpressionError
-            It takes other arguments.
-        """
+        """The quantity of a call; ExpressionError if it takes other arguments."""
         name, labels, given, part = call
         if name in QUANTITIES:
             return cls._motion(name, labels, given, part)

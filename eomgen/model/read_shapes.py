@@ -27,11 +27,10 @@ from ..contact.states import (
 )
 from ..elements import kinds
 from ..expr.core import Expr
-from ..expr.shown import quoted, shown
+from ..expr.shown import shown
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items
-from .names import nearest
 from .values import Reader
 
 SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
@@ -103,10 +102,8 @@ def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
     if not isinstance(given, Mapping):
         reader.wrong(path, given, ContactShapes)
         return []
-    kind = given.get("shape")
-    if not isinstance(kind, str) or kind not in SHAPE_FIELDS:
-        message = "is missing" if kind is None else f"no shape {quoted(kind)}"
-        reader.fault(f"{path}.shape", message, nearest(shown(kind), SHAPE_FIELDS, "shapes"), "EG-CHOICE")
+    kind = reader.type_of(path, given, SHAPE_FIELDS, "shape", "shape")
+    if not kind:
         return []
     check_keys(path, given, SHAPE_FIELDS[kind], reader.faults)
     if reader.faults.under(path):

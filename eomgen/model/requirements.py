@@ -28,15 +28,7 @@ class Requirement(NamedTuple):
 
 
 class Requirements:
-    """The requirements of one description.
-
-    Attributes
-    ----------
-    all : list of Requirement
-        Those that depend on parameters.
-    numbers : dict of str to float
-        Declared values of parameters.
-    """
+    """The requirements of one description: ``all`` that depend on parameters, and the declared ``numbers`` of these."""
 
     def __init__(self, faults: Any) -> None:
         self.faults, self.all = faults, list[Requirement]()

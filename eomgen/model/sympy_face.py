@@ -34,13 +34,7 @@ def require_name(what: str, name: Any) -> str:
 
 
 def named(what: str, given: Any) -> dict[Any, Any]:
-    """Values by name, of a mapping by symbol or name; none of None.
-
-    Raises
-    ------
-    UsageError
-        It is no mapping.
-    """
+    """Values by name, of a mapping by symbol or name; none of None, UsageError if it is no mapping."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -59,13 +53,7 @@ def one_or_several(given: Any) -> list[Any]:
 
 
 def names_of(path: str, given: Any, what: str) -> list[str]:
-    """Names of what is given as symbols, functions of time or texts, one or several; none of None.
-
-    Raises
-    ------
-    ModelError
-        Something else is among them.
-    """
+    """Names of what is given as symbols, functions of time or texts, one or several; ModelError for anything else."""
     listed = one_or_several(given)
     remedy = "give symbols q or functions q(t) of the time t"
     wrong = [
@@ -167,24 +155,10 @@ def _is_time(arguments: Any) -> bool:
 
 
 def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
-    """The graph expression of a SymPy expression.
+    """The graph expression of a SymPy expression; ExpressionError if a part of it has no meaning.
 
-    Parameters
-    ----------
-    graph : Graph
-    expression : sympy.Expr
-        In plain symbols, in functions of time ``q(t)`` with their derivatives, or both.
-    resolve : callable
-        Gives the expression of a name.
-
-    Returns
-    -------
-    Expr
-
-    Raises
-    ------
-    ExpressionError
-        The expression has a part without a meaning.
+    It is in plain symbols, in functions of time ``q(t)`` with their derivatives, or both; ``resolve`` gives the
+    expression of a name.
     """
     from ..expr.sympy_bridge import LoweringError, lower
 
@@ -238,12 +212,8 @@ _WORDS = {sign: word for word, sign in GREEK.items()}
 class SympyNames:
     """What SymPy's names are called in a model; only those that it cannot use are changed.
 
-    Parameters
-    ----------
-    given : nested lists and mappings
-        Everything in which names stand.
-    coordinates : sequence
-        Where they are functions, their argument is the time, whatever it is called.
+    ``given`` is everything in which names stand; where coordinates are functions, their argument is the time, whatever
+    it is called.
     """
 
     def __init__(self, given: Any, coordinates: Any) -> None:
@@ -322,18 +292,9 @@ def _plain(name: str) -> str:
 
 
 def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
-    """A SymPy expression as a text that the expressions of a model file know.
+    """A SymPy expression as a text that the expressions of a model file know, with functions that the model declares.
 
-    Parameters
-    ----------
-    expression : sympy.Expr
-    functions : collection of str, optional
-        Names of the functions that the model declares.
-
-    Raises
-    ------
-    UsageError
-        The expression has parts that such a text cannot say.
+    Raises UsageError where it has parts that such a text cannot say.
     """
     import sympy
     from sympy.core.function import AppliedUndef

@@ -74,10 +74,7 @@ class UnitError(ValueError):
 def read_unit(text: str) -> Unit:
     """The unit of a text such as ``kg*m^2``, ``N m/rad``, ``mm``.
 
-    Raises
-    ------
-    UnitError
-        The text is not made of units, or of units with an offset (degC).
+    Raises UnitError if it is not made of units, or of units with an offset (degC).
     """
     if text and not text.strip():
         raise UnitError(f"{quoted(text)} is not a unit", "leave the unit out if there is none")

@@ -51,25 +51,15 @@ def is_number(value: object) -> bool:
 
 
 class Reader:
-    """Reads values of one description into one graph.
-
-    Attributes
-    ----------
-    bodies : dict of str to int
-        Index of each body; ground has :data:`~eomgen.elements.frames.GROUND`.
-    markers : dict of str to Marker
-        Named markers (``rod.tip``) and the bodies' own frames (``rod``).
-    quantities : dict of str to Quantity
-        Motions of markers that expressions use.
-    """
+    """Reads values of one description into one graph."""
 
     def __init__(self, graph: Graph, names: Namespace, faults: Faults, description: Description) -> None:
         self.graph, self.names, self.faults, self.description = graph, names, faults, description
         self.fault = faults.add  # path, message, remedy, code
         self.identity = vec.identity(graph)
-        self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
-        self.markers: dict[str, Marker] = {}
-        self.quantities: dict[str, Quantity] = {}
+        self.bodies: dict[str, int] = {GROUND_NAME: GROUND}  # by name, the index
+        self.markers: dict[str, Marker] = {}  # named ones (``rod.tip``) and the bodies' own frames (``rod``)
+        self.quantities: dict[str, Quantity] = {}  # motions of markers that expressions use
         self.asked: dict[Named, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
@@ -125,6 +115,18 @@ class Reader:
     def unknown(self, path: str, what: str, name: object, known: Iterable[str], listed: str) -> None:
         """Note a name that is none of the known ones, which are listed as such."""
         self.fault(path, f"no {what} {quoted(name)}", nearest(shown(name), known, listed), "EG-NAME-UNKNOWN")
+
+    def type_of(self, path: str, values: Mapping[str, Any], types: Iterable[str], what: str, key: str = "type") -> str:
+        """The type that an entry names, one of a table; empty where it is none, which is noted."""
+        given = values.get(key)
+        if isinstance(given, str) and given in types:
+            return given
+        if given is None:
+            self.faults.missing(f"{path}.{key}", f"give one of {', '.join(types)}")
+        else:
+            remedy = nearest(shown(given), types, "types")
+            self.fault(f"{path}.{key}", f"no {what} of type {quoted(given)}", remedy, "EG-CHOICE")
+        return ""
 
     def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
         """Note keys that a table does not know, and required ones that are missing."""
@@ -389,11 +391,8 @@ class Reader:
 
     def axis(self, path: str, value: Any) -> Columns:
         """Columns of the turn that brings an axis to z."""
-        if isinstance(value, str):
-            if value in TURNS:
-                return TURNS[value]
-            self.fault(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
-            return TURNS["z"]
+        if isinstance(value, str) and value in TURNS:
+            return TURNS[value]
         parts = items(value)
         if parts is None or len(parts) != 3:
             self.fault(path, f"{quoted(value)} is not an axis", f"allowed: {kinds.Axis.says}", "EG-TYPE")
@@ -473,13 +472,7 @@ MULTIPLIERS = ("lambda", "multiplier")
 
 
 def numbered(word: str, count: int) -> list[str]:
-    """``lambda_1``, ``lambda_2``, ...
-
-    Parameters
-    ----------
-    word : str
-    count : int
-    """
+    """``lambda_1``, ``lambda_2``, ..."""
     return [f"{word}_{k + 1}" for k in range(count)]
 
 

@@ -157,13 +157,7 @@ def _values(values: Mapping[str, Any], fields: Fields, visitor: Visitor) -> dict
 
 
 class Undotted(Visitor):
-    """Names with a dot after an instance as the model has them.
-
-    Parameters
-    ----------
-    instances : mapping of str to str
-        Name of an instance -> its prefix.
-    """
+    """Names with a dot after an instance as the model has them; ``instances`` has the prefix of each."""
 
     def __init__(self, instances: Mapping[str, str]) -> None:
         self.instances = instances

@@ -59,22 +59,12 @@ def scalar(text: str) -> Any:
 
 
 class Document:
-    """A model file as plain values.
-
-    Attributes
-    ----------
-    value : object
-        Mappings, lists and scalars.
-    lines : dict of str to (str, int)
-        File and line of each dotted path; the empty path is the file itself.
-    problems : list of Problem
-        Anchors, tags, duplicate keys and other things a model file does not have.
-    """
+    """A model file as plain values: mappings, lists and scalars."""
 
     def __init__(self, text: str, file: str) -> None:
         self.file = file
-        self.lines: dict[str, tuple[str, int]] = {"": (file, 1)}
-        self.problems: list[Problem] = []
+        self.lines: dict[str, tuple[str, int]] = {"": (file, 1)}  #: by dotted path; the empty one is the file itself
+        self.problems: list[Problem] = []  #: anchors, tags, duplicate keys and what else a model file does not have
         self.count = 0
         self.value = self._read(text)
 
@@ -195,30 +185,11 @@ def _line_of(error: BaseException, text: str) -> int:
 
 
 def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = False) -> Description:
-    """The raw data of a model file.
+    """The raw data of a model file, with the entries of all components that it adds.
 
     Names are looked up when the model is checked, as in Python; faults of the file itself that leave nothing to check
-    (it is not YAML, too large, not a mapping) are raised at once, others are kept and told with all the rest.
-
-    Parameters
-    ----------
-    path : str or path
-    allow_native : bool, optional
-        As for :func:`eomgen.load`.
-
-    Returns
-    -------
-    Description
-        With the entries of all components that it adds.
-
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    UsageError
-        It is not a plain file.
-    ModelError
-        The file is not YAML or not a mapping.
+    (it is not YAML, too large, not a mapping) are raised at once as ModelError, others are reported with all the rest.
+    FileNotFoundError or UsageError is raised where there is no such file, or no plain one.
     """
     name = as_name("path", path)
     return _describe(_text_of(name), name, _Origin(allow_native, os.path.dirname(name)))
@@ -381,16 +352,8 @@ def _add_section(
 def with_named_markers(description: Description) -> Description:
     """The same description in which markers that expressions speak of have names.
 
-    Parameters
-    ----------
-    description : Description
-        Stays as it is.
-
-    Returns
-    -------
-    Description
-        With a named marker, ``marker_1`` and so on, for each unnamed one in use; ``x(rod.at(l, 0, 0))`` in an
-        expression is ``x(rod.marker_1)``.
+    Each unnamed one in use gets one, ``marker_1`` and so on; ``x(rod.at(l, 0, 0))`` in an expression is
+    ``x(rod.marker_1)``.
     """
     if not description.motions:
         return description
@@ -443,43 +406,30 @@ _PLAIN = re.compile(r"[A-Za-z0-9_.(*+/-][A-Za-z0-9_.()*+/<>= -]*\Z")
 
 
 def yaml_text(description: Description) -> str:
-    """The text of a model file.
+    """The text of a model file: YAML 1.2, sections in the order of the table of fields, one entry a line.
 
-    Parameters
-    ----------
-    description : Description
-        SymPy expressions in it are written as text; unnamed markers whose motion they use get names.
-
-    Returns
-    -------
-    str
-        YAML 1.2, sections in the order of the table of fields, one entry a line.
-
-    Raises
-    ------
-    UsageError
-        An expression or value has no form in a model file.
+    SymPy expressions are written as text, and unnamed markers whose motion they use get names.  Raises UsageError for
+    what has no form in a model file.
     """
-    description = with_named_markers(undotted(description))
+    if isinstance(given := description.values.get("equations"), Mapping):
+        values = {**description.values, "equations": with_intermediates(given)}
+        description = replace(description, values=values)
     lines = [f"# {comment_text(note)}" for note in description.notes]
-    functions = frozenset(entry.name for entry in description.sections["functions"])
+    description = plain_description(description)
     for key in MODEL:
         if key in SECTIONS:
             lines += _section(key, description)
         elif key in description.values:
             value = description.values[key]
-            if key == "equations" and isinstance(value, Mapping):
-                value = with_intermediates(value)
             if key in ("lagrangian", "equations") and value is not None:
-                lines += [f"{key}:", *(f"  {_key(k)}: {_value(v, functions)}" for k, v in value.items())]
+                lines += [f"{key}:", *(f"  {_key(k)}: {_value(v)}" for k, v in value.items())]
             elif not MODEL[key].is_default(value):
-                lines.append(f"{key}: {_value(value, functions)}")
+                lines.append(f"{key}: {_value(value)}")
     return "\n".join(lines) + "\n"
 
 
 def _section(section: str, description: Description) -> list[str]:
     entries = description.sections[section]
-    functions = frozenset(entry.name for entry in description.sections["functions"])
     if not entries:
         return []
     short = SHORT.get(section)
@@ -488,11 +438,11 @@ def _section(section: str, description: Description) -> list[str]:
         fields = fields_of(section, entry.values)
         values = {key: x for key, x in entry.values.items() if not fields.get(key, _UNKNOWN).is_default(x)}
         only = short is not None and list(values) == [short]
-        lines.append(f"  {_key(entry.name)}: {_value(values[short] if only and short else values, functions)}")
+        lines.append(f"  {_key(entry.name)}: {_value(values[short] if only and short else values)}")
     return lines
 
 
-def _value(value: Any, functions: Names) -> str:
+def _value(value: Any) -> str:
     if value is None:
         return "null"
     if isinstance(value, os.PathLike):
@@ -502,34 +452,22 @@ def _value(value: Any, functions: Names) -> str:
     if getattr(value, "shape", None) == () and hasattr(value, "tolist"):
         value = value.tolist()
     if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
-        listed = items(value)
-        if listed is not None:
-            return _value(listed, functions)
-        if is_sympy(value):
-            return _sympy(value, functions)
         raise cannot(f"{shortened(value)} cannot be written to a model file")
-    if is_sympy(value):
-        return _sympy(value, functions)
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, numbers.Real):
         return str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(k)}: {_value(v, functions)}" for k, v in value.items()) + "}"
-    if value and all(isinstance(x, tuple) and len(x) == 2 and isinstance(x[1], dict) for x in value):
-        return _value(dict(value), functions)  # named markers
-    return "[" + ", ".join(_value(x, functions) for x in value) + "]"
+        return "{" + ", ".join(f"{_key(k)}: {_value(v)}" for k, v in value.items()) + "}"
+    if value and all(isinstance(x, list) and len(x) == 2 and isinstance(x[1], dict) for x in value):
+        return _value(dict(value))  # named markers
+    return "[" + ", ".join(_value(x) for x in value) + "]"
 
 
 def _key(key: Any) -> str:
     """A name as a key, whatever it holds: names are checked when the model is."""
     name = name_of(key)
-    return _text(name) if isinstance(name, str) else _value(name, frozenset())
-
-
-def _sympy(value: Any, functions: Names) -> str:
-    text = sympy_text(value, functions)
-    return text if isinstance(scalar(text), int | float) else _text(text)
+    return _text(name) if isinstance(name, str) else _value(name)
 
 
 def _text(text: str) -> str:
@@ -555,7 +493,8 @@ def plain_description(given: Description) -> Description:
 def plain(value: Any, functions: Names = frozenset()) -> Any:
     """A value as numbers, texts, lists and mappings; functions of Python stay."""
     if is_sympy(value):
-        return sympy_text(value, functions)
+        text = sympy_text(value, functions)
+        return number if isinstance(number := scalar(text), int | float) else text
     if isinstance(value, Mapping):
         return {name_of(key): plain(part, functions) for key, part in value.items()}
     listed = None if isinstance(value, str) else items(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -160,6 +161,14 @@ def test_its_keys_are_judged_by_their_kinds(keys: dict[str, Any], code: str, pat
     assert (path, code) in [(problem.path, problem.code) for problem in error.value.problems]
 
 
+def test_type_checkers_know_all_of_them() -> None:
+    stub = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "stubs.py"))["stub"]()
+    ends = "self, name: str, a: Any, b: Any, stiffness: Value"
+    assert f"def hardening_spring({ends}, hardening: Value = 0, share: float = 100" in " ".join(stub.split())
+    assert "def slanted(self, name: str, predecessor: Any, successor: Any, slope: Value" in stub
+    assert "def level(self, name: str, marker: Any, height: Value = 0)" in stub
+
+
 def test_a_joint_moves_as_it_says_and_reads_its_key() -> None:
     m = eg.Model("slope", gravity=(0, 0, -10))
     block = m.body("block", mass=1.0)
@@ -170,6 +179,7 @@ def test_a_joint_moves_as_it_says_and_reads_its_key() -> None:
     np.testing.assert_allclose(mod.rhs(0.0, [0.0, 0.0])[1], -5.0, rtol=1e-14)  # g / (1 + slope^2)
     assert joint.coordinate_names == ("s",)
     assert "S slides on a slope of P" in m.derive().explain().markdown
+    assert m.draw() is not None
 
 
 def test_a_constraint_holds_what_it_says(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from ..element_type import ElementType, Entry, table
 from ..frames import Frame, Marker
 from ..kinds import Choice, CoordinateName, Flag, JointReference, Latex, MarkerReference, Scalar
 from ..looks import Contour, LiftCurve, Seen, Wheel
-from .constraint import Condition, Constraint, ConstraintView
+from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 
 # -- laws of lift ------------------------------------------------------------------------------------------------------
 
@@ -289,8 +289,8 @@ def _cam(e: Entry) -> CamLift | None:
 
 def _cam_contact(e: Entry) -> Constraint | None:
     shape, axis, follower = e["shape"], e["cam"], e["follower"]
-    if axis is not None and follower is not None and axis.body == follower.body:
-        e.fault("follower", f"{axis.label} and {follower.label} are on the same body", "name another", "EG-REFERENCE")
+    if axis is not None and follower is not None:
+        on_two_bodies(e, "follower", axis, follower)
     if e.at_fault("shape"):
         return None
     if shape != "roller":

@@ -17,7 +17,7 @@ from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
 from ..element_type import ElementType, Entry, table
 from ..kinds import LAW, Choice, Fields, Scalar
-from .force import Force, Load, View, beyond_zero, map_law, where
+from .force import Force, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, Path, PathForce, read_coordinate
 from .springs import Damper
 
@@ -490,7 +490,7 @@ def is_reaction(symbol: str) -> bool:
 
 
 @dataclass(frozen=True)
-class ReactionFriction(Force):
+class ReactionFriction(PathForce):
     """Friction by the force that the joint carries: -[(c(v) + m(v) N) tanh(v / smoothing) + viscous v].
 
     m is the coefficient of ``carried``.  N is the size of the reaction across the joint's axis; for an angle it is
@@ -503,7 +503,6 @@ class ReactionFriction(Force):
     )
     formula = r"F = -\left(c(v) + \mu(v) N\right) \mathrm{tanh}(v/v_s) - b v"
     by_reaction = True
-    path: Path
     law: Friction
     joint: str
     carried: Friction
@@ -520,9 +519,6 @@ class ReactionFriction(Force):
             normal = normal + self.thrust_radius * graph.apply("abs", z)
         direction = graph.apply("tanh", rate / self.law.smoothing)
         return -(self.law.along(rate) + self.carried.level(rate * rate) * normal * direction)
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.along(*self.path.measure(view)))
 
 
 #: Keys of friction by the joint's reaction.

@@ -27,16 +27,11 @@ RESTITUTIONS = ("hunt_crossley", "lankarani", "flores")
 
 
 def dissipation_of(restitution: Expr, velocity: Expr, formula: str) -> Expr:
-    """The factor lambda of :class:`HuntCrossley` for a coefficient of restitution at an impact velocity.
+    """The factor lambda of :class:`HuntCrossley` for a coefficient of restitution e at an impact velocity v > 0.
 
-    Parameters
-    ----------
-    restitution, velocity : Expr
-        e (1) and v (m/s, or rad/s), v > 0.
-    formula : {"hunt_crossley", "lankarani", "flores"}
-        3 (1 - e) / (2 v), Hunt and Crossley (1975), J. Appl. Mech. 42, 440-445, for e close to 1; 3 (1 - e^2) / (4 v),
-        Lankarani and Nikravesh (1990), J. Mech. Des. 112, 369-376; 8 (1 - e) / (5 e v), Flores, Machado, Silva and
-        Martins (2011), Multibody Syst. Dyn. 25, 357-375, for all e > 0.
+    By ``formula`` 3 (1 - e) / (2 v), Hunt and Crossley (1975), J. Appl. Mech. 42, 440-445, for e close to 1;
+    ``lankarani`` 3 (1 - e^2) / (4 v), Lankarani and Nikravesh (1990), J. Mech. Des. 112, 369-376; ``flores``
+    8 (1 - e) / (5 e v), Flores, Machado, Silva and Martins (2011), Multibody Syst. Dyn. 25, 357-375, for all e > 0.
     """
     e, v = restitution, velocity
     if formula == "lankarani":
@@ -103,16 +98,13 @@ class HuntCrossley(NormalLaw):
     dissipation: Expr
 
     def force(self, depth: Expr, rate: Expr) -> Expr:
-        """Force (N or N m) from the penetration and its rate."""
         gain = depth.graph.apply("max", 0.0, 1.0 + self.dissipation * rate)
         return beyond_zero(depth, lambda d: self.stiffness * d**self.exponent * gain)
 
     def elastic(self, depth: Expr) -> Expr:
-        """The part of the force that has a potential."""
         return beyond_zero(depth, lambda d: self.stiffness * d**self.exponent)
 
     def energy(self, depth: Expr) -> Expr:
-        """The potential of the elastic part, k d^(n + 1) / (n + 1) (J)."""
         power = self.exponent + 1.0
         return beyond_zero(depth, lambda d: self.stiffness * d**power / power)
 
@@ -180,23 +172,7 @@ class PartlyDamped(NormalLaw):
 
     def force(self, depth: Expr, rate: Expr) -> Expr:
         elastic = self.law.elastic(depth)
-        return elastic + self.grip * (self.law.force(depth, rate) - elastic)
-
-    def elastic(self, depth: Expr) -> Expr:
-        return self.law.elastic(depth)
-
-    def energy(self, depth: Expr) -> Expr:
-        return self.law.energy(depth)
-
-
-@dataclass(frozen=True)
-class ElasticPart(NormalLaw):
-    """The part of another law that has a potential."""
-
-    law: NormalLaw
-
-    def force(self, depth: Expr, rate: Expr) -> Expr:
-        return self.law.elastic(depth)
+        return elastic if self.grip.is_zero else elastic + self.grip * (self.law.force(depth, rate) - elastic)
 
     def elastic(self, depth: Expr) -> Expr:
         return self.law.elastic(depth)
