@@ -100,7 +100,7 @@ class Equilibrium(Result):
         lines += [(name, f"{value:.10g}") for name, value in self.states.items()]
         lines += [(f"{name} (solved)", f"{value:.10g}") for name, value in self.unknowns.items()]
         lines += [(f"support at {name}", f"{value:.6g}") for name, value in self.supports.items()]
-        lines.append(("largest force left", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))
+        lines.append(("largest remaining force", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))
         lines.append(("eigenvalues", ", ".join(number(value) for value in self.eigenvalues)))
         return [*lines, ("stability", self.stability)]
 

@@ -105,8 +105,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     moved = mobility.driven or m.forces or m.inputs or m.switched
     if m.default_gravity and not moved and any(not body.mass.is_zero for body in m.bodies):
         notes.append(
-            "no gravity is given and no force acts, so that nothing speeds up or slows down but by inertia; if it "
-            "should fall, give gravity; gravity (0, 0, 0) says that it should not"
+            "gravity is 0 by default and no force acts, so only inertia changes the motion; set gravity, or "
+            "confirm with gravity (0, 0, 0)"
         )
     if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
         held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
@@ -362,7 +362,7 @@ class MechanismReport:
         if len(set(self.ranks)) > 1:
             say("", f"the rank differs between configurations: {sorted(set(self.ranks))}")
         if timed := [str(element["name"]) for element in self.elements if TIMED.items() <= element.items()]:
-            say("held for a time", f"{_list(timed)}; what follows is without them")
+            say("closing and opening", f"{_list(timed)}; not counted below")
         counts = []
         if self.gruebler_kutzbach is not None:
             counts.append(f"Gruebler-Kutzbach {self.gruebler_kutzbach} in space")
