@@ -1,6 +1,6 @@
 """Free text of a user -> messages, terminals, HTML; lines -> the width of a terminal; Python's text -> its tree.
 
-Nothing else in eomgen quotes or escapes but this, and :mod:`eomgen.expr.languages` for generated files.
+Nothing else in eomgen quotes or escapes but this, and :mod:`eomgen.expr.texts` for generated files.
 """
 
 from __future__ import annotations

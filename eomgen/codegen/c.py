@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..base.kernel_table import KERNELS
-from ..expr.languages import comment_lines
+from ..expr.texts import comment_lines
 from ..toolchain.layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..expr.core import Expr, Node, reachable
-from ..expr.languages import comment_text
+from ..expr.texts import comment_text
 from .c_functions import each_lane, each_name
 from .c_layout import places_again
 from .pair_sums import CopiedRun, PairLists, copied_runs

@@ -17,7 +17,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.files import shipped
 from ..errors import EomgenError, bad_file
-from ..expr import languages
+from ..expr import texts
 from ..expr.evaluate import Evaluator
 from ..toolchain.trusted_files import Kept
 from .program import Program
@@ -44,12 +44,12 @@ def environment() -> Environment:
         autoescape=False,
     )
     made.filters |= {
-        "comment": languages.comment_text,
-        "comment_lines": languages.comment_lines,
-        "docstring": languages.docstring_text,
-        "toml": languages.toml_text,
-        "markdown": languages.markdown_text,
-        "code": languages.markdown_code,
+        "comment": texts.comment_text,
+        "comment_lines": texts.comment_lines,
+        "docstring": texts.docstring_text,
+        "toml": texts.toml_text,
+        "markdown": texts.markdown_text,
+        "code": texts.markdown_code,
         "listing": lambda names: repr(tuple(names)),
     }
     return made

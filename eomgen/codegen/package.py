@@ -14,8 +14,8 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 from ..base.files import open_plain, refuse_link
+from ..base.texts import one_line, shortened
 from ..errors import UsageError, bad_file, cannot, no_choice
-from ..expr.languages import summary_text
 from ..expr.notation import Notation
 from ..runtime.columns import column_names
 from ..runtime.layout import Layout, ModelInfo
@@ -175,7 +175,7 @@ def _context(program: Program, analyses: bool) -> dict[str, Any]:
         "name": program.name,
         "prefix": program.name.upper(),
         "doc": doc,
-        "description": summary_text(doc.splitlines()[0] if doc else f"Equations of motion of {program.name}"),
+        "description": shortened(one_line((doc or f"Equations of motion of {program.name}").splitlines()[0]), 500),
         "target": metadata["target"],
         "metadata": metadata,
         "provenance": metadata["provenance"],

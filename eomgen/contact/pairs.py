@@ -267,22 +267,19 @@ class PairCall:
 
     def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
         """Its value as a function of floats or arrays."""
-        return itemgetter(self.numbers[0]) if self.part == "item" else self.on_numbers(self.function.in_floats)
+        return self.on_numbers(self.function.in_floats)
 
     def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
         """Its value as a function of numbers, by given loops."""
 
-        def slope(*operands: Any) -> Any:
-            flat = operands if len(operands) == 1 + len(self.numbers) else tuple(_unpacked(operands))
-            return loops.slope_along(flat[0], self.numbers, flat[1:])
-
-        def meeting(*operands: Any) -> Any:
-            flat = operands if len(operands) > 1 else tuple(_unpacked(operands))
-            return loops.meeting(flat[0], flat[1:])
-
-        made: dict[str, Callable[..., Any]] = {"sum": loops, "slope": slope, "meeting": meeting}
-        made |= {"given": lambda *operands: list(_unpacked(operands)), "witnesses": loops.witnesses}
-        return made[self.part] if self.part in made else itemgetter(self.numbers[0])
+        made: dict[str, Callable[..., Any]] = {
+            "given": lambda *operands: list(operands),
+            "sum": loops,
+            "slope": lambda given, *rates: loops.slope_along(given, self.numbers, rates),
+            "meeting": lambda given, *accelerations: loops.meeting(given, accelerations),
+            "witnesses": loops.witnesses,
+        }
+        return itemgetter(self.numbers[0]) if self.item else made[self.part]
 
     def push(self, graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         """The tangent of its node from those of the nodes before it; None where there is none.
@@ -337,11 +334,6 @@ class PairCall:
         symbols = sorted(set().union(*(x.free_symbols for x in operands)), key=str)
         name = self.function.name if self.part == "given" else f"{self.name}_{len(self.numbers)}"
         return sympy.Function(name)(*symbols)
-
-
-def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:
-    """Operands as they are, or from one tuple of them."""
-    return operands[0] if len(operands) == 1 and isinstance(operands[0], tuple) else operands
 
 
 def pair_call(graph: Graph, operation: str) -> PairCall | None:

@@ -16,28 +16,100 @@ if TYPE_CHECKING:
     from ..base.operations import Operation
     from .functions import Function
 
-# -- nodes -------------------------------------------------------------------------------------------------------------
+# -- the graph ---------------------------------------------------------------------------------------------------------
 
-# The rules are those of arithmetic on constants, signs, zeros and ones; they are exact up to rounding order.
+# A :class:`Graph` is a growing table of nodes ``(operation, operand ids...)``. A node that already exists is never made
+# again, and constants, signs, zeros and ones are folded as nodes are made, so common subexpressions merge at birth and
+# derivation code cannot swell. :class:`Expr` is a handle on one node with Python's operators.
+#
+# Operations: ``const``, ``sym``, those of the table :mod:`eomgen.base.operations`, and calls of declared functions
+# (:mod:`.functions`). ``select(c, x, y)`` is x where c is true (non-zero) and y elsewhere. Comparisons give 1.0 or 0.0.
 
 
+Scalar = Union["Expr", float, int]
 Part = TypeVar("Part")
 Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
 
 
-class Nodes:
-    """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
+class Graph:
+    """A table of interned nodes, handed out as :class:`Expr`.
 
-    __slots__ = ("_ids", "calls", "marks", "n_passes", "nodes", "reached")
+    Attributes
+    ----------
+    nodes : list of tuple
+        By id; operands have smaller ids than the node that uses them, so id order is a topological order.
+    marks : list of (int, int)
+        Ids, ascending, with which the part of another body begins, and the pass over the bodies that it is of: code of
+        big models is made of alike parts.
+    reached : dict
+        What many roots were found to be made of: nodes never change, so neither does that.
+    roots : Roots, optional
+        What :mod:`.differentiate` knows of its nodes.
+    functions, calls : dict
+        Functions that expressions may call, by name; what each operation that is a call means: (Function, orders),
+        or of a sum over pairs of shapes (:class:`~eomgen.contact.pairs.PairCall`, ()).
+    """
+
+    __slots__ = ("_ids", "calls", "functions", "marks", "n_passes", "nodes", "one", "reached", "roots", "zero")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.marks: list[tuple[int, int]] = []
         self.n_passes = 0
         self.reached: dict[frozenset[int], list[int]] = {}
+        self.roots: Any = None
         self._ids: dict[Node, int] = {}
+        self.functions: dict[str, Function] = {}
         self.calls: dict[str, tuple[Any, tuple[int, ...]]] = {}
+        self.zero = self.constant(0.0)
+        self.one = self.constant(1.0)
 
+    def __deepcopy__(self, memo: dict[int, object]) -> Graph:
+        """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
+        twin = memo[id(self)] = Graph.__new__(Graph)
+        twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
+        twin.marks, twin.n_passes, twin.reached = list(self.marks), self.n_passes, {}
+        twin.roots = None
+        twin.calls, twin.functions = dict(self.calls), dict(self.functions)
+        twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
+        return twin
+
+    # -- leaves ---------------------------------------------------------------------------------------------------
+    def constant(self, value: float) -> Expr:
+        """The node of a finite number (numbers are doubles; -0.0 is stored as 0.0)."""
+        return Expr(self, self._const(float(value)))
+
+    def symbol(self, name: str) -> Expr:
+        """The node of a named quantity; the same name is always the same node."""
+        return Expr(self, self._node(("sym", name)))
+
+    def lift(self, value: Scalar) -> Expr:
+        """An :class:`Expr` of this graph from an Expr or a number."""
+        if isinstance(value, Expr):
+            if value.graph is not self:
+                raise ValueError("an expression of another graph cannot be used here")
+            return value
+        return Expr(self, self._const(float(value)))
+
+    # -- making nodes ---------------------------------------------------------------------------------------------
+    def apply(self, operation: str, *operands: Scalar) -> Expr:
+        """The node of ``operation`` on Exprs or numbers, simplified."""
+        ids = [self.lift(x).id for x in operands]
+        return Expr(self, self.make(operation, *ids))
+
+    def declare(self, function: Function) -> None:
+        """Let expressions call a function."""
+        self.functions[function.name] = function
+
+    def call(self, function: Function, orders: tuple[int, ...], ids: Iterable[int]) -> int:
+        """The id of a call of a function, or of its derivative of these orders, on operand ids."""
+        if function.highest is not None and max(orders) > function.highest:
+            return self.zero.id
+        operation = function.operation(orders)
+        self.calls[operation] = (function, orders)
+        return self._node((operation, *ids))
+
+    # -- rules: arithmetic on constants, signs, zeros and ones, exact up to rounding order ---------------------------
     def _const(self, value: float) -> int:
         if not math.isfinite(value):
             raise OverflowError(f"constant {value!r} is not a finite number")
@@ -260,95 +332,6 @@ class Nodes:
         return self._const(1.0) if result is None else result
 
 
-# -- the graph ---------------------------------------------------------------------------------------------------------
-
-# A :class:`Graph` is a growing table of nodes ``(operation, operand ids...)``. A node that already exists is never made
-# again, and constants, signs, zeros and ones are folded as nodes are made, so common subexpressions merge at birth and
-# derivation code cannot swell. :class:`Expr` is a handle on one node with Python's operators.
-#
-# Operations: ``const``, ``sym``, those of the table :mod:`eomgen.base.operations`, and calls of declared functions
-# (:mod:`.functions`). ``select(c, x, y)`` is x where c is true (non-zero) and y elsewhere. Comparisons give 1.0 or 0.0.
-
-
-Scalar = Union["Expr", float, int]
-
-
-class Graph(Nodes):
-    """A table of interned nodes, handed out as :class:`Expr`.
-
-    Attributes
-    ----------
-    nodes : list of tuple
-        ``nodes[i]`` is the node with id ``i``; operands always have smaller ids than the node that uses them, so id
-        order is a topological order.
-    marks : list of (int, int)
-        Ids, ascending, with which the part of another body begins, and the pass over the bodies that it is of: code of
-        big models is made of alike parts.
-    n_passes : int
-    reached : dict
-        What many roots were found to be made of: nodes never change, so neither does that.
-    roots : Roots, optional
-        What :mod:`.differentiate` knows of its nodes.
-    functions, calls : dict
-        Functions that expressions may call, by name; what each operation that is a call means: (Function, orders),
-        or of a sum over pairs of shapes (:class:`~eomgen.contact.pairs.PairCall`, ()).
-    """
-
-    __slots__ = ("functions", "one", "roots", "zero")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.roots: Any = None
-        self.functions: dict[str, Function] = {}
-        self.zero = self.constant(0.0)
-        self.one = self.constant(1.0)
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Graph:
-        """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
-        twin = memo[id(self)] = Graph.__new__(Graph)
-        twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
-        twin.marks, twin.n_passes, twin.reached = list(self.marks), self.n_passes, {}
-        twin.roots = None
-        twin.calls, twin.functions = dict(self.calls), dict(self.functions)
-        twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
-        return twin
-
-    # -- leaves ---------------------------------------------------------------------------------------------------
-    def constant(self, value: float) -> Expr:
-        """The node of a finite number (numbers are doubles; -0.0 is stored as 0.0)."""
-        return Expr(self, self._const(float(value)))
-
-    def symbol(self, name: str) -> Expr:
-        """The node of a named quantity; the same name is always the same node."""
-        return Expr(self, self._node(("sym", name)))
-
-    def lift(self, value: Scalar) -> Expr:
-        """An :class:`Expr` of this graph from an Expr or a number."""
-        if isinstance(value, Expr):
-            if value.graph is not self:
-                raise ValueError("an expression of another graph cannot be used here")
-            return value
-        return Expr(self, self._const(float(value)))
-
-    # -- making nodes ---------------------------------------------------------------------------------------------
-    def apply(self, operation: str, *operands: Scalar) -> Expr:
-        """The node of ``operation`` on Exprs or numbers, simplified."""
-        ids = [self.lift(x).id for x in operands]
-        return Expr(self, self.make(operation, *ids))
-
-    def declare(self, function: Function) -> None:
-        """Let expressions call a function."""
-        self.functions[function.name] = function
-
-    def call(self, function: Function, orders: tuple[int, ...], ids: Iterable[int]) -> int:
-        """The id of a call of a function, or of its derivative of these orders, on operand ids."""
-        if function.highest is not None and max(orders) > function.highest:
-            return self.zero.id
-        operation = function.operation(orders)
-        self.calls[operation] = (function, orders)
-        return self._node((operation, *ids))
-
-
 class Expr:
     """A handle on one node of a graph; arithmetic on handles makes nodes.
 
@@ -534,13 +517,7 @@ def marked_again(graph: Graph, ids: Sequence[int], backwards: bool = False) -> I
 
 
 def common_graph(*groups: Sequence[Expr]) -> Graph | None:
-    """The one graph of all these expressions, None if there are none.
-
-    Raises
-    ------
-    ValueError
-        Expressions of different graphs.
-    """
+    """The one graph of all these expressions, None if there are none."""
     graph: Graph | None = None
     for group in groups:
         for x in group:
@@ -560,17 +537,7 @@ FEW = 256  #: nodes that are not worth parts of their own
 def substitute(outputs: Sequence[Expr], mapping: Mapping[Expr, Expr]) -> list[Expr]:
     """Replace nodes (symbols or whole subexpressions) everywhere in the outputs, all at once.
 
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-    mapping : mapping of Expr to Expr
-        Node -> replacement.  Replacements are not searched again, so ``{x: y, y: x}`` exchanges x and y.
-
-    Returns
-    -------
-    list of Expr
-        One per output, simplified as all new nodes are.
+    Replacements are not searched again, so ``{x: y, y: x}`` exchanges x and y.
     """
     graph = common_graph(outputs, list(mapping), list(mapping.values()))
     if graph is None:
@@ -609,13 +576,7 @@ SHARED = frozenset({str, int, float, bool, type(None)})  #: types whose values a
 
 
 def copied(value: Held) -> Held:
-    """What ``copy.deepcopy`` gives, in a fraction of its time where there are many expressions.
-
-    Parameters
-    ----------
-    value : tuple, list, dict, record or Expr
-        And whatever these hold; what is held twice is held twice by the copy.
-    """
+    """What ``copy.deepcopy`` gives of a tuple, list, dict, record or Expr, in a fraction of its time."""
     return _Copies().of(value)  # type: ignore[no-any-return]
 
 

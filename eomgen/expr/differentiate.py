@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from typing import Any
 
 from ..base.operations import OPERATIONS, operations_with
 from .core import LEAVES, Expr, Graph, common_graph, marked_again, reachable
@@ -102,8 +101,7 @@ class Roots:
 
 def roots_in(g: Graph) -> Roots:
     """The roots of a graph, kept with it, as nodes never change."""
-    roots: Roots = g.roots or Roots()
-    g.roots = roots
+    g.roots = roots = g.roots or Roots()
     roots.look(g)
     return roots
 
@@ -211,19 +209,14 @@ def partials(g: Graph, i: int, active: Sequence[bool]) -> list[int]:
     """Partial derivatives of a smooth node with respect to its operands (zero where not active)."""
     node = g.nodes[i]
     if node[0] in g.calls:
-        return _call_partials(g, node, active)
+        function, orders = g.calls[node[0]]
+        return [g.call(function, raised(orders, k), node[1:]) if on else g.zero.id for k, on in enumerate(active)]
     if node[0] == "pow" and active == [True, False] and _is_square(g, node[1])[0]:
         # b a^(b - 1/2) / sqrt(a), for b > 1/2 finite where a, and with it a', is 0
         rest = g.make("pow", node[1], g.sub(node[2], g.constant(0.5).id))
         return [g.mul(node[2], g.make("absorb", rest, g.div(g.one.id, g.make("sqrt", node[1])))), g.zero.id]
     slopes = zip(OPERATIONS[node[0]].slopes, active, strict=True)
     return [slope(g, i, *node[1:]) if wanted else g.zero.id for slope, wanted in slopes]
-
-
-def _call_partials(g: Graph, node: tuple[Any, ...], active: Sequence[bool]) -> list[int]:
-    """Partial derivatives of a call with respect to its arguments (zero where not active)."""
-    function, orders = g.calls[node[0]]
-    return [g.call(function, raised(orders, i), node[1:]) if wanted else g.zero.id for i, wanted in enumerate(active)]
 
 
 # -- derivatives of expressions ----------------------------------------------------------------------------------------
@@ -435,25 +428,7 @@ def _column_bits(wrt: Sequence[Expr]) -> dict[int, int]:
 
 
 def jvp(outputs: Sequence[Expr], seeds: Mapping[Expr, Expr]) -> list[Expr]:
-    """Directional derivative: for each output y, the sum over seeds of dy/dx * seed.
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions y of one graph.
-    seeds : mapping of Expr to Expr
-        Symbol x -> its rate of change; symbols not named are constant.
-
-    Returns
-    -------
-    list of Expr
-        One derivative per output.
-
-    Raises
-    ------
-    ValueError
-        A seed is not a symbol, or expressions of different graphs.
-    """
+    """Directional derivative: for each output y, the sum over symbols x of dy/dx times the seed, the rate of x."""
     g = common_graph(outputs, list(seeds), list(seeds.values()))
     if g is None:
         return []
@@ -471,22 +446,8 @@ def vjp(outputs: Sequence[Expr], weights: Sequence[Expr], wrt: Sequence[Expr]) -
 
     One reverse sweep, whatever the number of symbols.  Branching operations are differentiated forward and multiplied
     in, so that an infinite slope in a branch not taken never meets a zero weight.
-
-    Parameters
-    ----------
-    outputs, weights : sequence of Expr
-        As many weights as outputs.
-    wrt : sequence of Expr
-        Symbols.
-
-    Returns
-    -------
-    list of Expr
-        One derivative per symbol.
     """
     g = common_graph(outputs, weights, wrt)
-    if len(weights) != len(outputs):
-        raise ValueError(f"{len(outputs)} outputs need as many weights, not {len(weights)}")
     if g is None:
         return []
     nodes, order = g.nodes, reachable(g, (y.id for y in outputs))
@@ -511,22 +472,10 @@ def gradient(output: Expr, wrt: Sequence[Expr]) -> list[Expr]:
 
 
 def jacobian(outputs: Sequence[Expr], wrt: Sequence[Expr]) -> dict[tuple[int, int], Expr]:
-    """Sparse Jacobian ``d outputs[row] / d wrt[column]``.
+    """Entries (row, column) of ``d outputs[row] / d wrt[column]`` that are not identically zero, ascending.
 
     Each column (forward) or row (reverse) visits only the nodes it depends on; the direction with fewer operations is
     taken, forward always where expressions branch.
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        One per row.
-    wrt : sequence of Expr
-        Symbols, one per column.
-
-    Returns
-    -------
-    dict of (row, column) to Expr
-        Entries that are not identically zero, by rows and columns ascending.
     """
     g = common_graph(outputs, wrt)
     if g is None:
@@ -602,14 +551,7 @@ def _reverse_jacobian(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> di
             continue
         adjoints = {root: g.one.id}
         order = [i for i in reachable(g, [root]) if i in active]
-        branches: list[int] = []
         for part in marked_again(g, order, backwards=True):
-            _pull(g, part, active, adjoints, branches)
-        slopes = _forward_jacobian(g, branches, wrt) if branches else {}
-        for column, x in enumerate(wrt):
-            d = adjoints.get(x.id, g.zero.id)
-            for k, branch in enumerate(branches):
-                d = g.add(d, g.mul(adjoints[branch], slopes.get((k, column), g.zero.id)))
-            if d != g.zero.id:
-                entries[row, column] = d
+            _pull(g, part, active, adjoints, [])  # nothing branches
+        entries |= {(row, k): d for k, x in enumerate(wrt) if (d := adjoints.get(x.id, g.zero.id)) != g.zero.id}
     return entries

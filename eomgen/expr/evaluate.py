@@ -17,21 +17,13 @@ from ..errors import ill_shaped, incomplete
 from .core import Expr, common_graph, reachable, symbols_of
 
 Value = Any  # float or ndarray
-
-
-def _pack(*values: Any) -> tuple[Any, ...]:
-    return tuple(x for value in values for x in (value if isinstance(value, tuple) else (value,)))
+Function = Callable[..., Any]
 
 
 class Evaluator:
     """A schedule that evaluates the same expressions again and again.
 
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-    names : sequence of str
-        Symbols that will be given, at least those the outputs depend on, in the order of values given as a sequence.
+    ``names`` are the symbols that will be given, at least those that the outputs depend on.
 
     Raises
     ------
@@ -43,12 +35,10 @@ class Evaluator:
         self.names = tuple(names)
         graph = common_graph(outputs)
         order = reachable(graph, (y.id for y in outputs)) if graph is not None else []
-        nodes = graph.nodes if graph is not None else []
+        nodes, calls = (graph.nodes, graph.calls) if graph is not None else ([], {})
         place = {name: k for k, name in enumerate(self.names)}
         self._constants: list[float] = []
         slots: dict[int, int] = {}
-        used: set[int] = set()
-        unknown: list[str] = []
         rest: list[int] = []
         for i in order:
             kind, *args = nodes[i]
@@ -57,65 +47,41 @@ class Evaluator:
                 self._constants.append(args[0])
             elif kind == "sym":
                 slots[i] = place.get(args[0], -1)
-                used.add(slots[i])
-                if args[0] not in place:
-                    unknown.append(args[0])
             else:
                 rest.append(i)
-        if unknown:
-            raise incomplete(f"no value for {', '.join(sorted(unknown))}")
+        self._used = set(slots.values())
+        if -1 in self._used:
+            unknown = sorted(nodes[i][1] for i, slot in slots.items() if slot < 0)
+            raise incomplete(f"no value for {', '.join(unknown)}")
         first = len(self.names) + len(self._constants)
-        self._steps: list[tuple[str, int, int, int]] = []  # operation and operand slots, -1 where there is none
-        self._functions: dict[str, tuple[Callable[..., Any], Callable[..., Any]]]
-        self._functions = {name: (row.value, row.array) for name, row in OPERATIONS.items()} | {"pack": (_pack, _pack)}
-        for operation, (function, orders) in (graph.calls if graph is not None else {}).items():
-            implementation = function.implementation(orders)
-            self._functions[operation] = (implementation, implementation)
-        last: dict[int, int] = {}
-        steps = self._steps
-        for i in rest:
-            node = nodes[i]
-            if len(node) == 3:  # most of them
-                operation, k, j = node
-                a, b = slots[k], slots[j]
-                last[a] = last[b] = step = len(steps)
-                steps.append((operation, a, b, -1))
-                slots[i] = first + step
-            else:
-                slots[i] = self._add_step(node[0], [slots[j] for j in node[1:]], first, last)
+        functions = {name: (row.value, row.array) for name, row in OPERATIONS.items()}
+        for operation, (function, orders) in calls.items():
+            functions[operation] = (function.implementation(orders),) * 2
+        #: of each step its function of floats and of arrays, its first operands (the second is -1 where there is none)
+        #: and those beyond two
+        self._steps: list[tuple[Function, Function, int, int, list[int]]] = []
+        last, none = dict[int, int](), list[int]()
+        for step, i in enumerate(rest):
+            operation, *args = nodes[i]
+            a = slots[args[0]]
+            b = slots[args[1]] if len(args) > 1 else -1
+            others = [slots[k] for k in args[2:]] if len(args) > 2 else none
+            for slot in others:
+                last[slot] = step
+            last[a] = last[b] = step
+            self._steps.append((*functions[operation], a, b, others))
+            slots[i] = first + step
         self._outputs = [slots[y.id] for y in outputs]
         keep = {*self._outputs, -1, *range(first)}
-        self._dead: list[tuple[int, ...]] = [()] * len(self._steps)  # slots not needed after each step
-        for s, k in last.items():
-            if s not in keep:
-                self._dead[k] = (*self._dead[k], s)
-        self._scalar = [(self._functions[op][0], a, b, c) for op, a, b, c in self._steps]
-        self._used = used
-
-    def _add_step(self, operation: str, places: list[int], first: int, last: dict[int, int]) -> int:
-        """Append a step, after steps that pack the arguments of a call of more than three; returns its slot."""
-        if len(places) > 3:
-            while len(places) > 1:  # in a balanced tree, so that the work is of the order of their number
-                parts = [places[k : k + 3] for k in range(0, len(places), 3)]
-                places = [self._add_step("pack", part, first, last) for part in parts]
-        a, b, c = (*places, -1, -1)[:3]
-        self._steps.append((operation, a, b, c))
-        for s in places:
-            last[s] = len(self._steps) - 1
-        return first + len(self._steps) - 1
+        self._dead: dict[int, list[int]] = {}  # slots not needed after a step
+        for slot, k in last.items():
+            if slot not in keep:
+                self._dead.setdefault(k, []).append(slot)
 
     def __call__(self, values: Mapping[str, Value] | Sequence[Value] | np.ndarray) -> list[Value]:
-        """Evaluate.
+        """Values of the outputs, those that depend on no array as floats.
 
-        Parameters
-        ----------
-        values : mapping or sequence
-            Numbers or arrays that broadcast against each other, by name or in the order of :attr:`names`.
-
-        Returns
-        -------
-        list of float or ndarray
-            One per output; an output that depends on no array is a float.
+        What is given are numbers, or arrays that broadcast against each other, by name or in the order of ``names``.
         """
         data, arrays = self._inputs(values)
         data.extend(self._constants)
@@ -145,54 +111,32 @@ class Evaluator:
 
     def _on_floats(self, data: list[float]) -> list[Value]:
         append = data.append
-        for k, (function, a, b, c) in enumerate(self._scalar):
+        for function, array, a, b, others in self._steps:
             try:
                 if b < 0:
                     append(function(data[a]))
-                elif c < 0:
+                elif not others:
                     append(function(data[a], data[b]))
                 else:
-                    append(function(data[a], data[b], data[c]))
+                    append(function(data[a], data[b], *[data[k] for k in others]))
             except (ValueError, ArithmeticError):  # NumPy knows the infinity or NaN it should be
                 with np.errstate(all="ignore"):
-                    append(
-                        float(
-                            self._functions[self._steps[k][0]][1](*(np.float64(data[s]) for s in (a, b, c) if s >= 0))
-                        )
-                    )
+                    append(float(array(*(np.float64(data[k]) for k in (a, b, *others) if k >= 0))))
         return [data[s] for s in self._outputs]
 
     def _on_arrays(self, data: list[Value]) -> list[Value]:
-        append = data.append
         with np.errstate(all="ignore"):
-            for (operation, a, b, c), dead in zip(self._steps, self._dead, strict=True):
-                function = self._functions[operation][1]
-                if b < 0:
-                    append(function(data[a]))
-                elif c < 0:
-                    append(function(data[a], data[b]))
-                else:
-                    append(function(data[a], data[b], data[c]))
-                for s in dead:
+            for k, (_, function, a, b, others) in enumerate(self._steps):
+                rest = [data[s] for s in others] if others else others
+                data.append(function(data[a]) if b < 0 else function(data[a], data[b], *rest))
+                for s in self._dead.get(k, ()):
                     data[s] = None
         found = (data[s] for s in self._outputs)  # of a sum over pairs a list
         return [x if isinstance(x, list) or np.ndim(x) else float(x) for x in found]
 
 
 def evaluate(outputs: Sequence[Expr], values: Mapping[str, Value]) -> list[Value]:
-    """Values of the outputs at the given numbers or arrays (which broadcast against each other).
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-    values : mapping of str to float or ndarray
-        By symbol name; names that are not needed are ignored.
-
-    Returns
-    -------
-    list of float or ndarray
-        One per output; an output that depends on no array is a float.
+    """Values of the outputs at numbers or arrays by name, as of :class:`Evaluator`; other names are ignored.
 
     Raises
     ------

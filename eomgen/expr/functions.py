@@ -27,17 +27,11 @@ def pieces(knots: np.ndarray, x: Value) -> Any:
 
 
 class Curve:
-    """A piecewise cubic of one variable.
+    """A piecewise cubic of one variable between n knots, strictly increasing.
 
-    Parameters
-    ----------
-    knots : sequence of n floats
-        Strictly increasing.
-    coefficients : sequence of n + 1 rows of four floats
-        Of the pieces, highest power first: before the first knot, between knots, beyond the last; powers of the
-        distance from the knot to the left (the first knot for the first piece).
-    period : float, optional
-        Arguments are brought into ``[knots[0], knots[0] + period]`` first.
+    Each of n + 1 rows of coefficients is a piece, highest power first: before the first knot, between knots, beyond the
+    last; powers of the distance from the knot to the left (the first knot for the first piece).  With a period,
+    arguments are brought into ``[knots[0], knots[0] + period]`` first.
     """
 
     def __init__(
@@ -58,16 +52,10 @@ class Curve:
 
 
 class Surface:
-    """A piecewise bicubic of two variables on a grid.
+    """A piecewise bicubic of two variables on a grid of lines x and y, strictly increasing.
 
-    Parameters
-    ----------
-    x, y : sequence of floats
-        Grid lines, strictly increasing.
-    nodes : array (n_x, n_y, 4)
-        f, df/dx, df/dy and d2f/dxdy at the grid points.
-    slope : float
-        1 to go on linearly beyond the grid, 0 to keep the value of its edge.
+    ``nodes`` (n_x, n_y, 4) are f, df/dx, df/dy and d2f/dxdy at the grid points.  With slope 1 it goes on linearly
+    beyond the grid, with 0 it keeps the value of its edge.
     """
 
     def __init__(self, x: Numbers, y: Numbers, nodes: Any, slope: float = 1.0) -> None:
@@ -172,13 +160,10 @@ def lowered(orders: Orders, i: int) -> Orders:
 
 
 class Twin:
-    """The Python side of a function written in C.
+    """The Python side of a function written in C: its value, under ``(0, ...)``, and the derivatives that are known.
 
-    Parameters
-    ----------
-    functions : mapping of orders to callable
-        Values, under ``(0, ...)``, and the derivatives that are known; called with floats, one point at a time, or
-        with whole arrays if they are NumPy ufuncs.  Other derivatives are central differences of these.
+    These are called with floats, one point at a time, or with whole arrays if they are NumPy ufuncs.  Other derivatives
+    are central differences of them.
     """
 
     def __init__(self, functions: Mapping[Orders, Callable[..., Any]]) -> None:
@@ -240,42 +225,22 @@ def up_to(arity: int, total: int) -> Iterator[Orders]:
 
 @dataclass(frozen=True)
 class NativeCode:
-    """A function in C.
+    """A function in C."""
 
-    Attributes
-    ----------
-    file : str
-        Name of the source file, for messages.
-    text : str
-        The source.
-    names : tuple of (orders, name)
-        C functions of the value and of the derivatives that the source has.
-    """
-
-    file: str
+    file: str  #: name of the source file, for messages
     text: str
-    names: tuple[tuple[Orders, str], ...]
+    names: tuple[tuple[Orders, str], ...]  #: C functions of the value and of the derivatives that the source has
 
 
 @dataclass(frozen=True, eq=False)
 class Function:
-    """A function that expressions may call.
-
-    Attributes
-    ----------
-    evaluator : Curve, Surface, Twin or None
-        Its values in NumPy; None for native code without a Python twin.
-    native : NativeCode, optional
-        Its C source, if it is no table.
-    place : (file, line)
-        Where a model file declares it, for messages.
-    """
+    """A function that expressions may call."""
 
     name: str
     arity: int
-    evaluator: Curve | Surface | Twin | None
-    native: NativeCode | None = None
-    place: tuple[str, int] = ("", 0)
+    evaluator: Curve | Surface | Twin | None  #: its values in NumPy; None for native code without a Python twin
+    native: NativeCode | None = None  #: its C source, if it is no table
+    place: tuple[str, int] = ("", 0)  #: file and line where a model file declares it, for messages
     lists = item = False  # as :class:`~eomgen.contact.pairs.PairCall` says of itself
 
     @property
@@ -292,23 +257,11 @@ class Function:
         return operation
 
     def implementation(self, orders: Orders) -> Callable[..., Any]:
-        """The value or a derivative as a function of floats or arrays, or of one tuple of them."""
-
-        def call(*arguments: Any) -> Any:
-            if len(arguments) < self.arity:  # packed
-                (arguments,) = arguments
-            return self.require_evaluator()(*arguments, *orders)
-
-        return call
+        """The value or a derivative as a function of floats or arrays."""
+        return lambda *arguments: self.require_evaluator()(*arguments, *orders)
 
     def require_evaluator(self) -> Curve | Surface | Twin:
-        """The evaluator in NumPy.
-
-        Raises
-        ------
-        ModelError
-            The function is native code without a Python twin.
-        """
+        """The evaluator in NumPy; ModelError of native code without a Python twin."""
         if self.evaluator is None:
             message = "is a C function without a Python version, and must be evaluated in NumPy here"
             remedy = (

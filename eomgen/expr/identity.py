@@ -29,27 +29,23 @@ ROOTS = 4  #: of an expression, up to which all their signs are tried
 DRAWS = 9  #: points that are drawn for it: some lie outside of the domain of a root or logarithm
 
 
-def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
-    """Values of expressions and the bounds of their rounding.
+def with_bounds(
+    outputs: Sequence[Expr], values: Mapping[str, Value], likely: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of expressions and the bounds of their rounding, (n,) or (n, k), from exact values or (k,) arrays by name.
 
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-    values : mapping of str to float or (k,) array
-        Of all symbols, taken as exact.
-
-    Returns
-    -------
-    values : (n,) or (n, k) array
-        NaN outside of an operation's domain.
-    bounds : (n,) or (n, k) array
-        In units of eps; infinite or NaN where nothing is known, as of a square root at 0.
+    Values are NaN outside of an operation's domain.  Bounds are in units of eps, and infinite or NaN where nothing is
+    known, as of a square root at 0.  ``likely`` ones are at most CHANCE times those of independent roundings, which
+    long chains of rotations need.
     """
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
-    return _bounds_at(graph, outputs, _values_of_nodes(graph, outputs, values), values, independent=False)
+    nodes = _values_of_nodes(graph, outputs, values)
+    found, bounds = _bounds_at(graph, outputs, nodes, values, independent=False)
+    if likely:
+        bounds = np.minimum(bounds, CHANCE * _bounds_at(graph, outputs, nodes, values, independent=True)[1])
+    return found, bounds
 
 
 def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str, Value]) -> dict[int, Value]:
@@ -102,33 +98,16 @@ def _bounds_at(
     return result
 
 
-def with_likely_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
-    """The same, bounds at most CHANCE times those of independent roundings, which long chains of rotations need."""
-    graph = common_graph(outputs)
-    if graph is None:
-        return np.empty(0), np.empty(0)
-    nodes = _values_of_nodes(graph, outputs, values)
-    found, bounds = _bounds_at(graph, outputs, nodes, values, independent=False)
-    likely = _bounds_at(graph, outputs, nodes, values, independent=True)[1]
-    return found, np.minimum(bounds, CHANCE * likely)
-
-
 def vanishes(
     outputs: Sequence[Expr], within: float | None = None, pieces: bool = False, unknown: bool = False
 ) -> list[bool]:
     """Which expressions are zero at all values of their symbols; the module's page says how surely.
 
-    Parameters
-    ----------
-    outputs : sequence of Expr
-    within : float, optional
-        What counts as zero of numbers that a user wrote in so many digits.  Rounding by default; the derivatives have
-        to be rounding then too: beside large numbers that cancel, a term of size 1 may be lost in the value.
-    pieces : bool
-        Whether expressions that are not analytic are judged by such points too, so that ``max(x, 0)``, which is zero
-        in a part of its domain, may count as zero; they never do otherwise.
-    unknown : bool
-        What is returned of an expression that is zero wherever it has a value, but has one at fewer points.
+    ``within`` is what counts as zero of numbers that a user wrote in so many digits.  By default it is rounding, and
+    the derivatives have to be rounding too: beside large numbers that cancel, a term of size 1 may be lost in the
+    value.  With ``pieces`` expressions that are not analytic are judged by such points too, so that ``max(x, 0)``, zero
+    in a part of its domain, may count as zero; they never do otherwise.  ``unknown`` is what is returned of an
+    expression that is zero wherever it has a value, but has one at fewer points.
     """
     graph = common_graph(outputs)
     if graph is None:
@@ -165,7 +144,7 @@ def _vanish(flat: Sequence[Expr], within: float | None, unknown: bool) -> list[b
         done = [k for k, passed in left.items() if passed == TRIES]
         left = {k: passed for k, passed in left.items() if passed < TRIES}
         if within is None and done:
-            rounding = is_rounding(*with_likely_bounds([flat[k] for k in done], values))
+            rounding = is_rounding(*with_bounds([flat[k] for k in done], values, likely=True))
             done = [k for k, zero in zip(done, rounding, strict=True) if zero]
             done = [
                 k for k, flat_there in zip(done, _are_flat([flat[k] for k in done], values), strict=True) if flat_there
@@ -210,7 +189,7 @@ def _are_flat(outputs: Sequence[Expr], values: Mapping[str, float]) -> list[bool
     """Whether the slopes by each symbol are rounding, also of the terms' own slopes, which folded constants hide."""
     names = [sorted(symbols_of([x])) for x in outputs]
     slopes = [gradient(x, [x.graph.symbol(name) for name in own]) for x, own in zip(outputs, names, strict=True)]
-    found, bounds = with_likely_bounds([slope for own in slopes for slope in own], values)
+    found, bounds = with_bounds([slope for own in slopes for slope in own], values, likely=True)
     terms = [_slopes_of_terms(x, own, values) for x, own in zip(outputs, names, strict=True)]
     strict, likely = (np.concatenate([own[k] for own in terms]) if terms else np.empty(0) for k in (0, 1))
     zero = iter(is_rounding(found, np.maximum(bounds, np.minimum(strict, CHANCE * likely))))

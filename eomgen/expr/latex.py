@@ -157,21 +157,12 @@ Node = Sign | Group | Styled | Accent | Scripts | Fraction
 
 @cache
 def read_latex(text: str) -> Node:
-    r"""The tree of a symbol's LaTeX, such as ``q_{\rm f}``.
-
-    Raises
-    ------
-    NotationError
-        Braces do not match, a command is not one of a symbol, or a character would end the formula.
-    """
+    r"""The tree of a symbol's LaTeX, such as ``q_{\rm f}``; NotationError of anything else."""
     if not text.strip():
         raise NotationError("the LaTeX of a symbol is empty", "leave it out, or write for example \\theta_1")
     if len(text) > LONGEST:
         raise NotationError(f"the LaTeX of a symbol has {len(text)} characters", f"at most {LONGEST}")
-    text = spaced(text)
-    if text.endswith("\\") and not text.endswith("\\\\"):
-        raise NotationError(f"{_shown(text)} ends in a backslash", "take it away")
-    return _Reader(text).whole()
+    return _Reader(spaced(text)).whole()
 
 
 def spaced(text: str) -> str:
@@ -179,18 +170,16 @@ def spaced(text: str) -> str:
     return _SPACES.sub(" ", text).strip(" ")
 
 
-def _shown(text: str) -> str:
-    return f"'{visible(text, lines=False)}'"
-
-
 class _Reader:
     """Reads tokens from left to right."""
 
     def __init__(self, text: str) -> None:
         self.text, self.tokens = text, [(m[0], m.start()) for m in _TOKEN.finditer(text)]
-        self.place, self.shown = 0, _shown(text)
+        self.place, self.shown = 0, f"'{visible(text, lines=False)}'"
 
     def whole(self) -> Node:
+        if self.text.endswith("\\") and not self.text.endswith("\\\\"):
+            raise NotationError(f"{self.shown} ends in a backslash", "take it away")
         found = self.row("", False, 0)
         if self.place < len(self.tokens):
             raise NotationError(f"{self.shown} has a '}}' without its '{{'", "write as many { as }")

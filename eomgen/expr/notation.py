@@ -73,17 +73,17 @@ def latex_of(name: str) -> str:
     """
     if found := _OF_MARKER.match(name):
         head = _MOTIONS[found[1]] if found[1] else found[2]
-        return _with(head, [*([found[2]] if found[1] else []), _upright(found[3])])
+        return _with(head, [*([found[2]] if found[1] else []), literal(found[3])])
     if found := _ENTRY.match(name):
         head, subs = _head_and_subs(found[1])
         return _with(head, [*subs, found[2]])
     if found := _CALL.match(name):
-        return f"{_with(*_head_and_subs(found[1]))}({_upright(found[2]) if found[2] else ''})"
+        return f"{_with(*_head_and_subs(found[1]))}({literal(found[2]) if found[2] else ''})"
     path, _, own = name.rpartition(".")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", name, re.ASCII) or not own.strip("_"):
         return literal(name)
     head, subs = _head_and_subs(own)
-    return _with(head, [*subs, *([_upright(path)] if path else [])])
+    return _with(head, [*subs, *([literal(path)] if path else [])])
 
 
 def _head_and_subs(name: str) -> tuple[str, list[str]]:
@@ -95,7 +95,7 @@ def _head_and_subs(name: str) -> tuple[str, list[str]]:
         return _MOTIONS[last[0]], [*map(_sub, (first, *parts[:-1])), last[1]]
     head, subs = _first(first)
     if head.startswith(r"\mathrm"):
-        head, subs = _upright(first), []  # leg1_x
+        head, subs = literal(first), []  # leg1_x
     if len(parts) > 1 and parts[0] in _DOTTED:  # theta_dot_max
         head, parts = rf"\{parts[0]}{{{head}}}", parts[1:]
     return head, [*subs, *map(_sub, parts)]
@@ -116,7 +116,7 @@ def _first(word: str) -> tuple[str, list[str]]:
     for size in (1, 2):  # thetaA, omegaAB
         if (letter := _letter(word[:-size])) is not None and len(word) > size + 1 and word[-size:].isupper():
             return letter, [word[-size:]]
-    return _upright(word), []
+    return literal(word), []
 
 
 def _letter(word: str) -> str | None:
@@ -133,11 +133,7 @@ def _sub(part: str) -> str:
         return letter
     if (found := _PART.match(part)) and not found[3] and (letter := _letter(found[1])) is not None:
         return f"{letter}{found[2]}"
-    return _upright(part)
-
-
-def _upright(text: str) -> str:
-    return literal(text)
+    return literal(part)
 
 
 def _with(head: str, subs: list[str]) -> str:
@@ -235,14 +231,9 @@ class Notation:
         return not any(alike.match(self.latex(name)) or numbered.match(self.text(name)) for name in self.names)
 
     def letter(self, *choice: str, with_numbers: bool = False) -> str:
-        r"""A letter of a display that no name is printed as: the first of the choice, or the last with a star.
+        r"""A letter of a display that no name is printed as: the first of the choice (LaTeX), or the last with a star.
 
-        Parameters
-        ----------
-        *choice : str
-            LaTeX, such as ``M``.
-        with_numbers : bool
-            Whether it gets numbers as subscripts, ``M_{12}``, which no name may have either.
+        With numbers it gets these as subscripts, ``M_{12}``, which no name may have either.
         """
         starred = f"{{{choice[-1]}}}^{{\\ast}}"
         return next((letter for letter in choice if self.is_free(letter, with_numbers)), starred)
@@ -324,15 +315,7 @@ class Notation:
 
 
 def dotted(latex: str, order: int) -> str:
-    r"""LaTeX with dots, for derivatives by the time, over its first letter or word.
-
-    Parameters
-    ----------
-    latex : str
-        Of one symbol, such as ``\theta_1``.
-    order : int
-        1, 2 or 3: ``\dot{\theta}_1``, ``\ddot{\theta}_1``, ``\dddot{\theta}_1``.
-    """
+    r"""LaTeX of one symbol with 1, 2 or 3 dots over its first letter or word: ``\ddot{\theta}_1`` of ``\theta_1``."""
     tree = read_latex(latex)
     head = head_of(tree) or tree
     body = head

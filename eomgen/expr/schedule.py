@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import field
+from dataclasses import asdict, field
 from itertools import pairwise
 from typing import Any
 
@@ -18,23 +18,15 @@ from .records import dataclass
 
 @dataclass(frozen=True)
 class Operations:
-    """How many operations evaluate some expressions, each shared node counted once.
-
-    Attributes
-    ----------
-    multiplications, additions, divisions, negations : int
-        Subtractions are additions.
-    functions : mapping of str to int
-        sqrt, sin, pow, ... by name; a sum over pairs of shapes, its derivatives along a direction, ... once each.
-    choices : mapping of str to int
-        abs, sign, min, max, comparisons, logic and select by name.
-    """
+    """How many operations evaluate some expressions, each shared node counted once."""
 
     multiplications: int = 0
-    additions: int = 0
+    additions: int = 0  #: and subtractions
     divisions: int = 0
     negations: int = 0
+    #: sqrt, sin, pow, ... by name; a sum over pairs of shapes, its derivatives along a direction, ... once each
     functions: Mapping[str, int] = field(default_factory=dict)
+    #: abs, sign, min, max, comparisons, logic and select by name
     choices: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -43,29 +35,15 @@ class Operations:
         return self.multiplications + self.additions + self.divisions
 
     def __add__(self, other: Operations) -> Operations:
-        return Operations(
-            self.multiplications + other.multiplications,
-            self.additions + other.additions,
-            self.divisions + other.divisions,
-            self.negations + other.negations,
-            _sum(self.functions, other.functions),
-            _sum(self.choices, other.choices),
-        )
+        merged: dict[str, Any] = other.as_dict()
+        for name, value in self.as_dict().items():
+            both = value + merged[name] if isinstance(value, int) else Counter(value) + Counter(merged[name])
+            merged[name] = both if isinstance(both, int) else dict(sorted(both.items()))
+        return Operations(**merged)
 
     def as_dict(self) -> dict[str, Any]:
         """The counts as plain numbers and dicts, for a metadata file."""
-        return {
-            "multiplications": self.multiplications,
-            "additions": self.additions,
-            "divisions": self.divisions,
-            "negations": self.negations,
-            "functions": dict(self.functions),
-            "choices": dict(self.choices),
-        }
-
-
-def _sum(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
-    return {name: a.get(name, 0) + b.get(name, 0) for name in sorted({*a, *b})}
+        return asdict(self)
 
 
 def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
@@ -95,24 +73,12 @@ def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
 
 @dataclass(frozen=True)
 class Chunk:
-    """A run of statements that can stand in a function of its own.
+    """A run of statements, ids of nodes, that can stand in a function of its own."""
 
-    Attributes
-    ----------
-    statements : tuple of int
-        Node ids in order of evaluation; constants and symbols are not statements.
-    imports : tuple of int
-        Ids made by earlier chunks and used here, ascending.
-    exports : tuple of int
-        Ids made here and used by later chunks, ascending.
-    results : tuple of int
-        Ids made here that are outputs, ascending (an output may also be an export).
-    """
-
-    statements: tuple[int, ...]
-    imports: tuple[int, ...]
-    exports: tuple[int, ...]
-    results: tuple[int, ...]
+    statements: tuple[int, ...]  #: in order of evaluation
+    imports: tuple[int, ...]  #: made by earlier chunks and used here, ascending
+    exports: tuple[int, ...]  #: made here and used by later chunks, ascending
+    results: tuple[int, ...]  #: made here that are outputs, ascending; one may also be an export
 
 
 def order(outputs: Sequence[Expr]) -> list[int]:
@@ -121,17 +87,7 @@ def order(outputs: Sequence[Expr]) -> list[int]:
     Depth first, operands before their node, and of a node's operands first the one that needs more registers
     (R. Sethi, J. D. Ullman, The generation of optimal code for arithmetic expressions, J. ACM 17 (1970), applied to
     the graph as if it were a tree).  Where a graph is so shared that the order in which it was made needs fewer live
-    values, that order is taken.
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
-        Expressions of one graph.
-
-    Returns
-    -------
-    list of int
-        Ids of all operations, each once, after its operands; constants and symbols are not among them.
+    values, that order is taken.  Constants and symbols are not in it.
     """
     graph = common_graph(outputs)
     if graph is None:
@@ -197,19 +153,9 @@ def _last_uses(graph: Graph, statements: Sequence[int]) -> dict[int, int]:
 
 
 def crossings(graph: Graph, statements: Sequence[int]) -> list[int]:
-    """How many values cross each place between statements.
+    """How many values are made by ``statements[:k]`` and used in ``statements[k:]``, for k of 0 to n.
 
-    Parameters
-    ----------
-    graph : Graph
-    statements : sequence of int
-        An order as :func:`order` gives it.
-
-    Returns
-    -------
-    list of int
-        Entry ``k`` counts the values made by ``statements[:k]`` and used in ``statements[k:]``; length n + 1.  The
-        largest entry is the number of live values the order needs.
+    The largest is the number of live values that the order needs.
     """
     steps = [0] * (len(statements) + 2)
     last = _last_uses(graph, statements)
@@ -230,31 +176,8 @@ def chunk(
     """Cut an order into chunks at its narrow waists.
 
     Each chunk has between half of ``size`` and ``size`` statements (the last one perhaps fewer) and ends where the
-    fewest values cross; of equal places the latest.
-
-    Parameters
-    ----------
-    statements : sequence of int
-        What :func:`order` gave for these outputs.
-    outputs : sequence of Expr
-        The outputs, to tell which statements are results.
-    size : int
-        Most statements in one chunk, and one more where the last is of ``followed``.
-    followed : container of int
-        Statements that stay in one chunk with the next.
-
-    Returns
-    -------
-    list of Chunk
-        In order; together they hold each statement once.
-
-    Raises
-    ------
-    ValueError
-        ``size`` is less than 1.
+    fewest values cross; of equal places the latest.  Statements in ``followed`` stay in one chunk with the next.
     """
-    if size < 1:
-        raise ValueError(f"a chunk has at least 1 statement, not {size}")
     graph = common_graph(outputs)
     if graph is None or not statements:
         return []
@@ -294,14 +217,7 @@ Tape = tuple[list[Instruction], list[float], list[int]]
 
 
 def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, int]]) -> Tape:
-    """One tape for several expressions.
-
-    Parameters
-    ----------
-    expressions : sequence of Expr
-        Each of a graph of its own, or of the same.
-    place : callable
-        Name of a symbol -> its kind (``t``, ``x``, ``u``, ``p``) and index.
+    """One tape for several expressions; ``place`` gives a symbol its kind (``t``, ``x``, ``u``, ``p``) and index.
 
     Raises
     ------

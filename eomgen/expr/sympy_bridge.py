@@ -17,7 +17,7 @@ from sympy.matrices.matrixbase import MatrixBase
 from ..base.operations import CONDITION, OPERATIONS
 from ..errors import EomgenError
 from .core import LEAVES, Expr, Graph, common_graph, reachable
-from .shown import is_tower, parts_of, shortened
+from .texts import is_tower, parts_of, shortened
 
 # -- from SymPy --------------------------------------------------------------------------------------------------------
 
@@ -40,23 +40,7 @@ ARGUMENT = 1e6  #: of a function that SymPy evaluates
 
 
 class LoweringError(EomgenError, code="EG-EXPRESSION"):
-    """A SymPy expression has no meaning as a real function of known quantities.
-
-    Attributes
-    ----------
-    expression : sympy.Basic
-        The part at fault (the first of them, if there are several).
-    reason : str
-        What is wrong and what is allowed.
-    unresolved : tuple of sympy.Basic
-        All symbols and functions that have no meaning, sorted by name.
-    """
-
-    def __init__(self, expression: Any, reason: str, unresolved: Sequence[Any] = ()) -> None:
-        super().__init__(reason)
-        self.expression = expression
-        self.reason = reason
-        self.unresolved = tuple(unresolved)
+    """A SymPy expression has no meaning as a real function of known quantities."""
 
 
 class _Fault(Exception):
@@ -64,21 +48,10 @@ class _Fault(Exception):
 
 
 def lower(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
-    """Build a SymPy expression in a graph.
+    """Build a SymPy scalar or a number in a graph.
 
-    Parameters
-    ----------
-    graph : Graph
-        Where to build.
-    expression : sympy.Basic or number
-        A scalar.
-    resolve : callable
-        Gives the meaning of a symbol, an applied function such as ``q(t)``, a ``Derivative`` or anything else that is
-        not known here; None if it has none.
-
-    Returns
-    -------
-    Expr
+    ``resolve`` gives the meaning of a symbol, an applied function such as ``q(t)``, a ``Derivative`` or anything else
+    that is not known here; None if it has none.
 
     Raises
     ------
@@ -89,7 +62,7 @@ def lower(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
         expression = sympy.Float(expression, 17) if isinstance(expression, float) else sympy.Integer(expression)
     if isinstance(expression, MatrixBase) or not isinstance(expression, sympy.Basic):
         kind = type(expression).__name__
-        raise LoweringError(expression, f"a SymPy scalar is expected, not {kind}")
+        raise LoweringError(f"a SymPy scalar is expected, not {kind}")
     walk = _Walk(graph, resolve)
     result = walk.run(expression)
     if walk.unresolved or walk.faults:
@@ -108,8 +81,7 @@ def _error(walk: _Walk) -> LoweringError:
         )
         declare = "declare functions first, by model.table or model.native" if functions else "declare them"
         lines.append(f"unknown names {names}; {declare}")
-    first = walk.faults[0][0] if walk.faults else unresolved[0]
-    return LoweringError(first, "\n".join(lines), unresolved)
+    return LoweringError("\n".join(lines))
 
 
 class _Walk:
@@ -307,14 +279,8 @@ def _product(g: Graph, ids: Sequence[int]) -> int:
             below.append(node[2])
         else:
             above.append(i)
-    if not below:
-        return reduce(g.mul, [*numbers, *above]) if not numbers else g.mul(reduce(g.mul, numbers), _all(g, above))
-    top = g.mul(reduce(g.mul, numbers, g.one.id), _all(g, above))
-    return g.div(top, reduce(g.mul, below))
-
-
-def _all(g: Graph, ids: Sequence[int]) -> int:
-    return reduce(g.mul, ids) if ids else g.one.id
+    top = g.mul(reduce(g.mul, numbers, g.one.id), reduce(g.mul, above, g.one.id))
+    return g.div(top, reduce(g.mul, below)) if below else top
 
 
 def _known() -> str:

@@ -111,7 +111,7 @@ def skew(a: Vec3) -> Mat3:
     return ((o, -a[2], a[1]), (a[2], o, -a[0]), (-a[1], a[0], o))
 
 
-def axis_of(rotation: Mat3) -> int | None:
+def _axis_of(rotation: Mat3) -> int | None:
     """The coordinate axis that a rotation turns about by an angle; None for other rotations and quarter turns."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -126,7 +126,7 @@ def axis_of(rotation: Mat3) -> int | None:
 
 def rotate_symmetric(rotation: Mat3, a: Mat3) -> Mat3:
     """R a R^T of a symmetric a."""
-    k = axis_of(rotation)
+    k = _axis_of(rotation)
     if k is not None:
         return symmetric(_turn(rotation, a, k))
     half = vec.product(rotation, a)
@@ -136,7 +136,7 @@ def rotate_symmetric(rotation: Mat3, a: Mat3) -> Mat3:
 
 def rotate(rotation: Mat3, a: Mat3) -> Mat3:
     """R a R^T"""
-    k = axis_of(rotation)
+    k = _axis_of(rotation)
     if k is not None:
         return _turn(rotation, a, k)
     return vec.product(vec.product(rotation, a), vec.transpose(rotation))

@@ -13,7 +13,7 @@ from ..base.limits.numbers import BY_CHANCE, LARGE_LOOP, ROUNDED, SMALL_LOOP, TI
 from ..base.scales import Scales, Space
 from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.evaluate import Evaluator
-from ..expr.identity import is_rounding, terms_of, with_bounds, with_likely_bounds
+from ..expr.identity import is_rounding, terms_of, with_bounds
 from .kinematics import Kinematics
 
 # -- typical sizes -----------------------------------------------------------------------------------------------------
@@ -238,7 +238,7 @@ def _numbers(kinematics: Kinematics, place: Mapping[Expr, Expr]) -> dict[str, fl
 
 def _lengths_at(gradients: Sequence[Sequence[Expr]], numbers: Mapping[str, float]) -> list[Length]:
     """The lengths of some gradients at one place; what they share is evaluated once."""
-    values, bounds = with_likely_bounds([x for gradient in gradients for x in gradient], numbers)
+    values, bounds = with_bounds([x for gradient in gradients for x in gradient], numbers, likely=True)
     ends = np.cumsum([len(gradient) for gradient in gradients])[:-1]
     return [_length_of(*parts) for parts in zip(np.split(values, ends), np.split(bounds, ends), strict=True)]
 

@@ -16,7 +16,7 @@ from ..elements.constraints.switching import event_of, is_switched, state_of
 from ..elements.dimensions import NONE
 from ..elements.kinds import LAW, MOTION, OUTPUT, Fields
 from ..expr.core import LEAVES, Expr, is_comparison, reachable, substitute, symbols_of
-from ..expr.shown import quoted, shown
+from ..expr.texts import quoted, shown
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, STATE

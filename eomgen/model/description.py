@@ -17,7 +17,7 @@ from ..elements.kinds import Table
 from ..elements.kinds import is_zero as is_zero
 from ..elements.kinds import items as items
 from ..errors import Problem, cannot
-from ..expr.shown import NO_TEXT, shortened, shown
+from ..expr.texts import NO_TEXT, shortened, shown
 
 GROUND_NAME = "ground"
 

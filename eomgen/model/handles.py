@@ -9,7 +9,7 @@ from ..base import texts
 from ..elements.joints import JOINTS
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.records import dataclass
-from ..expr.shown import shown
+from ..expr.texts import shown
 from .build_elements import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
 from .mechanism import velocity_names

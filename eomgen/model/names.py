@@ -15,7 +15,7 @@ from ..elements.frames import Marker
 from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from ..errors import ExpressionError
 from ..expr.core import Expr, Graph, symbols_of
-from ..expr.shown import quoted
+from ..expr.texts import quoted
 from .description import Faults
 from .quantities import ACCELERATIONS, COM, ONE_OR_TWO, QUANTITIES, TOTALS, TURNING, Named, Quantity, call_of
 

@@ -27,7 +27,7 @@ from ..contact.states import (
 )
 from ..elements import kinds
 from ..expr.core import Expr
-from ..expr.shown import shown
+from ..expr.texts import shown
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items

@@ -17,7 +17,7 @@ from ..expr.core import Expr, Graph
 from ..expr.functions import Function
 from ..expr.latex import GREEK, NotationError, read_latex
 from ..expr.notation import split_rate
-from ..expr.shown import parts_of, quoted, shortened
+from ..expr.texts import parts_of, quoted, shortened
 from .description import Description, items
 from .expressions import parse
 from .names import RATES, fault_of_name, unique
@@ -169,7 +169,7 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
     try:
         return lower(graph, expression, meaning)
     except LoweringError as error:
-        raise ExpressionError(error.reason.replace("\n", "; ")) from None
+        raise ExpressionError(str(error.args[0]).replace("\n", "; ")) from None
 
 
 def _parts(expressions: list[Any]) -> Iterator[Any]:

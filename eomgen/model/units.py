@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..base.names import closest
 from ..elements import dimensions
 from ..elements.dimensions import Dimension
-from ..expr.shown import quoted
+from ..expr.texts import quoted
 
 if TYPE_CHECKING:
     import pint

@@ -25,7 +25,7 @@ from ..errors import ExpressionError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.latex import NotationError, read_latex, spaced
-from ..expr.shown import quoted, shown
+from ..expr.texts import quoted, shown
 from ..expr.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of

@@ -18,8 +18,7 @@ from ..base.texts import visible
 from ..elements import kinds
 from ..elements.kinds import Field, items
 from ..errors import ModelError, Problem, UsageError, cannot
-from ..expr.languages import comment_text, yaml_quoted
-from ..expr.shown import shortened
+from ..expr.texts import comment_text, shortened, yaml_quoted
 from .components import Components
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults
 from .fields import MODEL, PARTS, SHORT, fields_of

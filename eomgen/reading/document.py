@@ -11,7 +11,7 @@ from ..base.results import image_html
 from ..base.texts import html_text, visible
 from ..expr.notation import Notation
 from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
-from ..expr.printing.formula import Formula, Letter, MatrixOf
+from ..expr.printing.formula import Formula, Letter, Matrix
 from ..expr.printing.writers import row
 
 # -- parts of a document -----------------------------------------------------------------------------------------------
@@ -101,7 +101,7 @@ SHORT = 32  #: characters of a side that leaves room for another one in its line
 def _in_one_line(formula: FormulaLine, rows: Sequence[str], names: Notation) -> bool:
     """Whether all sides go into one line: there is one right side that is no long sum, or all are short."""
     trees = [side for side in formula.sides if not isinstance(side, Letter)]
-    return len(rows) < 2 or all(not isinstance(x, MatrixOf) and len(text(x, names)) <= SHORT for x in trees)
+    return len(rows) < 2 or all(not isinstance(x, Matrix) and len(text(x, names)) <= SHORT for x in trees)
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------

@@ -14,9 +14,9 @@ from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
 from ..expr.evaluate import evaluate
 from ..expr.notation import Notation
-from ..expr.shown import quoted
 from ..expr.spatial import Wrench
 from ..expr.tensors import solve_symmetric
+from ..expr.texts import quoted
 from ..expr.vectors import Vec3
 from ..mechanics import Kinematics
 from ..mechanics.methods.free_bodies import FreeBodies

@@ -25,12 +25,12 @@ from ..expr.printing.formula import (
     RATE,
     Formula,
     Letter,
-    MatrixOf,
+    Matrix,
     Name,
-    NumberPart,
+    Number,
     Product,
     Relation,
-    SumOf,
+    Sum,
     Words,
 )
 from ..expr.printing.writers import TIGHT
@@ -217,7 +217,7 @@ class PrintedEquations:
     @property
     def column(self) -> Formula:
         """v' as it is multiplied by M."""
-        return self.accelerations[0] if self.is_one_equation else MatrixOf(tuple((x,) for x in self.accelerations))
+        return self.accelerations[0] if self.is_one_equation else Matrix(tuple((x,) for x in self.accelerations))
 
     # -- what a page shows --------------------------------------------------------------------------------------------
     @cached_property
@@ -245,10 +245,10 @@ class PrintedEquations:
 
     def _motion(self) -> Iterator[Piece]:
         """M v' = f written out where it fits on a page, else in letters, and their entries."""
-        M, f = MatrixOf(tuple(map(tuple, self.mass_matrix))), MatrixOf(tuple((x,) for x in self.force))
+        M, f = Matrix(tuple(map(tuple, self.mass_matrix))), Matrix(tuple((x,) for x in self.force))
         if self.is_one_equation and self.fits:
             factor = M.rows[0][0]
-            left = self.column if factor == NumberPart("1") else Product((factor, self.column))
+            left = self.column if factor == Number("1") else Product((factor, self.column))
             yield FormulaLine((left, self.force[0]))
         elif len(self.accelerations) > 1 and self.fits:
             yield FormulaLine((Product((M, self.column)), f))
@@ -282,7 +282,7 @@ class PrintedEquations:
         """Entries of M on and below its diagonal that do not vanish, then those of f."""
         for i, row in enumerate(self.mass_matrix):
             for j, x in enumerate(row[: i + 1]):
-                if x != NumberPart("0"):
+                if x != Number("0"):
                     yield PrintedEntry(self.letters.mass, (j + 1, i + 1), x)
         for i, x in enumerate(self.force):
             yield PrintedEntry(self.letters.force, (i + 1,), x)
@@ -290,7 +290,7 @@ class PrintedEquations:
     @property
     def vanishing(self) -> bool:
         """Whether entries of M vanish."""
-        return any(x == NumberPart("0") for row in self.mass_matrix for x in row)
+        return any(x == Number("0") for row in self.mass_matrix for x in row)
 
     @property
     def told(self) -> str:
@@ -319,7 +319,7 @@ class PrintedEquations:
         return self._width(self.mass_matrix) <= PAGE
 
     def _width(self, rows: list[list[Formula]]) -> float:
-        return width(MatrixOf(tuple(map(tuple, rows))), self.names)
+        return width(Matrix(tuple(map(tuple, rows))), self.names)
 
     @property
     def coordinates(self) -> list[PrintedCoordinate]:
@@ -382,7 +382,7 @@ TITLES = {
     PartMeaning.FORCE: "right side",
     PartMeaning.CONSTRAINT_RATE: "velocity terms of the constraints",
 }
-ZERO = NumberPart("0")
+ZERO = Number("0")
 NUMBERED = re.compile(r"z\d+")  #: names that say nothing
 
 
@@ -460,17 +460,17 @@ class PrintedParts:
         mass, force, C, gamma = (Letter(matrix.letter) for matrix in self._matrices)
         B, a, w = self._letter("B", "P"), self._letter("a", "b"), self._letter("v_t", "w_t")
         transposed, rates = Letter(raised(B, "T")), Letter(dotted(w, 1))
-        rest = SumOf(((False, force), (True, Product((mass, Letter(a))))))
+        rest = Sum(((False, force), (True, Product((mass, Letter(a))))))
         yield _row((M, Product((transposed, mass, Letter(B)))), (f, Product((transposed, rest))))
         every = [Name(acceleration_name(name)) for name in k.velocity_names]
         free = [x for x, label in zip(every, k.velocity_labels, strict=True) if label in self._free]
-        constrained = SumOf(((False, Product((C, rates))), (False, gamma)))
+        constrained = Sum(((False, Product((C, rates))), (False, gamma)))
         of_all = f"${mass.latex}$ and ${force.latex}$ are of all accelerations of the tree, ${rates.latex}$ = ("
         yield Sentence((of_all, *listed(every), "). With the constraints ", constrained, " = 0,"))
         C_d, C_i, B_d, a_d = (f"{x}_{part}" for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
-        moved = SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
+        moved = Sum(((False, Product((Letter(B), v))), (False, Letter(a))))
         inverse = Letter(raised(C_d, "{-1}"))
-        solved = ((Letter(x), SumOf(((True, Product((inverse, y))),))) for x, y in ((B_d, Letter(C_i)), (a_d, gamma)))
+        solved = ((Letter(x), Sum(((True, Product((inverse, y))),))) for x, y in ((B_d, Letter(C_i)), (a_d, gamma)))
         yield _row((rates, moved), *solved)
         of_others = f"${B_d}$ and ${a_d}$ are the rows of the other accelerations; in the rows of ${v.latex}$, ${B}$ is"
         of_free = f"where ${C_i}$ holds the columns of ${C.latex}$ that belong to "
@@ -510,7 +510,7 @@ class PrintedParts:
         stem = M.letter.removesuffix("_t")
         diagonal = (Letter(rf"\mathbf{{{stem}}}_{{{k + 1}}}") for k in range(len(columns)))
         rows = [[x if i == k else ZERO for i in range(len(columns))] for k, x in enumerate(diagonal)]
-        yield _row((Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))))
+        yield _row((Letter(M.letter), Matrix(tuple(map(tuple, rows)))))
         rows = [
             [
                 Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
@@ -518,7 +518,7 @@ class PrintedParts:
             ]
             for a, r in enumerate(blocks.equations)
         ]
-        yield _row((Letter(C.letter), MatrixOf(tuple(map(tuple, rows)))))
+        yield _row((Letter(C.letter), Matrix(tuple(map(tuple, rows)))))
 
     @property
     def _zeros(self) -> tuple[str, ...]:
@@ -557,10 +557,10 @@ class PrintedParts:
             return True
         if (part := self._part(entry)) is not None:
             return not matrix.is_column and (part in self._entry_letters or self._meaning[part] == PartMeaning.CONSTANT)
-        is_sum = isinstance(entry, SumOf) and len(entry.terms) > 1
+        is_sum = isinstance(entry, Sum) and len(entry.terms) > 1
         return not matrix.is_column and not is_sum and len(text(entry, self.names)) <= self.short
 
-    def _pattern(self, matrix: _Matrix) -> MatrixOf:
+    def _pattern(self, matrix: _Matrix) -> Matrix:
         """A matrix with letters for its long entries, of a symmetric one the upper half."""
         first = self._first_places(matrix)
         rows: list[list[Formula]] = [
@@ -571,7 +571,7 @@ class PrintedParts:
             for i, row in enumerate(rows):
                 row[:i] = [Words("", "")] * i
             rows[-1][0] = Words("sym.", r"\text{sym.}")
-        return MatrixOf(tuple(map(tuple, rows)))
+        return Matrix(tuple(map(tuple, rows)))
 
     def _entries(self, matrix: _Matrix) -> Iterator[tuple[Any, FormulaLine]]:
         """What the letters of a matrix stand for, in SymPy and as it is printed, those of named parts left out."""
@@ -594,7 +594,7 @@ class PrintedParts:
 
     def _part(self, entry: Formula) -> str | None:
         """The named part that an entry is, perhaps subtracted."""
-        part = entry.terms[0][1] if isinstance(entry, SumOf) and len(entry.terms) == 1 else entry
+        part = entry.terms[0][1] if isinstance(entry, Sum) and len(entry.terms) == 1 else entry
         return part.name if isinstance(part, Name) and part.name in self._meaning else None
 
     @cached_property

@@ -9,7 +9,7 @@ from ..base.texts import fold, html_text, visible
 from ..expr.latex import SUPERSCRIPTS, read_latex, text_form
 from ..expr.notation import Notation
 from ..expr.printing import latex, text
-from ..expr.printing.formula import DIGITS, ROUNDED, MatrixOf, times
+from ..expr.printing.formula import DIGITS, ROUNDED, Matrix, times
 from ..expr.printing.writers import TIGHT
 from .document import Folded, FormulaLine, Look, Piece, Row, Sentence, Table, Text, html, tex_formula, written
 from .printed import (
@@ -151,7 +151,7 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
     def equation(line: FormulaLine) -> Iterator[str]:
         left, right = line.sides
         rows = _rows(parts, line)
-        if not isinstance(right, MatrixOf):
+        if not isinstance(right, Matrix):
             yield from _wrapped(f"{text(left, parts.names)} = ", text(right, parts.names), columns)
         elif max(map(len, rows)) <= columns:
             yield from ("", *map(plain, rows))
@@ -185,7 +185,7 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
 def _rows(parts: PrintedParts, line: FormulaLine) -> list[str]:
     """A matrix in rows; none of what is no matrix."""
     left, right = line.sides
-    if not isinstance(right, MatrixOf):
+    if not isinstance(right, Matrix):
         return []
     before = f"  {text(left, parts.names)} = "
     return _matrix([[text(x, parts.names) for x in entries] for entries in right.rows], before)

@@ -73,13 +73,6 @@ FAULTS = (
         "tests/core/test_simplified.py::test_as_by_hand[cos(A)*cos(B) - sin(A)*sin(B)-cos(A + B)]",
     ),
     Fault(
-        "form-half-turn", "JoinedAngles._quarter_turns",
-        '{("sin", 2): -1, ("sin", 3): -1, ("cos", 1): -1, ("cos", 2): -1}',
-        '{("sin", 2): -1, ("sin", 3): -1, ("cos", 2): -1}',
-        "cos(a + pi/2) becomes sin a",
-        "tests/core/test_simplified.py::test_as_by_hand[cos(A + pi/2)--sin(A)]",
-    ),
-    Fault(
         "form-signed-root", "Expansion._root",
         'self.atoms.poly("abs", (freeze({base: 1}),))',
         "{base: 1}",

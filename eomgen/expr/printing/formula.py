@@ -24,10 +24,7 @@ Key = tuple[Any, ...]
 class Order:
     """The order of names, and what follows from it for factors and terms.
 
-    Parameters
-    ----------
-    kinds : mapping of str to int
-        Name -> one of the kinds of this file, in the order of declaration; names that are not in it are intermediates.
+    ``kinds`` gives names their kind, of those above, in the order of declaration; other names are intermediates.
     """
 
     def __init__(self, kinds: Mapping[str, int]) -> None:
@@ -136,7 +133,7 @@ def _flat(keys: Iterable[Any]) -> tuple[str, ...]:
 # -- the tree ----------------------------------------------------------------------------------------------------------
 
 
-class NumberPart(NamedTuple):
+class Number(NamedTuple):
     """A number without a sign, as it is printed; ``power`` is the power of ten after it."""
 
     digits: str
@@ -155,7 +152,7 @@ class Letter(NamedTuple):
     latex: str
 
 
-class SumOf(NamedTuple):
+class Sum(NamedTuple):
     """Terms, each with whether it is subtracted."""
 
     terms: tuple[tuple[bool, Formula], ...]
@@ -181,7 +178,7 @@ class Power(NamedTuple):
     exponent: Formula
 
 
-class CallOf(NamedTuple):
+class Call(NamedTuple):
     """A function of arguments: ``sin``, ``sqrt``, ``abs``, ``min``, ..."""
 
     function: str
@@ -195,13 +192,13 @@ class Relation(NamedTuple):
     sides: tuple[Formula, ...]
 
 
-class PiecewiseOf(NamedTuple):
+class Cases(NamedTuple):
     """Values and the conditions under which they hold; the last may hold otherwise."""
 
     branches: tuple[tuple[Formula, Formula | None], ...]
 
 
-class MatrixOf(NamedTuple):
+class Matrix(NamedTuple):
     """Formulas in rows."""
 
     rows: tuple[tuple[Formula, ...], ...]
@@ -214,9 +211,7 @@ class Words(NamedTuple):
     latex: str
 
 
-Formula = (
-    NumberPart | Name | Letter | SumOf | Product | Quotient | Power | CallOf | Relation | PiecewiseOf | MatrixOf | Words
-)
+Formula = Number | Name | Letter | Sum | Product | Quotient | Power | Call | Relation | Cases | Matrix | Words
 
 
 def times(formula: Formula, factor: Formula) -> Formula:
@@ -226,7 +221,7 @@ def times(formula: Formula, factor: Formula) -> Formula:
             return formula._replace(above=times(formula.above, factor))
         case Product():
             return Product((*formula.factors, factor))
-        case NumberPart("1", ""):
+        case Number("1", ""):
             return factor
         case _:
             return Product((formula, factor))
@@ -234,24 +229,19 @@ def times(formula: Formula, factor: Formula) -> Formula:
 
 def is_group(formula: Formula) -> bool:
     """Whether a formula needs parentheses to be one factor."""
-    return isinstance(formula, SumOf | Relation)
-
-
-def is_number(formula: Formula) -> bool:
-    """Whether a formula is a number without a sign."""
-    return isinstance(formula, NumberPart)
+    return isinstance(formula, Sum | Relation)
 
 
 def is_simple(formula: Formula) -> bool:
     """Whether a formula is one symbol."""
-    return isinstance(formula, Name | Letter) or (isinstance(formula, NumberPart) and not formula.power)
+    return isinstance(formula, Name | Letter) or (isinstance(formula, Number) and not formula.power)
 
 
 # -- from SymPy --------------------------------------------------------------------------------------------------------
 
 
-_SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
-_LOGIC = {"And": "and", "Or": "or"}
+_SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "=",
+          "And": "and", "Or": "or"}  # fmt: skip
 DIGITS = 15  #: of a decimal that is meant as it stands
 PRINTED = 8  #: digits up to which a decimal is printed in full
 ROUNDED = 6  #: digits of one with more, in displays
@@ -261,20 +251,9 @@ _NAMES = {"Abs": "abs", "Max": "max", "Min": "min", "log": "ln", "ceiling": "cei
 class Formulas:
     """Makes trees of expressions; parts that appear again are made once.
 
-    Parameters
-    ----------
-    order : Order
-    numbers : mapping of str to float, optional
-        Numbers that stand in the places of names.
-    digits : int, optional
-        Of decimals that have more than ``PRINTED``; all of them by default.
-
-    Attributes
-    ----------
-    rounded : bool
-        Whether a number has more digits than are printed, in what was made up to now.
-    signs : bool
-        Whether sgn(x) stands for x / |x| in it, which has no value at x = 0.
+    ``numbers`` stand in the places of names; decimals that have more than ``PRINTED`` digits get ``digits`` of them.
+    Of what was made up to now, ``rounded`` tells whether a number has more digits than are printed, ``signs`` whether
+    sgn(x) stands for x / |x|, which has no value at x = 0.
     """
 
     def __init__(self, order: Order, numbers: Mapping[str, float] | None = None, digits: int = DIGITS) -> None:
@@ -285,7 +264,7 @@ class Formulas:
     def __call__(self, expression: Any) -> Formula:
         """The tree of an expression or a matrix."""
         if isinstance(expression, sympy.MatrixBase):
-            return MatrixOf(tuple(tuple(map(self, row)) for row in expression.tolist()))
+            return Matrix(tuple(tuple(map(self, row)) for row in expression.tolist()))
         found = self._made.get(expression)
         if found is None:
             found = self._made[expression] = self._formula(expression)
@@ -295,10 +274,10 @@ class Formulas:
         if x.is_Symbol:
             return Name(x.name)
         if x.is_Add:
-            return SumOf(tuple(self._signed(term) for term in self.order.terms(x.args)))
+            return Sum(tuple(self._signed(term) for term in self.order.terms(x.args)))
         if x.is_Mul or x.is_Number:
             subtracted, term = self._signed(x)
-            return SumOf(((True, term),)) if subtracted else term
+            return Sum(((True, term),)) if subtracted else term
         if x.is_Pow:
             return self._power(x.base, x.exp)
         if isinstance(x, AppliedUndef) and x.args == (sympy.Symbol("t"),):
@@ -307,14 +286,14 @@ class Formulas:
             return Name(f"{x.expr.func.__name__}_{'d' * int(x.variable_count[0][1])}ot")
         if isinstance(x, sympy.Piecewise):
             branches = ((self(value), None if when == sympy.true else self(when)) for value, when in x.args)
-            return PiecewiseOf(tuple(branches))
+            return Cases(tuple(branches))
         kind = type(x).__name__
-        if kind in _SIGNS or kind in _LOGIC:
-            return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))
+        if kind in _SIGNS:
+            return Relation(_SIGNS[kind], tuple(map(self, x.args)))
         if kind == "delta":  # the variation of a name, which no number stands for
-            return CallOf(kind, (Name(x.args[0].name),))
+            return Call(kind, (Name(x.args[0].name),))
         if isinstance(x, sympy.Function | sympy.Max | sympy.Min) and x.args:
-            return CallOf(_NAMES.get(kind, kind), tuple(map(self, x.args)))
+            return Call(_NAMES.get(kind, kind), tuple(map(self, x.args)))
         if x == sympy.pi:
             return Name("pi")
         return Words(str(x), sympy.latex(x))
@@ -336,14 +315,14 @@ class Formulas:
         if not number.is_Rational:
             upper = (self._decimal(number), *upper)
         elif number.q == 1:
-            upper = (NumberPart(str(number)), *upper) if number != 1 or not upper else upper
+            upper = (Number(str(number)), *upper) if number != 1 or not upper else upper
         elif decimal := _as_decimal(number):
-            upper = (NumberPart(decimal), *upper)
+            upper = (Number(decimal), *upper)
         elif lower:
-            upper = (NumberPart(str(number.p)), *upper) if number.p != 1 or not upper else upper
-            lower = (NumberPart(str(number.q)), *lower)
+            upper = (Number(str(number.p)), *upper) if number.p != 1 or not upper else upper
+            lower = (Number(str(number.q)), *lower)
         else:
-            upper = (Quotient(NumberPart(str(number.p)), NumberPart(str(number.q))), *upper)
+            upper = (Quotient(Number(str(number.p)), Number(str(number.q))), *upper)
         return subtracted, Quotient(_product(upper), _product(lower)) if lower else _product(upper)
 
     def _with_signs(self, above: list[Any], below: list[Any]) -> tuple[list[Any], list[Any]]:
@@ -363,8 +342,8 @@ class Formulas:
         if not x.is_Float or not x.is_finite:
             return Words(str(x), sympy.latex(x))
         full = number(float(x), DIGITS)
-        part = full if isinstance(full, NumberPart) else full.terms[0][1] if isinstance(full, SumOf) else None
-        kept = not isinstance(part, NumberPart) or len(part.digits.replace(".", "").lstrip("0")) <= PRINTED
+        part = full if isinstance(full, Number) else full.terms[0][1] if isinstance(full, Sum) else None
+        kept = not isinstance(part, Number) or len(part.digits.replace(".", "").lstrip("0")) <= PRINTED
         if kept or self.digits >= DIGITS:
             return full
         self.rounded = True
@@ -375,13 +354,13 @@ class Formulas:
 
     def _power(self, base: Any, exponent: Any) -> Formula:
         if exponent.is_Number and exponent.is_negative:
-            return Quotient(NumberPart("1"), self._power(base, -exponent))
+            return Quotient(Number("1"), self._power(base, -exponent))
         root = _root(base) if (2 * exponent).is_Integer and not exponent.is_Integer else None
         if root is not None:  # (x^2)^(n/2) is |x|^n
-            size = CallOf("abs", (self(root),))
+            size = Call("abs", (self(root),))
             return size if exponent == sympy.Rational(1, 2) else Power(size, self(2 * exponent))
         if exponent == sympy.Rational(1, 2):
-            return CallOf("sqrt", (self(base),))
+            return Call("sqrt", (self(base),))
         if exponent == 1:
             return self(base)
         return Power(self(base), self(exponent))
@@ -409,7 +388,7 @@ def _without(factors: list[Any], x: Any) -> list[Any] | None:
 
 def _product(factors: tuple[Formula, ...]) -> Formula:
     if not factors:
-        return NumberPart("1")
+        return Number("1")
     return factors[0] if len(factors) == 1 else Product(factors)
 
 
@@ -422,13 +401,7 @@ def _as_decimal(number: Any) -> str:
 
 
 def number(value: float, digits: int = 6) -> Formula:
-    """A number of at most so many digits; one below 0 is a sum that subtracts it.
-
-    Parameters
-    ----------
-    value : float
-    digits : int
-    """
+    """A number of at most so many digits; one below 0 is a sum that subtracts it."""
     shown, _, power = f"{abs(value):.{digits}g}".partition("e")
-    part = NumberPart(shown, str(int(power)) if power else "")
-    return SumOf(((True, part),)) if value < 0 else part
+    part = Number(shown, str(int(power)) if power else "")
+    return Sum(((True, part),)) if value < 0 else part

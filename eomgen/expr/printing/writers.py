@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import unicodedata
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
+from typing import ClassVar
 
 from ...base.texts import html_text
 from ..latex import SUPERSCRIPTS, NotationError, mathml_form, read_latex, text_form
@@ -19,12 +20,7 @@ from . import formula as tree
 
 @cache
 def bare_mathml(latex: str) -> str:
-    """The elements of a formula, without ``<math>``.
-
-    Parameters
-    ----------
-    latex : str
-    """
+    """The elements of a formula, without ``<math>``."""
     return "".join(map(_piece, _pieces(latex))).replace("<mo>-</mo>", "<mo>\N{MINUS SIGN}</mo>")
 
 
@@ -52,26 +48,21 @@ def _piece(latex: str) -> str:
 
 
 class FormulaWriter:
-    """Writes the parts of a formula, each kind by the method of ``WRITTEN_BY``.
-
-    Parameters
-    ----------
-    names : Notation
-        How names are printed.
-    """
+    """Writes the parts of a formula, each kind by the method of its name, with names as they are printed."""
 
     minus, plus = " - ", " + "  #: between terms
     negative = "-"  #: before a first term that is subtracted
     grouped: Callable[[str], str]  #: in parentheses
+    relations: ClassVar[dict[str, str]]  #: signs that are written otherwise
 
     def __init__(self, names: Notation) -> None:
         self.names = names
 
     def write(self, formula: tree.Formula) -> str:
         """The text of a formula."""
-        return str(getattr(self, WRITTEN_BY[type(formula)])(formula))
+        return str(getattr(self, type(formula).__name__.lower())(formula))
 
-    def sum(self, formula: tree.SumOf) -> str:
+    def sum(self, formula: tree.Sum) -> str:
         """Terms with their signs."""
         found = ""
         for k, (subtracted, term) in enumerate(formula.terms):
@@ -79,26 +70,14 @@ class FormulaWriter:
             found += (self.negative * subtracted if k == 0 else between) + self.factor(term)
         return found
 
+    def relation(self, formula: tree.Relation) -> str:
+        """Sides with their sign between them."""
+        return f" {self.relations.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
+
     def factor(self, formula: tree.Formula) -> str:
         """A formula in a place where a sum needs parentheses."""
         shown = self.write(formula)
         return self.grouped(shown) if tree.is_group(formula) else shown
-
-
-WRITTEN_BY: dict[type, str] = {
-    tree.NumberPart: "number",
-    tree.Name: "name",
-    tree.Letter: "letter",
-    tree.Words: "words",
-    tree.SumOf: "sum",
-    tree.Product: "product",
-    tree.Quotient: "quotient",
-    tree.Power: "power",
-    tree.CallOf: "call",
-    tree.Relation: "relation",
-    tree.PiecewiseOf: "cases",
-    tree.MatrixOf: "matrix",
-}
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
@@ -110,17 +89,10 @@ _LATEX = {
     "delta": r"\delta",
 }  # fmt: skip
 _NEXT_ROW = r" \\ "
-_LATEX_RELATIONS = {"<=": r"\le", ">=": r"\ge", "and": r"\wedge", "or": r"\vee"}
 
 
 def latex(formula: tree.Formula, names: Notation) -> str:
-    """LaTeX of a formula.
-
-    Parameters
-    ----------
-    formula : Formula
-    names : Notation
-    """
+    """LaTeX of a formula."""
     return _LatexWriter(names).write(formula)
 
 
@@ -132,8 +104,9 @@ def fenced(inside: str) -> str:
 
 class _LatexWriter(FormulaWriter):
     grouped = staticmethod(fenced)
+    relations: ClassVar = {"<=": r"\le", ">=": r"\ge", "and": r"\wedge", "or": r"\vee"}
 
-    def number(self, part: tree.NumberPart) -> str:
+    def number(self, part: tree.Number) -> str:
         return rf"{part.digits} \cdot 10^{{{part.power}}}" if part.power else part.digits
 
     def name(self, part: tree.Name) -> str:
@@ -157,18 +130,15 @@ class _LatexWriter(FormulaWriter):
     def power(self, formula: tree.Power) -> str:
         exponent, base = self.write(formula.exponent), formula.base
         raised = f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}"
-        if isinstance(base, tree.CallOf) and base.function in _LATEX:
-            return self._called(base, raised)
+        if isinstance(base, tree.Call) and base.function in _LATEX:
+            return self.call(base, raised)
         shown = self.write(base)
-        of_abs = isinstance(base, tree.CallOf) and base.function == "abs"
+        of_abs = isinstance(base, tree.Call) and base.function == "abs"
         if not of_abs and (not tree.is_simple(base) or "^" in shown or "'" in shown):
             shown = fenced(shown)
         return f"{shown}{raised}"
 
-    def call(self, formula: tree.CallOf) -> str:
-        return self._called(formula)
-
-    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+    def call(self, formula: tree.Call, power: str = "") -> str:
         inside = ", ".join(map(self.write, formula.arguments))
         if formula.function == "sqrt":
             return rf"\sqrt{{{inside}}}"
@@ -179,17 +149,14 @@ class _LatexWriter(FormulaWriter):
             return f"{name}{power} {inside}"
         return f"{name}{power}{fenced(inside)}"
 
-    def relation(self, formula: tree.Relation) -> str:
-        return f" {_LATEX_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
-
-    def cases(self, formula: tree.PiecewiseOf) -> str:
+    def cases(self, formula: tree.Cases) -> str:
         rows = (
             rf"{self.write(value)} & " + (r"\text{otherwise}" if when is None else rf"\text{{if }} {self.write(when)}")
             for value, when in formula.branches
         )
         return rf"\begin{{cases}}{_NEXT_ROW.join(rows)}\end{{cases}}"
 
-    def matrix(self, formula: tree.MatrixOf) -> str:
+    def matrix(self, formula: tree.Matrix) -> str:
         rows = (" & ".join(map(self.write, row)) for row in formula.rows)
         return rf"\begin{{bmatrix}}{_NEXT_ROW.join(rows)}\end{{bmatrix}}"
 
@@ -199,24 +166,18 @@ class _LatexWriter(FormulaWriter):
 
 #: Between factors and within arguments of functions: lines are broken between terms before they are broken there.
 TIGHT = "\u00a0"
-_TEXT_RELATIONS = {"<=": "≤", ">=": "≥"}
 
 
 def text(formula: tree.Formula, names: Notation) -> str:
-    """One line of text; factors, and whatever stands in arguments of functions, are ``TIGHT`` apart.
-
-    Parameters
-    ----------
-    formula : Formula
-    names : Notation
-    """
+    """One line of text; factors, and whatever stands in arguments of functions, are ``TIGHT`` apart."""
     return _TextWriter(names).write(formula)
 
 
 class _TextWriter(FormulaWriter):
     grouped = staticmethod("({})".format)
+    relations: ClassVar = {"<=": "≤", ">=": "≥"}
 
-    def number(self, part: tree.NumberPart) -> str:
+    def number(self, part: tree.Number) -> str:
         return f"{part.digits}e{part.power}" if part.power else part.digits
 
     def name(self, part: tree.Name) -> str:
@@ -231,9 +192,13 @@ class _TextWriter(FormulaWriter):
     def product(self, formula: tree.Product) -> str:
         """A fraction of numbers stands at the end: ``m l²/3``."""
         first, others = formula.factors[0], formula.factors[1:]
-        if not (isinstance(first, tree.Quotient) and tree.is_number(first.above) and tree.is_number(first.below)):
+        if not (
+            isinstance(first, tree.Quotient)
+            and isinstance(first.above, tree.Number)
+            and isinstance(first.below, tree.Number)
+        ):
             return TIGHT.join(map(self._atom, formula.factors))
-        above = others if first.above == tree.NumberPart("1") else (first.above, *others)
+        above = others if first.above == tree.Number("1") else (first.above, *others)
         return f"{self.product(tree.Product(above))}/{self.write(first.below)}"
 
     def quotient(self, formula: tree.Quotient) -> str:
@@ -246,8 +211,8 @@ class _TextWriter(FormulaWriter):
     def power(self, formula: tree.Power) -> str:
         exponent, base = self.write(formula.exponent), formula.base
         high = exponent.translate(SUPERSCRIPTS) if exponent.isdecimal() else ""
-        of_call = isinstance(base, tree.CallOf)
-        if high and isinstance(base, tree.CallOf) and base.function not in ("abs", "sqrt"):
+        of_call = isinstance(base, tree.Call)
+        if high and isinstance(base, tree.Call) and base.function not in ("abs", "sqrt"):
             return f"{base.function}{high}({self._inside(base)})"
         shown = self.write(base)
         plain = isinstance(base, tree.Name | tree.Words) or (of_call and shown.startswith("|"))
@@ -256,28 +221,25 @@ class _TextWriter(FormulaWriter):
             return shown + high
         return f"{shown}^{exponent}" if exponent.isalnum() else f"{shown}^({exponent})"
 
-    def call(self, formula: tree.CallOf) -> str:
+    def call(self, formula: tree.Call) -> str:
         inside, function = self._inside(formula), formula.function
         if function == "abs":
             return f"|{inside}|"
         rooted = function == "sqrt" and isinstance(formula.arguments[0], tree.Name)
         return f"√{inside}" if rooted else f"{function}({inside})"
 
-    def _inside(self, formula: tree.CallOf) -> str:
+    def _inside(self, formula: tree.Call) -> str:
         """Arguments, in which lines are broken last."""
         return ", ".join(map(self.write, formula.arguments)).replace(" ", TIGHT)
 
-    def relation(self, formula: tree.Relation) -> str:
-        return f" {_TEXT_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
-
-    def cases(self, formula: tree.PiecewiseOf) -> str:
+    def cases(self, formula: tree.Cases) -> str:
         parts = (
             f"{self.write(value)} otherwise" if when is None else f"{self.write(value)} if {self.write(when)}"
             for value, when in formula.branches
         )
         return f"{{{'; '.join(parts)}}}"
 
-    def matrix(self, formula: tree.MatrixOf) -> str:
+    def matrix(self, formula: tree.Matrix) -> str:
         return f"[{'; '.join(', '.join(map(self.write, row)) for row in formula.rows)}]"
 
 
@@ -285,7 +247,6 @@ class _TextWriter(FormulaWriter):
 
 
 _MATHML_FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ"}
-_MATHML_RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
 MINUS_SIGN = "\u2212"
 MINUS = f"<mo>{MINUS_SIGN}</mo>"
 TALL = ("<mfrac", "<mtable", "<msqrt")  #: what is higher than a line
@@ -293,13 +254,7 @@ _THIN = "<mspace width='0.17em'/>"
 
 
 def mathml(formula: tree.Formula, names: Notation) -> str:
-    """Elements of MathML, without ``<math>``.
-
-    Parameters
-    ----------
-    formula : Formula
-    names : Notation
-    """
+    """Elements of MathML, without ``<math>``."""
     return _MathMLWriter(names).write(formula)
 
 
@@ -323,10 +278,10 @@ def table(rows: list[list[str]], style: str = "") -> str:
 
 class _MathMLWriter(FormulaWriter):
     minus, plus, negative = MINUS, "<mo>+</mo>", MINUS
-
     grouped = staticmethod(mathml_fenced)
+    relations: ClassVar = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
 
-    def number(self, part: tree.NumberPart) -> str:
+    def number(self, part: tree.Number) -> str:
         digits = f"<mn>{part.digits}</mn>"
         if not part.power:
             return digits
@@ -341,7 +296,7 @@ class _MathMLWriter(FormulaWriter):
     def words(self, part: tree.Words) -> str:
         return f"<mtext>{html_text(part.text)}</mtext>"
 
-    def sum(self, formula: tree.SumOf) -> str:
+    def sum(self, formula: tree.Sum) -> str:
         return row(super().sum(formula))
 
     def product(self, formula: tree.Product) -> str:
@@ -357,8 +312,8 @@ class _MathMLWriter(FormulaWriter):
 
     def power(self, formula: tree.Power) -> str:
         exponent, base = self.write(formula.exponent), formula.base
-        if isinstance(base, tree.CallOf) and base.function not in ("sqrt", "abs"):
-            return self._called(base, exponent)
+        if isinstance(base, tree.Call) and base.function not in ("sqrt", "abs"):
+            return self.call(base, exponent)
         shown = self.write(base)
         if not tree.is_simple(base):
             shown = mathml_fenced(shown)
@@ -368,10 +323,7 @@ class _MathMLWriter(FormulaWriter):
             shown = mathml_fenced(shown)
         return f"<msup>{shown}{exponent}</msup>"
 
-    def call(self, formula: tree.CallOf) -> str:
-        return self._called(formula)
-
-    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+    def call(self, formula: tree.Call, power: str = "") -> str:
         arguments = "<mo>,</mo>".join(map(self.write, formula.arguments))
         if formula.function == "sqrt":
             return f"<msqrt>{arguments}</msqrt>"
@@ -384,17 +336,17 @@ class _MathMLWriter(FormulaWriter):
         return row(name, mathml_fenced(arguments))
 
     def relation(self, formula: tree.Relation) -> str:
-        sign = html_text(_MATHML_RELATIONS.get(formula.sign, formula.sign))
+        sign = html_text(self.relations.get(formula.sign, formula.sign))
         return row(f"<mo>{sign}</mo>".join(map(self.write, formula.sides)))
 
-    def cases(self, formula: tree.PiecewiseOf) -> str:
+    def cases(self, formula: tree.Cases) -> str:
         rows = []
         for value, when in formula.branches:
             held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if&#160;</mtext>", self.write(when))
             rows.append([self.write(value), held])
         return row("<mo>{</mo>", table(rows, "text-align:left"))
 
-    def matrix(self, formula: tree.MatrixOf) -> str:
+    def matrix(self, formula: tree.Matrix) -> str:
         body = table([list(map(self.write, one)) for one in formula.rows])
         return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"
 
@@ -416,26 +368,18 @@ _HIGH = {*map(chr, SUPERSCRIPTS.values())}
 
 
 def width(formula: tree.Formula, names: Notation) -> float:
-    """About how many letters wide a formula is.
-
-    Parameters
-    ----------
-    formula : Formula
-    names : Notation
-    """
-
-    def of(part: tree.Formula) -> float:
-        return width(part, names)
+    """About how many letters wide a formula is."""
+    of = partial(width, names=names)
 
     def factor(part: tree.Formula) -> float:
         return of(part) + FENCES * tree.is_group(part)
 
     match formula:
-        case tree.NumberPart():
+        case tree.Number():
             return len(formula.digits) + (SIGN + 2 + INDEX * len(formula.power) if formula.power else 0.0)
         case tree.Name() | tree.Letter() | tree.Words():
             return _of_text(text(formula, names))
-        case tree.SumOf():
+        case tree.Sum():
             first = SIGN * formula.terms[0][0]
             return first + sum(factor(x) for _, x in formula.terms) + SIGN * (len(formula.terms) - 1)
         case tree.Product():
@@ -443,9 +387,9 @@ def width(formula: tree.Formula, names: Notation) -> float:
         case tree.Quotient():
             return max(of(formula.above), of(formula.below)) + 2 * SPACE
         case tree.Power():
-            simple = tree.is_simple(formula.base) or isinstance(formula.base, tree.CallOf)
+            simple = tree.is_simple(formula.base) or isinstance(formula.base, tree.Call)
             return of(formula.base) + FENCES * (not simple) + INDEX * of(formula.exponent)
-        case tree.CallOf():
+        case tree.Call():
             inside = sum(map(of, formula.arguments)) + SIGN * (len(formula.arguments) - 1)
             if formula.function in ("sqrt", "abs"):
                 return inside + FENCES
@@ -453,9 +397,9 @@ def width(formula: tree.Formula, names: Notation) -> float:
             return len(formula.function) + fences + inside
         case tree.Relation():
             return sum(map(of, formula.sides)) + SIGN * (len(formula.sides) - 1)
-        case tree.PiecewiseOf():
+        case tree.Cases():
             return FENCES + max(of(x) + (of(when) if when else 9.0) + 2 * COLUMN for x, when in formula.branches)
-        case tree.MatrixOf():
+        case tree.Matrix():
             return FENCES + sum(max(map(of, column)) + COLUMN for column in zip(*formula.rows, strict=True))
 
 
@@ -475,7 +419,7 @@ def sums_in_lines(formula: tree.Formula, names: Notation) -> list[tree.Formula]:
     """
     room = PAGE - LABEL
     wide = isinstance(formula, tree.Product) and width(formula, names) > room
-    given = formula.terms if isinstance(formula, tree.SumOf) else ((False, formula),) if wide else ()
+    given = formula.terms if isinstance(formula, tree.Sum) else ((False, formula),) if wide else ()
     terms = [(subtracted, part) for subtracted, term in given for part in _in_parts(term, names, room)]
     if len(terms) < 2:
         return [formula]
@@ -488,7 +432,7 @@ def sums_in_lines(formula: tree.Formula, names: Notation) -> list[tree.Formula]:
             used = 0.0
         lines[-1].append((subtracted, term))
         used += size
-    return [tree.SumOf(tuple(line)) for line in lines]
+    return [tree.Sum(tuple(line)) for line in lines]
 
 
 def latex_lines(formula: tree.Formula, names: Notation) -> list[str]:
@@ -502,7 +446,7 @@ def mathml_lines(formula: tree.Formula, names: Notation) -> list[str]:
     first, *others = sums_in_lines(formula, names)
     found = [mathml(first, names)]
     for line in others:
-        subtracted = isinstance(line, tree.SumOf) and line.terms[0][0]
+        subtracted = isinstance(line, tree.Sum) and line.terms[0][0]
         shown = mathml(line, names)
         sign = MINUS_SIGN if subtracted else "+"
         found.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
@@ -513,7 +457,7 @@ def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.For
     """A product whose widest sum is cut where it is too wide: of a (b + c + d) a (b + c) and a d."""
     if not isinstance(term, tree.Product) or width(term, names) + SIGN <= room:
         return [term]
-    sums = [x for x in term.factors if isinstance(x, tree.SumOf)]
+    sums = [x for x in term.factors if isinstance(x, tree.Sum)]
     if not sums:
         return [term]
     widest = max(sums, key=lambda x: width(x, names))
@@ -529,4 +473,4 @@ def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.For
             groups.append([])
         groups[-1].append(part)
         used += size
-    return [tree.Product(tuple(tree.SumOf(tuple(g)) if x is widest else x for x in term.factors)) for g in groups]
+    return [tree.Product(tuple(tree.Sum(tuple(g)) if x is widest else x for x in term.factors)) for g in groups]

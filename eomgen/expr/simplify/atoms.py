@@ -28,18 +28,13 @@ SMALL = 1000  #: denominators up to which a number is written as a fraction
 class Atom(NamedTuple):
     """What cannot be split.
 
-    Attributes
-    ----------
-    kind : str
-        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
-        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.base.operations`, or a
-        declared function.
-    what : Any
-        The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.
+    Kinds are ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
+    ``factor`` (a sum in a product), ``name`` (an intermediate), operations of :mod:`eomgen.base.operations`, and
+    declared functions.
     """
 
     kind: str
-    what: Any
+    what: Any  #: the name of a symbol; the Frozen angle of a sine; the Frozen operands of another call
 
 
 Value = TypeVar("Value")
@@ -60,21 +55,13 @@ class PerAtom(Generic[Value]):
 
 
 class Atoms:
-    """A table of interned atoms.
-
-    Attributes
-    ----------
-    names_in : callable
-        The atoms of names that an atom is made of, itself included.
-    choices_in : callable
-        How deep choices between values stand in each other in an atom, itself included.
-    """
+    """A table of interned atoms."""
 
     def __init__(self) -> None:
         self.table: list[Atom] = []
         self._ids: dict[Atom, int] = {}
-        self.names_in = PerAtom(self._names_in)
-        self.choices_in = PerAtom(self._choices_in)
+        self.names_in = PerAtom(self._names_in)  #: the atoms of names that an atom is made of, itself included
+        self.choices_in = PerAtom(self._choices_in)  #: how deep choices between values stand in each other in an atom
 
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
@@ -141,7 +128,7 @@ class Atoms:
         if kind == "sym":
             return self.poly("sym", value)
         amount, of_pi = number(value)
-        return {((self.id("pi", ""), 1),): amount} if of_pi else constant(amount)
+        return {((self.id("pi", ""), 1),) if of_pi else ONE: amount} if amount else {}
 
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""
@@ -179,11 +166,6 @@ def ratio(a: Number, b: Number) -> Number:
 def freeze(poly: Poly) -> Frozen:
     """A polynomial as a key."""
     return tuple(sorted(poly.items()))
-
-
-def constant(value: Number) -> Poly:
-    """The polynomial of a number."""
-    return {ONE: value} if value else {}
 
 
 def add(a: Poly, b: Poly, factor: Number = 1) -> Poly:

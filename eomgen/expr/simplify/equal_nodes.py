@@ -33,22 +33,10 @@ Given = Sequence[tuple[str, Expr]]
 def joined_nodes(
     exprs: Sequence[Expr], given: Given = (), unit: Sequence[Sequence[str]] = ()
 ) -> tuple[list[Expr], list[tuple[str, Expr]]]:
-    """Expressions, and what names in them stand for, with nodes of one function made one node.
+    """Expressions, and what names in them stand for, with nodes of one function made one node, in a graph of their own.
 
-    Parameters
-    ----------
-    exprs : sequence of Expr
-        Expressions of one graph.
-    given : sequence of (str, Expr)
-        Names that stand in the expressions as symbols, and what they stand for, in order.
-    unit : sequence of sequence of str
-        Symbols whose squares have the sum 1, such as the Euler parameters of a joint.
-
-    Returns
-    -------
-    exprs : list of Expr
-        In a graph of their own, in which what a name stands for comes before it.
-    given : list of (str, Expr)
+    ``given`` are names that stand in the expressions as symbols, and what they stand for, in order; ``unit`` symbols
+    whose squares have the sum 1, such as the Euler parameters of a joint.
     """
     roots = [*(x for _, x in given), *exprs]
     if not roots:
@@ -88,12 +76,7 @@ def with_known_conditions(exprs: Sequence[Expr]) -> list[Expr]:
 class Opened:
     """Expressions with symbols for what is no analytic function, as ``max``, or is lost beside others, as ``exp``.
 
-    Attributes
-    ----------
-    roots : list of int
-        The nodes with symbols in them.
-    operands : list of int
-        Those of the operations for which symbols stand.
+    ``roots`` are the nodes with symbols in them, ``operands`` those of the operations for which symbols stand.
     """
 
     def __init__(self, graph: Graph, roots: Sequence[int]) -> None:
@@ -146,16 +129,9 @@ def _copied(graph: Graph, roots: Sequence[int]) -> list[Expr]:
 
 
 class Values:
-    """Values of nodes at random points, with bounds of their rounding.
+    """Values of nodes at random points ``at``, with bounds of their rounding: (POINTS,) arrays by node.
 
-    Attributes
-    ----------
-    values, bounds : dict of int to (POINTS,) array
-    names : sequence of str
-    depends : dict of int to int
-        Bits of the names, by their places, on which a node depends.
-    at : dict of str to (POINTS,) array
-        The points.
+    ``depends`` has the bits of the names, by their places, on which a node depends.
     """
 
     def __init__(

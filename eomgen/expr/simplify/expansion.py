@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import gcd, lcm
 from typing import Any, Generic, TypeVar
@@ -58,26 +58,7 @@ class JoinedAngles:
         if angle[min(angle)] < 0:
             angle = scaled(angle, -1)
             factor = -1 if kind == "sin" else 1
-        quarter = self._quarter_turns(angle)
-        if quarter is not None:
-            return quarter(kind, factor)
         return {((self.atoms.id(kind, freeze(angle)), 1),): factor}
-
-    def _quarter_turns(self, angle: Poly) -> Callable[[str, int], Poly] | None:
-        """Of angle = rest + k pi / 2: what gives its sine or cosine; None where there is no such part."""
-        pi = ((self.atoms.id("pi", ""), 1),)
-        turns = angle.get(pi)
-        if turns is None or isinstance(turns, float) or (2 * turns).denominator != 1:
-            return None
-        rest = {m: x for m, x in angle.items() if m != pi}
-        quarters = int(2 * turns) % 4
-
-        def turned(kind: str, factor: int) -> Poly:
-            other = "cos" if kind == "sin" else "sin"
-            sign = {("sin", 2): -1, ("sin", 3): -1, ("cos", 1): -1, ("cos", 2): -1}.get((kind, quarters), 1)
-            return scaled(self.of_angle(other if quarters % 2 else kind, rest), factor * sign)
-
-        return turned
 
     # -- simplifying
     def simplified(self, poly: Poly) -> Poly:
@@ -285,16 +266,7 @@ class OfNodes(ABC, Generic[Made]):
 
 
 class Expansion(OfNodes[Poly]):
-    """Polynomials of the nodes of one graph, multiplied out.
-
-    Attributes
-    ----------
-    atoms : Atoms
-    angles : JoinedAngles
-        Simplifies sines and cosines.
-    under_roots : set of int
-        Sums of which roots were taken.
-    """
+    """Polynomials of the nodes of one graph, multiplied out; ``under_roots`` are sums of which roots were taken."""
 
     def __init__(self, graph: Graph, work: Work) -> None:
         super().__init__(graph)

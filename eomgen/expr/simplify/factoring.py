@@ -201,14 +201,7 @@ def _whole_root(n: int) -> int:
 
 
 def without_exact_quotients(poly: Poly, atoms: Atoms) -> Poly:
-    """The same polynomial, with what its denominators divide divided by them.
-
-    Parameters
-    ----------
-    poly : Poly
-    atoms : Atoms
-        What it is made of; denominators of several terms are atoms of kind ``sum``.
-    """
+    """The same, with what its denominators, atoms of kind ``sum`` where they have several terms, divide divided."""
     below = {a for m in poly for a, n in m if n <= -1 and atoms.table[a].kind == "sum"}
     for atom in sorted(below):
         poly = _divided_by(poly, atom, atoms)

@@ -33,19 +33,12 @@ SHARED = 1.35  #: how much longer what needs no names may be
 
 @dataclass(frozen=True)
 class Form:
-    """Polynomials in atoms, in which names stand for others.
-
-    Attributes
-    ----------
-    named : list of (int, Poly)
-        The atom of each name and what it stands for, in an order in which each uses only those before it.
-    polys : list of Poly
-    """
+    """Polynomials in atoms, in which names stand for others."""
 
     graph: Graph
     expansion: Expansion
     factoring: Factoring
-    named: Named = field(repr=False)
+    named: Named = field(repr=False)  #: in an order in which each uses only those before it
     polys: list[Poly] = field(repr=False)
 
     @property
@@ -67,16 +60,9 @@ class Form:
     ) -> tuple[list[tuple[Any, Any]], list[Any]]:
         """Named intermediates, each a symbol and its expression, and expressions.
 
-        Parameters
-        ----------
-        symbols : callable, optional
-            Name -> the SymPy object that stands for it; plain symbols by default.
-        parameters : collection of str, optional
-            Names of what is constant.
-        prefix : str, optional
-            Of the names to which better ones are given where there are better ones.
-        roots : bool, optional
-            Whether long roots and denominators that are written several times get names too.
+        ``symbols`` makes SymPy objects of names, ``parameters`` names what is constant.  Names that begin with
+        ``prefix`` are changed for better ones where there are any; with ``roots`` long roots and denominators that are
+        written several times get names too.
         """
         import sympy
 
@@ -138,16 +124,10 @@ def simplify(
 ) -> Form | None:
     """The shortest form found of expressions; None of no expressions.
 
-    Parameters
-    ----------
-    given : sequence of (str, Expr)
-        Names that stand in the expressions as symbols, and what they stand for, in order.
-    rates : collection of str, optional
-        Names of velocities and accelerations; sums of them are read more easily than sums of them and other quantities.
-    prefix : str, optional
-        Other names are ``z0``, ``z1``, ...
-    sizes : sequence of int, optional
-        Operations up to which what is shared is written out each time, one attempt each; ``WHOLE`` writes out all.
+    ``given`` are names that stand in the expressions as symbols, and what they stand for, in order; other names begin
+    with ``prefix``.  ``rates`` names velocities and accelerations: sums of them are read more easily than sums of them
+    and other quantities.  Up to so many operations of ``sizes`` what is shared is written out each time, one attempt
+    each; ``WHOLE`` writes out all.
     """
     graph = common_graph([*exprs, *(x for _, x in given)])
     if graph is None:

@@ -161,24 +161,14 @@ CONSTANT = "k"  #: begins names of what parameters and numbers alone give
 
 
 class GoodNames:
-    """Chooses names.
-
-    Attributes
-    ----------
-    turns : dict of int to str
-        Sines and cosines, by atom, that are worth a name.
-    intermediates : dict of str to str
-        Better names of intermediates.
-    roots : dict of int to (str, int)
-        Long sums that stand in several roots and denominators, by atom: the name of their root, and 2; of the sum
-        itself, and 1, where no root is taken.
-    """
+    """Chooses names."""
 
     def __init__(self, atoms: Atoms, costs: Costs, parameters: Collection[str], taken: Collection[str]) -> None:
         self.atoms, self.costs, self.parameters = atoms, costs, parameters
         self._taken = set(taken)
-        self.turns: dict[int, str] = {}
-        self.intermediates: dict[str, str] = {}
+        self.turns: dict[int, str] = {}  #: of sines and cosines that are worth one
+        self.intermediates: dict[str, str] = {}  #: better names of intermediates
+        #: of long sums in several roots and denominators: the name of the root and 2, or of the sum and 1
         self.roots: dict[int, tuple[str, int]] = {}
 
     def choose_roots(self, named: Named, polys: Sequence[Poly]) -> None:
@@ -276,19 +266,7 @@ LARGE = 60  #: terms of a sum that is compared with others
 
 
 class SharedSums:
-    """Finds what sums have in common, term by term, and puts names in its place.
-
-    Parameters
-    ----------
-    atoms, costs
-        Those of the form.
-    named, polys
-        The form.
-    taken : collection of str
-        Names that are not free.
-    prefix : str
-        New names are this and a number.
-    """
+    """Finds what sums have in common, term by term, and puts names in its place: the prefix and a number."""
 
     def __init__(
         self, atoms: Atoms, costs: Costs, named: Named, polys: list[Poly], taken: Collection[str], prefix: str

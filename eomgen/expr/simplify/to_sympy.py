@@ -42,7 +42,8 @@ class Raising:
 
     def _power(self, atom: int, n: Fraction | int) -> Any:
         symbol, times = self.roots.get(atom, (None, 1))
-        return sympy.Pow(as_number(self._atom(atom)) if symbol is None else symbol, _exponent(times * n))
+        n = times * n
+        return sympy.Pow(symbol or as_number(self._atom(atom)), sympy.Rational(n.numerator, n.denominator))
 
     def root(self, atom: int) -> Any:
         """A sum or its root, written out."""
@@ -85,10 +86,6 @@ class Raising:
             of = self.expression(self.factoring.factored(dict(what[0])))
             return of / sympy.Abs(of)
         return raise_operation(self.graph, kind, [self.expression(self.factoring.factored(dict(p))) for p in what])
-
-
-def _exponent(n: Fraction | int) -> Any:
-    return sympy.Rational(n.numerator, n.denominator)
 
 
 def _number(x: Number) -> Any:
