@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
+from functools import reduce
 
 from ..elements.forces.force import View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
-from .limits import COMMON, FOCAL, NEAREST, TWICE
+from .limits import COMMON, EQUAL, FOCAL, NEAREST, POLISHED, TWICE, UNIQUE
 from .point import Contact, Touch
 from .rounds import along_axis, direction, seen_from, settled
 
@@ -49,30 +51,29 @@ def quadratic_form(R: Mat3, axes: tuple[Expr, Expr, Expr]) -> Mat3:
     return vec.product((x, y, z), vec.transpose(R))
 
 
-def nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec3, Expr]:
-    """The outward normal at the point of an ellipsoid that is nearest to a place, and how far that is outside.
+def nearest(view: View, axes: Sequence[Expr], place: Sequence[Expr]) -> tuple[tuple[Expr, ...], Expr]:
+    """The outward normal at the point of an ellipsoid or an ellipse nearest to a place, and how far that is outside.
 
     The nearest point to p is (a^2 p_x / (t + a^2), ...), where S(t), the sum of (a p_x / (t + a^2))^2, is 1 (Eberly,
     Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid, 2013); t times (p_x / (t + a^2), ...) leads
     from it to p.  Newton's method for 1 / sqrt(S) = 1, which is nearly linear (More and Sorensen, SIAM J. Sci. Stat.
-    Comput. 4, 1983, 553-572), comes to t from the side on which S > 1, where the largest of the three squares is 1, or
+    Comput. 4, 1983, 553-572), comes to t from the side on which S > 1, where the largest of the squares is 1, or
     t = 0 of a centre outside.  Where S is less than 1 there, as about the centre of the ellipsoid, two points on both
     sides of the least axis are nearest (Eberly, section 3); the one on the side of p counts, or the positive one.
     """
     graph = view.graph
     squares = [a * a for a in axes]
     scaled = [a * p for a, p in zip(axes, place, strict=True)]
-    least = graph.apply("min", squares[0], graph.apply("min", squares[1], squares[2]))
+    least = reduce(lambda a, b: graph.apply("min", a, b), squares)
     begin = -(1.0 - FOCAL) * least
     for s, q in zip(scaled, squares, strict=True):
         begin = graph.apply("max", begin, graph.apply("max", s, -s) - q)
-    rises = [p / a for p, a in zip(place, axes, strict=True)]
-    outside = graph.apply("lt", 1.0, rises[0] * rises[0] + rises[1] * rises[1] + rises[2] * rises[2])
+    outside = graph.apply("lt", 1.0, _square([p / a for p, a in zip(place, axes, strict=True)]))
     begin = where(outside, graph.apply("max", begin, 0.0), begin)
 
     def parts_at(t: Expr) -> tuple[list[Expr], Expr]:
         parts = [s / (t + q) for s, q in zip(scaled, squares, strict=True)]
-        return parts, parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]
+        return parts, _square(parts)
 
     t = begin
     for k in range(NEAREST):
@@ -91,9 +92,24 @@ def nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec
         completed = sqrt(where(both, where(graph.apply("lt", 0.0, rest), rest, 1.0), 1.0))
         completed = where(graph.apply("lt", part, 0.0), -completed, completed)
         chosen.append(where(both, where(graph.apply("lt", 0.0, mine), completed, part), part))
-    x, y, z = (s / a for s, a in zip(chosen, axes, strict=True))
-    size = sqrt(x * x + y * y + z * z)
-    return (x / size, y / size, z / size), t * size
+    normal = [s / a for s, a in zip(chosen, axes, strict=True)]
+    size = sqrt(_square(normal))
+    return tuple(x / size for x in normal), t * size
+
+
+def _square(x: Sequence[Expr]) -> Expr:
+    return reduce(lambda a, b: a + b, (one * one for one in x))
+
+
+def least_curvature(axes: Sequence[Expr]) -> Expr:
+    """The least radius of curvature of an ellipsoid, as far as nearest places are taken to be unique.
+
+    Those of the sum of two convex bodies are unique within the sum of their least radii of curvature (W. Blaschke,
+    Kreis und Kugel, 1916).
+    """
+    least = reduce(lambda a, b: a.graph.apply("min", a, b), axes)
+    most = reduce(lambda a, b: a.graph.apply("max", a, b), axes)
+    return UNIQUE * least * least / most
 
 
 @dataclass(frozen=True)
@@ -105,39 +121,39 @@ class EllipsoidRound(Contact):
 
     def touch(self, view: View) -> Touch:
         reach, R, place = seen_from(self, view)
-        return self._touching(view, reach, R, place)
+        return self._touching(reach, R, *nearest(view, self.axes, place))
 
-    def _touching(self, view: View, reach: Vec3, R: Mat3, place: Vec3) -> Touch:
-        """A sphere at a place, at which ``reach`` ends."""
-        normal, gap = nearest(view, self.axes, place)
-        out = vec.times(R, normal)
+    def _touching(self, reach: Vec3, R: Mat3, normal: tuple[Expr, ...], gap: Expr) -> Touch:
+        """A sphere at which ``reach`` ends."""
+        x, y, z = normal
+        out = vec.times(R, (x, y, z))
         depth = self.radius - gap
         second = vec.scale(0.5 * depth - self.radius, out)
         return out, depth, vec.add(reach, second), second
 
 
 def silhouette_normal(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
-    """The unit vector n in a plane for which n r - sqrt(n B n) is greatest, and that root; B is xx, xy, yy."""
+    """The unit vector n in a plane for which n r - sqrt(n B n) is greatest, and that root; B is xx, xy, yy.
+
+    It is the normal of the ellipse of B at the point that is nearest to r, in the axes of B; Newton's steps for the
+    greatest n r - sqrt(n B n) behind it have derivatives where the axes have none, of a circle.
+    """
     graph, (bxx, bxy, byy) = view.graph, form
-    square = r[0] * r[0] + r[1] * r[1]
-    apart = graph.apply("lt", 0.0, square)
-    far, nearest = sqrt(where(apart, square, 1.0)), bxx * byy - bxy * bxy
-    radial = far * sqrt(nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0))
-    t = graph.apply("max", 0.0, radial * (far - radial))
-    nx = where(apart, (byy + t) * r[0] - bxy * r[1], 1.0)
-    ny = where(apart, (bxx + t) * r[1] - bxy * r[0], 0.0)
-    size = sqrt(nx * nx + ny * ny)
-    nx, ny = nx / size, ny / size
-    bx = by = h = graph.zero
-    for k in range(COMMON + 1):
+    mean, half = 0.5 * (bxx + byy), 0.5 * (bxx - byy)
+    square = half * half + bxy * bxy
+    bent = graph.apply("lt", 0.0, square)
+    spread = where(bent, sqrt(where(bent, square, 1.0)), 0.0)
+    double = where(bent, half / where(bent, spread, 1.0), 1.0)  # cosine of twice the angle of the longer axis
+    c, s = (sqrt(graph.apply("max", 0.0, 0.5 + way * 0.5 * double)) for way in (1.0, -1.0))
+    s = where(graph.apply("lt", bxy, 0.0), -s, s)
+    axes = sqrt(mean + spread), sqrt((bxx * byy - bxy * bxy) / (mean + spread))
+    (along, aside), _ = nearest(view, axes, (c * r[0] + s * r[1], c * r[1] - s * r[0]))
+    nx, ny = c * along - s * aside, s * along + c * aside
+    for k in range(POLISHED):
+        if k == POLISHED - 1:
+            nx, ny = settled(view, nx), settled(view, ny)
         bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
         h = sqrt(nx * bx + ny * by)
-        if k == COMMON:
-            break
-        if k == COMMON - 1:
-            nx, ny = settled(view, nx), settled(view, ny)
-            bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
-            h = sqrt(nx * bx + ny * by)
         gx, gy = r[0] - bx / h, r[1] - by / h
         cross = nx * by - ny * bx
         bend = (ny * ny * bxx - 2.0 * nx * ny * bxy + nx * nx * byy) / h - cross * cross / (h * h * h)
@@ -146,7 +162,7 @@ def silhouette_normal(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, 
         nx, ny = nx - step * ny, ny + step * nx
         size = sqrt(nx * nx + ny * ny)
         nx, ny = nx / size, ny / size
-    return nx, ny, h
+    return nx, ny, sqrt(nx * (bxx * nx + bxy * ny) + ny * (bxy * nx + byy * ny))
 
 
 @dataclass(frozen=True)
@@ -156,10 +172,14 @@ class EllipsoidRod(EllipsoidRound):
     It touches as the sphere about that point of its axis which is nearest to the ellipsoid: the signed distance of a
     convex body is convex, so that the nearest point of the whole line, held between the ends, is the nearest.  That of
     the line is found across it, where the ellipsoid is an ellipse, by the normal n that makes n r - sqrt(n B n)
-    greatest, r from the centre to the line, B = R diag(a^2, b^2, c^2) R^T.
+    greatest, r from the centre to the line, B = R diag(a^2, b^2, c^2) R^T.  Of a line deep in a slim ellipsoid that may
+    be another, so that the point nearest to the centre counts where it is nearer.
     """
 
     half: Expr
+
+    def deepest(self, view: View) -> Expr:
+        return self.radius + least_curvature(self.axes)
 
     def touch(self, view: View) -> Touch:
         graph = view.graph
@@ -174,10 +194,16 @@ class EllipsoidRod(EllipsoidRound):
         bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
         nx, ny, h = silhouette_normal(view, r, (bxx, bxy, byy))
         n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
-        s = graph.apply("max", -self.half, graph.apply("min", self.half, form(along, n) / h - vec.dot(along, place)))
-        moved = vec.scale(s, along)
-        arm = vec.times(R, moved)
-        out, depth, first, second = self._touching(view, vec.add(reach, arm), R, vec.add(place, moved))
+        to_centre = -vec.dot(along, place)
+        both: list[list[Expr]] = []
+        for x in (to_centre + form(along, n) / h, to_centre):
+            s = graph.apply("max", -self.half, graph.apply("min", self.half, x))
+            outward, gap = nearest(view, self.axes, vec.add(place, vec.scale(s, along)))
+            both.append([gap, s, *outward])
+        nearer = graph.apply("lt", both[1][0], both[0][0] - EQUAL * self.radius)
+        gap, s, *normal = (where(nearer, b, a) for a, b in zip(*both, strict=True))
+        arm = vec.times(R, vec.scale(s, along))
+        out, depth, first, second = self._touching(vec.add(reach, arm), R, tuple(normal), gap)
         return out, depth, first, vec.add(arm, second)
 
 
@@ -211,6 +237,9 @@ class EllipsoidEllipsoid(Contact):
     """
 
     axes: tuple[tuple[Expr, Expr, Expr], tuple[Expr, Expr, Expr]]
+
+    def deepest(self, view: View) -> Expr:
+        return least_curvature(self.axes[0]) + least_curvature(self.axes[1])
 
     def touch(self, view: View) -> Touch:
         graph = view.graph
@@ -287,6 +316,9 @@ class BlockEllipsoid(Contact):
     halves: Vec3
     axes: tuple[Expr, Expr, Expr]
 
+    def deepest(self, view: View) -> Expr:
+        return least_curvature(self.axes)
+
     def touch(self, view: View) -> Touch:
         graph = view.graph
         reach, R, place = seen_from(self, view)
@@ -323,8 +355,8 @@ class BlockEllipsoid(Contact):
             n = [zero, zero, zero]
             n[i], n[j] = -nx, -ny
             found.append((n[0], n[1], n[2]))
-        normal, _ = nearest(view, self.axes, vec.neg(vec.transpose_times(turn, d)))
-        found.append(vec.neg(vec.times(turn, normal)))
+        (x, y, z), _ = nearest(view, self.axes, vec.neg(vec.transpose_times(turn, d)))
+        found.append(vec.neg(vec.times(turn, (x, y, z))))
         return found
 
     def _eighth(self, place: Vec3, turn: Mat3) -> Vec3:

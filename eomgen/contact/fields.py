@@ -21,14 +21,14 @@ from ..expr.functions import Surface
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import quadratic_form
-from .limits import ASTRAY, FOOT, STEEP
+from .limits import ASTRAY, FOOT, NOWHERE, STEEP
 from .point import Contact, Touch
 from .rounds import seen_from, settled
 
 #: Symbols of a place in the expression of a height, and the names by which texts know them.
 PLACES = {"x": "x[height]", "y": "y[height]"}
 _LINES = 13  #: lines each way of which the picture of a height field is made
-_TOO_BENT = 0.1  #: part of the plain step's determinant below which Newton's step is not taken
+_TOO_BENT = 0.05  #: part of the plain step's determinant below which Newton's step is not taken
 
 
 class HeightField(NamedTuple):
@@ -109,8 +109,11 @@ class FieldContact(Contact):
     def _bend(self, m: Vec3, change: Vec3, view: View) -> Vec3:
         """How that changes with the direction."""
 
-    def _step(self, x: Expr, y: Expr, place: Vec3, view: View) -> tuple[Expr, Expr]:
-        """Newton's step towards e s_x = e s_y = 0, e from the shape's point to that of the ground, s = (x, y, h)."""
+    def _step(self, x: Expr, y: Expr, place: Vec3, view: View) -> tuple[Expr, Expr, Expr]:
+        """Newton's step towards e s_x = e s_y = 0, e from the shape's point to that of the ground, s = (x, y, h).
+
+        The last number says whether the distance has a minimum nearby, and no more than one.
+        """
         graph = view.graph
         h, hx, hy, xx, xy, yy = self.field.at(x, y)
         m = (-hx, -hy, graph.one)
@@ -124,18 +127,23 @@ class FieldContact(Contact):
         good = graph.apply("and", graph.apply("lt", _TOO_BENT * plain, det), graph.apply("lt", 0.0, jxx + jyy))
         jxx, jxy, jyx, jyy = (where(good, a, b) for a, b in ((jxx, gxx), (jxy, gxy), (jyx, gxy), (jyy, gyy)))
         det = where(good, det, plain)
-        return x - (jyy * fx - jxy * fy) / det, y - (jxx * fy - jyx * fx) / det
+        return x - (jyy * fx - jxy * fy) / det, y - (jxx * fy - jyx * fx) / det, good
 
-    def _found(self, view: View) -> tuple[Vec3, Expr, Vec3, Vec3, Expr]:
-        """Normal, depth and the shape's point, in axes of the first marker; the way between markers; whether found."""
+    def _found(self, view: View) -> tuple[Vec3, Expr, Vec3, Vec3, Expr, Expr]:
+        """Normal, depth and the shape's point, in axes of the first marker; the way between markers; whether found.
+
+        The last number says whether all steps lay where the distance has one minimum: then depths are continuous.
+        """
         graph = view.graph
         reach, _, place = seen_from(self, view)
         lowest = vec.add(place, self._reach((graph.zero, graph.zero, graph.one), view))
         x, y = lowest[0], lowest[1]
+        unique = graph.one
         for k in range(FOOT):
             if k == FOOT - 1:
                 x, y = settled(view, x), settled(view, y)
-            x, y = self._step(x, y, place, view)
+            x, y, good = self._step(x, y, place, view)
+            unique = graph.apply("and", unique, good)
         h, hx, hy, *_ = self.field.at(x, y)
         size = sqrt(1.0 + hx * hx + hy * hy)
         n = (-hx / size, -hy / size, 1.0 / size)
@@ -145,11 +153,15 @@ class FieldContact(Contact):
         aside = vec.sub(e, vec.scale(depth, n))
         square = vec.dot(e, e)
         good = graph.apply("le", vec.dot(aside, aside), ASTRAY * square)  # NaN is not
-        return n, where(good, depth, -sqrt(where(good, 1.0, square))), own, reach, good
+        return n, where(good, depth, -sqrt(where(good, 1.0, square))), own, reach, good, unique
+
+    def deepest(self, view: View) -> Expr:
+        """Nothing where the start or a step lies in a hollow that is sharper than the shape."""
+        return where(self._found(view)[-1], NOWHERE, 0.0)
 
     def touch(self, view: View) -> Touch:
         R = view.rotation(self.first)
-        n, depth, own, reach, _ = self._found(view)
+        n, depth, own, reach, *_ = self._found(view)
         normal = vec.times(R, n)
         second = vec.add(vec.times(R, own), vec.scale(0.5 * depth, normal))
         return normal, depth, vec.add(reach, second), second
@@ -163,7 +175,7 @@ class FieldContact(Contact):
         """
         graph = view.graph
         R = view.rotation(self.first)
-        n, depth, own, reach, good = self._found(view)
+        n, depth, own, reach, good, _ = self._found(view)
         _, _, place = seen_from(self, view)
         beneath = self.field.at(place[0], place[1])[0]
         over = STEEP * (place[2] - beneath) - sqrt(vec.dot(own, own))

@@ -74,6 +74,11 @@ class ContactGroups(Force):
     restitution: Expr | None = None  #: where bodies are rigid
 
     @property
+    def not_finite_where(self) -> str:  # type: ignore[override]
+        kinds = {shape.kind for shape in (*self.first, *self.second)}
+        return "; ".join(why for kind, why in _ENDS.items() if kind in kinds)
+
+    @property
     def laws(self) -> tuple[Any, ...]:
         return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
@@ -279,6 +284,13 @@ class ContactGroups(Force):
         held = [x.value for x in self._held(data.graph)]
         numbers = (*(x.value for x in data.values), *held)
         return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(held))
+
+
+#: Kind of shape -> where its law ends.
+_ENDS = {
+    "ellipsoid": "an ellipsoid is deeper in another solid than their least radii of curvature: make the law stiffer",
+    FIELD_SHAPE: "a shape lies in a hollow of the height field that is sharper than itself: make the shape smaller",
+}
 
 
 class _SharedData:

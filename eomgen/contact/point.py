@@ -27,6 +27,7 @@ from ..elements.forces.normal_laws import (
     HertzBodies,
     NormalLaw,
     PartlyDamped,
+    UpToDepth,
     read_normal_law,
 )
 from ..elements.frames import Marker, velocity_at
@@ -80,10 +81,15 @@ class Contact(Force):
         """The part of damping and friction that counts here; None means all."""
         return None
 
+    def deepest(self, view: View) -> Expr | None:
+        """The penetration up to which the nearest place is unique, where a law ends; None where it goes on."""
+        return None
+
     def law_here(self, view: View) -> NormalLaw:
         """The law of the normal force as it acts here."""
-        grip = self.grip(view)
-        return self.normal_law if grip is None else PartlyDamped(self.normal_law, grip)
+        grip, most = self.grip(view), self.deepest(view)
+        law = self.normal_law if most is None else UpToDepth(self.normal_law, most)
+        return law if grip is None else PartlyDamped(law, grip)
 
     def couple(self, view: View) -> Vec3 | None:
         """A couple on the second body that the energy has beside the force; its opposite acts on the first."""

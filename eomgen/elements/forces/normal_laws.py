@@ -13,7 +13,7 @@ from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH
 from ..element_type import ElementType, Entry, table
 from ..kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
 from ..looks import STOP, Seen
-from .force import Load, View, beyond_zero, map_law
+from .force import Load, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, PathForce, read_coordinate
 
 _PRESSURE = FORCE.times(LENGTH, -2)
@@ -179,6 +179,26 @@ class PartlyDamped(NormalLaw):
 
     def energy(self, depth: Expr) -> Expr:
         return self.law.energy(depth)
+
+
+@dataclass(frozen=True)
+class UpToDepth(NormalLaw):
+    """Another law up to a depth; deeper its force and its energy are no numbers, which ends a run by an error."""
+
+    law: NormalLaw
+    most: Expr
+
+    def _known(self, depth: Expr, value: Expr) -> Expr:
+        return where(depth.graph.apply("lt", self.most, depth), sqrt(self.most - depth), value)
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        return self._known(depth, self.law.force(depth, rate))
+
+    def elastic(self, depth: Expr) -> Expr:
+        return self._known(depth, self.law.elastic(depth))
+
+    def energy(self, depth: Expr) -> Expr:
+        return self._known(depth, self.law.energy(depth))
 
 
 @dataclass(frozen=True)
