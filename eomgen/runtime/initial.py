@@ -38,7 +38,6 @@ from ..base.limits.constraints import (
     UNMOVED,
 )
 from ..base.names import place_of_marker
-from ..base.picture_data import read_picture
 from ..base.ranks import parts, rank
 from ..base.scales import largest
 from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
@@ -361,6 +360,8 @@ def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
 
 def _of_marker(kernels: Kernels, name: str, what: str, marker: str) -> Wanted:
     """A coordinate of the place of a marker or of a body's origin, or of its velocity."""
+    from ..base.picture_data import read_picture
+
     layout, axis, of_velocities = kernels.layout, "xyz".index(what[-1]), what.startswith("v")
     poses, twists = kernels.poses, kernels.inertial_terms
     data = read_picture(layout.metadata, kernels.context.p)

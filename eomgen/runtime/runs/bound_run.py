@@ -474,7 +474,7 @@ class Run:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {self.forcing.lapse}")
         if cause is None:
             return SimulationError(
-                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "
+                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try Radau, other "
                 "tolerances, or look for a motion that grows without bound."
             )
         when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"

@@ -29,10 +29,11 @@ from ..inputs import Forcing
 from ..kernels import into
 from ..refusals import require_support
 from ..trajectory import Span, Start
-from .bound_run import Crawling, Run
+from .bound_run import Run
 from .events import Events
-from .integrate import integrate, record, require_end
+from .integrate import integrate, record
 from .run_arguments import check_step, check_tolerances, find_state, ordered_times, set_up
+from .simulate import complete
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -181,7 +182,10 @@ class Dae:
             raise cannot(f"{module.name} has no unknowns that IDA could solve for; use simulate")
         bound, forcing, start, end = set_up(module, span, parameters, inputs)
         forcing.begin(start, end)
-        tolerances = {"rtol": check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol})["rtol"], "atol": atol}
+        tolerances: dict[str, Any] = {
+            "rtol": check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol})["rtol"],
+            "atol": atol,
+        }
         watched = Events(module.layout, events)
         x0 = find_state(bound, initial, start, forcing)
         times = None if t_eval is None else ordered_times(t_eval, start, end, self.n_y)
@@ -190,18 +194,9 @@ class Dae:
         run = Run(bound, forcing)
         make = partial(_Steps, bound, forcing, end, partial(ida.IDA, **tolerances), options)
         nodes = [start, *forcing.corners(start, end), end]
-        try:
-            solution, _, raised = integrate(
-                bound, forcing, nodes, x0, make, times, False, {}, watched, rates=run.watched(None)
-            )
-            if raised is not None:
-                raise raised
-        except Crawling as crawl:
-            raise run.gave_up(crawl, end, "IDA", dict(tolerances)) from None
-        if solution.status < 0:
-            raise SimulationError(f"IDA stopped at t = {solution.ends[1]:.6g} s of {end:.6g} s: {solution.message}")
-        require_end(solution, end)
-        return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)
+        steps = partial(integrate, bound, forcing, nodes, x0, make, times, False, {}, watched, rates=run.watched(None))
+        solution = complete(run, steps, (start, end), "IDA", tolerances, watched)
+        return record(bound, forcing, solution, "IDA", tolerances, watched.names)
 
 
 class _Steps:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -293,34 +293,15 @@ def simulate(
     if many:
         require_size(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     run.begin(start, end, x0, longest, numbers)
+    steps = partial(
+        integrate, bound, forcing, nodes, x0, title if compiled else solver, stored, dense_output, settings, watched,
+        watch, run.look, None if compiled else run.watched(watch),
+    )  # fmt: skip
     try:
-        solution, failure, raised = integrate(
-            bound, forcing, nodes, x0, title if compiled else solver, stored, dense_output, settings, watched,
-            watch, run.look, None if compiled else run.watched(watch),
-        )  # fmt: skip
-        if failure is not None:
-            run.last = ("rhs", *failure)
-        if isinstance(raised, KeyboardInterrupt):
-            raise SimulationInterrupted(
-                f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
-                lambda: record(bound, forcing, solution, title, settings, watched.names),
-            ) from raised
-        if raised is not None:
-            raise raised
-    except EvaluationError as error:  # of a reset
-        event, watched.last = watched.last, ""
-        raise SimulationError(f"{title} stopped{event}: {error}") from error
-    except Crawling as crawl:
-        raise run.gave_up(crawl, end, title, settings) from None
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-        if run.last is None:
-            raise
-        raise run.ended(start, end, title, str(error)) from run.cause()
+        solution = complete(run, steps, (start, end), title, settings, watched)
     finally:
         if watch is not None:
             watch.close()
-    _check(run, solution, start, end, title)
-
     try:
         made = record(bound, forcing, solution, title, settings, watched.names, again)
     except EvaluationError as error:
@@ -343,7 +324,31 @@ def _copied(value: Any) -> Any:
     return parts.copy() if isinstance(parts, np.ndarray) else parts
 
 
-def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:
+def complete(
+    run: Run, steps: Callable[[], Any], span: Sequence[float], method: str, settings: dict[str, Any], watched: Events
+) -> Solution:
+    """The solution that the steps of a run over a span come to, or the error that says what ended it before."""
+    start, end = span
+    try:
+        solution, failure, raised = steps()
+        if failure is not None:
+            run.last = ("rhs", *failure)
+        if isinstance(raised, KeyboardInterrupt):
+            raise SimulationInterrupted(
+                f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
+                lambda: record(run.module, run.forcing, solution, method, settings, watched.names),
+            ) from raised
+        if raised is not None:
+            raise raised
+    except EvaluationError as error:  # of a reset
+        event, watched.last = watched.last, ""
+        raise SimulationError(f"{method} stopped{event}: {error}") from error
+    except Crawling as crawl:
+        raise run.gave_up(crawl, end, method, settings) from None
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        if run.last is None:
+            raise
+        raise run.ended(start, end, method, str(error)) from run.cause()
     if not solution.finite and not np.isfinite(solution.x).all():
         finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
@@ -352,3 +357,4 @@ def _check(run: Run, solution: Solution, start: float, end: float, method: str) 
         reached, last = (float(solution.t[-1]), solution.x[:, -1]) if solution.t.size else (start, None)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
     require_end(solution, end)
+    return cast("Solution", solution)
