@@ -69,20 +69,10 @@ def singular_values(module: BoundModel, t: Array, x: Array, u: Array | None = No
 
 
 def find_change_points(module: BoundModel, t: Array, x: Array, u: Array) -> list[ChangePoint]:
-    """Where a run passed configurations in which rank is lost.
+    """Where a run of a module passed configurations in which rank is lost.
 
-    Parameters
-    ----------
-    module : BoundModel
-        With the parameters of the run.
-    t : (n_t,) array
-        Of the integrator's steps; a time that comes twice is that of an event that resets the state.
-    x : (n_x, n_t) array
-    u : (n_u, n_t) array
-
-    Returns
-    -------
-    list of ChangePoint
+    t (n_t,), x (n_x, n_t) and u (n_u, n_t) are of the integrator's steps; a time that comes twice is that of an event
+    that resets the state.
     """
     if not module.layout.rank or len(t) < 2:
         return []

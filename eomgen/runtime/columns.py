@@ -106,17 +106,9 @@ NO_RESIDUALS = Residuals()
 class Columns:
     """Everything that can be read from the states of a run, evaluated when first asked for.
 
-    Parameters
-    ----------
-    module : BoundModel
-        With the parameters and constant inputs of the run bound.
-    t : (n_t,) array
-    x : (n_x, n_t) array
-        Projected.
-    u : (n_u, n_t) array, or callable
-        What gives it when it is first needed.
-    steps : callable, optional
-        Gives t, x and u of the integrator's steps, where other times are stored.
+    The module has parameters and constant inputs bound; x (n_x, n_t) is projected, and u (n_u, n_t) may be a function
+    that gives it when it is first needed.  ``steps()`` gives t, x and u of the integrator's steps, where other times
+    are stored.
     """
 
     def __init__(

@@ -117,17 +117,8 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
 
 
 def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
-    """l with C_q^T l = -force, the smallest in scaled rows where rows depend on each other.
-
-    Parameters
-    ----------
-    C_q : (k, n_c, n_v) array
-    force : (n_v, k) array
-        M a + h.
-
-    Returns
-    -------
-    (n_c, k) array
+    """l (n_c, k) with C_q^T l = -(M a + h), the smallest in scaled rows where rows depend on each other; C_q (k, n_c,
+    n_v).
     """
     if not C_q.shape[1]:
         return np.zeros((0, force.shape[1]))

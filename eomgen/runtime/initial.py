@@ -52,12 +52,7 @@ from .layout import warn_of_fixed
 def require_rank(kernels: Kernels, J: Array) -> None:
     """Refuse parameters with which more constraint rows are independent than with the declared ones.
 
-    Parameters
-    ----------
-    kernels : Kernels
-        With the parameters.
-    J : (n_c, n_v) array
-        Scaled constraint Jacobian at an assembled position.
+    J (n_c, n_v) is the scaled constraint Jacobian at an assembled position.
     """
     layout = kernels.layout
     pairs = list(zip(layout.p, kernels.context.p, layout.info.p_values, strict=True))
@@ -143,18 +138,9 @@ def _parts(kernels: Kernels, J: Array, given: Mapping[str, Sequence[Array]]) -> 
 class StartBranch:
     """The branches at one position where rank is lost, of loops each of which is connected with the others.
 
-    Others may be as fast as they like: speeds are those of the coordinates that the lost rows know.
-
-    Parameters
-    ----------
-    q : (n_q,) array
-        A closed position.
-    J : (n_c, n_v) array
-        The scaled C_q there.
-    given : mapping of str to sequence of (n_v,) arrays
-        Names of the velocities given, and their scaled gradients.
-    part : pair of arrays of int
-        The rows of these loops, and their velocities.
+    Others may be as fast as they like: speeds are those of the coordinates that the lost rows know.  J (n_c, n_v) is
+    the scaled C_q at the closed position q; ``given`` has the scaled gradients of the velocities given, by name, and
+    ``part`` the rows of these loops and their velocities.
     """
 
     def __init__(
@@ -319,10 +305,7 @@ class Wanted(NamedTuple):
 def find_wanted(kernels: Kernels, name: str, t: float) -> Wanted | None:
     """The function that an output or a place of a marker is; None if the name is neither.
 
-    Raises
-    ------
-    UsageError
-        An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
+    Refuses an output that depends on accelerations, or on velocities otherwise than linearly, and an unknown marker.
     """
     if found := place_of_marker(name):
         return _of_marker(kernels, name, *found)
@@ -388,14 +371,10 @@ def _of_marker(kernels: Kernels, name: str, what: str, marker: str) -> Wanted:
 
 
 class Initial:
-    """Assembly of one model with one set of parameters at one time.
+    """Assembly of one model with one set of parameters at one time, which matters for driven constraints only.
 
-    Parameters
-    ----------
-    t : float
-        Time; matters for driven constraints only.
-    names : iterable of str, optional
-        Of values that may be held; outputs and places of markers can be among them, and those declared are held too.
+    Names are those of values that may be held; outputs and places of markers can be among them, and those declared are
+    held too.
     """
 
     def __init__(self, kernels: Kernels, t: float = 0.0, names: Iterable[str] | None = None) -> None:

@@ -36,18 +36,8 @@ class LazyCore:
     Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
     exported package has them all from the beginning.
 
-    Parameters
-    ----------
-    core : Core
-    late : sequence of str
-        Names of the further kernels.
-    load : callable
-        Makes a core of those that are late together: of :attr:`~..base.kernel_table.Kernel.late` of the table.
-
-    Attributes
-    ----------
-    further : dict of str to Core
-        Cores made so far, by what their kernels have in common.
+    ``load(group)`` makes the core of the ``late`` kernels that have :attr:`~..base.kernel_table.Kernel.late` in common;
+    ``further`` holds those made so far.
     """
 
     def __init__(self, core: Core, late: Sequence[str], load: Callable[[str], Core]) -> None:

@@ -181,21 +181,10 @@ def motions(
     guess: Array | None,
     t: Array,
 ) -> tuple[Array, Array, Array]:
-    """Positions, velocities and accelerations of the whole tree, each column for itself.
+    """Positions, velocities and accelerations (n,) or (n, k) of the whole tree, each column for itself.
 
-    Parameters
-    ----------
-    reference : callable
-        t -> the closed position (n,) to start from.
-    given : three arrays (n_dof,) or (n_dof, k), or None
-        q_i, v_i, a_i; None is zero.
-    guess : (n,) array, optional
-        Start of Newton's iteration instead of following from there.
-    t : () or (k,) array
-
-    Returns
-    -------
-    q, v, a : (n,) or (n, k) arrays
+    Given are q_i, v_i and a_i, (n_dof,) or (n_dof, k), None for zero.  ``reference(t)`` is the closed position to start
+    from; from a guess (n,) Newton's iteration starts instead of following from there.
     """
     layout = path.layout
     n_q, n, size = layout.n_q, layout.n_v, len(layout.independent_q)

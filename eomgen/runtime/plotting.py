@@ -31,18 +31,11 @@ ENERGIES = ("T", "V", "energy")  #: columns of every run, unless the model has t
 
 
 def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Array:
-    """States (n, k) at times (k,) within a run: cubics through the states and slopes of its steps.
+    """States (n, k) at times (k,) within a run: cubics through the states x (n, m) and slopes of its steps at t (m,).
 
     Without slopes straight lines, and likewise where the slopes say nothing of what is between two points that are far
     apart (``t_eval=[0, 60]``): where they are not those of a curve from one state to the other.  Where a time stands
     twice, as at an event that resets the state, the second state begins the next piece.
-
-    Parameters
-    ----------
-    t : (m,) array
-        Ascending or descending.
-    x, slopes : (n, m) arrays
-    times : (k,) array
     """
     way = 1.0 if t[-1] >= t[0] else -1.0
     k = np.clip(np.searchsorted(way * t, way * times, side="right") - 1, 0, len(t) - 2)
@@ -254,17 +247,7 @@ def height(panel: Curves) -> float:
 
 
 def stack(figure: Any, grid: Any, panels: Sequence[Curves], across: str) -> list[Any]:
-    """Panels one above the other, sharing their horizontal axis.
-
-    Parameters
-    ----------
-    figure : matplotlib Figure
-    grid : matplotlib SubplotSpec or None
-        The part of the figure they share; all of it by default.
-    panels : sequence of Curves
-    across : str
-        Label of the horizontal axis.
-    """
+    """Panels one above the other, sharing their horizontal axis and a part of the figure, all of it by default."""
     heights = [height(panel) for panel in panels]
     if grid is None:
         cells = figure.add_gridspec(len(panels), 1, height_ratios=heights)

@@ -91,28 +91,11 @@ INSTALL = f"pip install {' '.join(repr(name) for name in CUDA_REQUIREMENTS)}"
 
 
 def compile_device_text(text: str, architecture: str, wanted: Sequence[str] = (), options: Sequence[str] = ()) -> bytes:
-    """Compile a text for an architecture.
+    """Compile a text for an architecture: ``sm_90`` for machine code, ``compute_90`` for PTX, which the driver
+    compiles.
 
-    Parameters
-    ----------
-    text : str
-    architecture : str
-        ``sm_90`` for machine code, ``compute_90`` for PTX, which the driver compiles for its GPU.
-    wanted : sequence of str
-        Macros to define: ``EOMGEN_WANT_...`` of the kernels.
-    options : sequence of str
-        Further options of NVRTC.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    MissingDependencyError
-        cuda-bindings or the library of NVRTC is not installed.
-    ToolchainError
-        NVRTC refuses the text; ``output`` is its log.
+    ``wanted`` are macros to define, ``EOMGEN_WANT_...`` of the kernels; ``options`` further ones of NVRTC.  Where NVRTC
+    refuses the text, ``output`` of the ToolchainError is its log.
     """
     return compile_with_log(text, architecture, wanted, options)[0]
 

@@ -39,22 +39,9 @@ UNASSEMBLED = -111  #: status of a run whose initial values could not be assembl
 def assemble_states(
     module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
 ) -> tuple[Array, Mask, list[str]]:
-    """The initial states of all runs, on the constraints.
+    """The initial states (n_x, k) of all runs on the constraints at time t, NaN where a run cannot be assembled.
 
-    Parameters
-    ----------
-    t : float
-        Time of the start (s).
-    forcing_of : callable
-        The inputs of a run by its number.
-
-    Returns
-    -------
-    x : (n_x, k) array
-        NaN for a run that cannot be assembled.
-    failed : (k,) bool array
-    words : list of str
-        Why, for each of these in order.
+    Also which these are (k,), and why, for each of them in order.  ``forcing_of(k)`` has the inputs of a run.
     """
     with silent():  # for all runs, when their values were collected
         x, reasons = _assemble_all(module, varied, t, forcing_of)

@@ -35,12 +35,8 @@ Groups = tuple[Any, Any, Any]
 def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     """Initial values, parameters and inputs with the columns of a grid: every combination, the last name fastest.
 
-    Parameters
-    ----------
-    grid : mapping
-        Values by the name of a parameter, an input, a coordinate, a rate or an output: a list, or (low, high, count).
-    groups : tuple
-        Initial values, parameters and inputs beside the grid, by name.
+    A grid has a list of values, or (low, high, count), by the name of a parameter, an input, a coordinate, a rate or an
+    output; the groups are what is given beside it, by name.
     """
     require_mapping("grid", grid)
     grid = without_dots(grid, module.layout.instances)
@@ -157,21 +153,10 @@ def collect_variations(
     inputs: Mapping[str, Any] | ArrayLike | None,
     count: int | None,
 ) -> Variations:
-    """Bring initial values, parameters and inputs together.
+    """Bring initial values, parameters and inputs together, each by name, or as arrays (n,) or (n, k).
 
-    Parameters
-    ----------
-    initial : mapping of str to float or (k,), or (n_x,) or (n_x, k) array, optional
-    parameters : mapping of str to float or (k,), or (n_p,) or (n_p, k) array, optional
-    inputs : mapping of str to float or (k,), or (n_u,) or (n_u, k) array, optional
-        Constant over time.
-    count : int, optional
-        Number of runs, where nothing given tells it.
-
-    Raises
-    ------
-    UsageError
-        Unknown names, values that are not finite, and lengths that differ, all named.
+    The number of runs is the count where no array gives it.  Unknown names, values that are not finite, and lengths
+    that differ are refused, all named.
     """
     lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
     p = _bound("parameter", module, parameters, lengths)

@@ -42,16 +42,7 @@ if TYPE_CHECKING:
 
 
 class Gaps:
-    """Coordinates and outputs that are followed as gaps.
-
-    Parameters
-    ----------
-    module : BoundModel
-        With parameters and constant inputs bound.
-    names : sequence of str
-    forcing : Forcing, optional
-        Inputs that vary.
-    """
+    """Coordinates and outputs of a bound module that are followed as gaps; ``forcing`` has the inputs that vary."""
 
     def __init__(self, module: BoundModel, names: Sequence[str], forcing: Forcing | None = None) -> None:
         self.module, self.layout, self.names, self.forcing = module, module.layout, tuple(names), forcing
@@ -181,19 +172,9 @@ def _is_velocity(layout: Layout, output: str) -> bool:
 def find_sliding(
     module: BoundModel, rough: Rough, gaps: Sequence[str], t: float, x: Array, forcing: Forcing | None = None
 ) -> Sliding:
-    """The sliding velocities of gaps at a state.
+    """The sliding velocities of gaps, all those of the impact, at a state x (n_x,) of a bound module.
 
-    Parameters
-    ----------
-    module : BoundModel
-        With parameters and inputs bound.
-    rough : mapping
-        Gap -> coefficient and names of the sliding velocities.
-    gaps : sequence of str
-        All gaps of the impact.
-    x : (n_x,) array
-    forcing : Forcing, optional
-        Inputs that vary.
+    ``rough`` gives a gap its coefficient and the names of its sliding velocities; ``forcing`` has the inputs that vary.
     """
     layout, n_q = module.layout, module.layout.n_q
     names = [name for gap in gaps if gap in rough for name in rough[gap][1]]
@@ -320,17 +301,9 @@ def strike_events(
     fired: Sequence[int],
     forcing: Forcing,
 ) -> Array:
-    """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
+    """The state (n_x,) after the impacts of the model's own events, those that ``fired`` and any gap that is closed.
 
-    Parameters
-    ----------
-    x : (n_x,) array
-    events : sequence of mappings
-        As in the metadata; those with a restitution are gaps.
-    fired : sequence of int
-        Events that happened.
-    forcing : Forcing
-        Inputs of the run.
+    Events are as in the metadata; those with a restitution are gaps.
     """
     layout, u = module.layout, forcing(t, x)
     module = module.bind(None, u)

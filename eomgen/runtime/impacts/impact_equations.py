@@ -64,7 +64,7 @@ FARTHEST = 1e5  #: change of the velocities, relative to the fastest approach, b
 
 
 def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[object]) -> tuple[Array, Array]:
-    """Impulses, and the change of velocities, of impacts of some gaps and of coordinates that are locked.
+    """Impulses (n,), and the change of velocities z = H impulses (m,), of impacts of gaps and of locked coordinates.
 
     Newton's law with complementarity, for all gaps together that close or are at rest (Moreau 1988; Glocker and
     Pfeiffer 1995; Brogliato, Nonsmooth Mechanics, 2016, ch. 5): 0 <= g, 0 <= rate+ + e min(rate-, 0), one of the two 0.
@@ -72,24 +72,8 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
     that was opening and is closing after that makes a further impact at the same instant, with the rates reached so
     far.  Each of these loses the energy sum g (1 - e) |rate-| / 2, so none is ever gained, whatever the restitutions.
 
-    Parameters
-    ----------
-    H : (m, n) array
-        A column for each gap, then for each locked coordinate; 0 for those that nothing can move.
-    rates : (n,) array
-        Before.
-    e : (k,) array
-        Restitutions of the k gaps.
-    rest : (n,) array
-        Rates of these sizes are rounding.
-    names : sequence
-        Of the gaps and locked coordinates, for errors.
-
-    Returns
-    -------
-    impulses : (n,) array
-    change : (m,) array
-        z = H impulses.
+    H (m, n) has a column for each gap, then for each locked coordinate, 0 for those that nothing can move; rates (n,)
+    are those before, of which the sizes ``rest`` are rounding, and e (k,) the restitutions of the k gaps.
     """
     count = len(e)
     sizes = np.linalg.norm(H, axis=0)
@@ -279,21 +263,8 @@ def strike(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Impulses (k + s,) and the change of velocities (m,), where some of k gaps have friction.
 
-    Gaps that share no body with one of friction greater than 0 obey :func:`collide`, all at once.
-
-    Parameters
-    ----------
-    solve : callable
-        ``solve_contacts`` of ``eomgen._native``.
-    H : (m, k + s) array
-        As for :func:`collide`, gaps first, then sliding velocities.
-    rates, e, rest, mu, owner, names
-        As for :func:`strike_rough`.
-
-    Raises
-    ------
-    UsageError
-        No impulses are found.
+    Gaps that share no body with one of friction greater than 0 obey :func:`collide`, all at once.  H (m, k + s) is as
+    there, gaps first, then sliding velocities; the others are as for :func:`strike_rough`.
     """
     k = len(e)
     rubbing = np.flatnonzero(mu[owner] > 0.0)
@@ -321,25 +292,10 @@ def strike_rough(
 ) -> Array:  # fmt: skip
     """Impulses (k + s,) of k gaps, all of them closed, and of friction along s sliding velocities.
 
-    Parameters
-    ----------
-    solve : callable
-        ``solve_contacts`` of ``eomgen._native``.
-    W : (k + s, k + s) array
-        How impulses change rates: gaps first, then sliding velocities.
-    rates, rest : (k + s,) arrays
-        Before the impact, and the sizes at which they are rounding.
-    e, mu : (k,) arrays
-        Restitutions, coefficients of friction.
-    owner : (s,) array of int
-        The gap of each sliding velocity.
-    names : sequence of str
-        Of the gaps, for errors.
-
-    Raises
-    ------
-    UsageError
-        No impulses stop the gaps from closing.
+    W (k + s, k + s) tells how impulses change rates, gaps first; rates and the sizes ``rest`` at which they are
+    rounding are those before the impact.  Restitutions e and coefficients mu are (k,); ``owner`` (s,) is the gap of
+    each sliding velocity.  ``solve`` is ``solve_contacts`` of ``eomgen._native``.  Refuses where no impulses stop the
+    gaps from closing.
     """
     k = len(e)
     rates = np.where(np.abs(rates) <= rest, 0.0, rates)

@@ -49,17 +49,7 @@ _asked: list[Any] = [None, False]  #: stderr at the last run, and whether it is 
 
 
 class Progress:
-    """Shows how far a run has come, once it has taken a while.
-
-    Parameters
-    ----------
-    start, end : float
-        Simulated time.
-    patience : float
-        Seconds before it appears.
-    words : str
-        What is said of how far it is.
-    """
+    """Shows how far a run has come in simulated time, in ``words``, once it has taken ``patience`` seconds."""
 
     def __init__(self, start: float, end: float, patience: float = PATIENCE, words: str = "t = {:.4g} s") -> None:
         self.words = words
@@ -191,22 +181,9 @@ class StallCheck:
     it would take more than ``IN_PLACE`` and is held where a rate jumps, as in sliding modes, and none of its states
     goes as its rate says; where others do, as they may end the sliding, it may take ``MOST_STEPS``.
 
-    Parameters
-    ----------
-    start, end : float
-        Of the run (s).
-    x : (n_x,) array
-        First state; of what follows it in those looked at, as derivatives by parameters, nothing is judged.
-    n_q : int
-        Number of positions; velocities follow.
-    max_step : float
-        The user's; steps that it keeps short are not a crawl.
-    troubled : callable
-        (t, x) -> whether the state is at a known singularity.
-    rhs : callable
-        f(t, x).
-    kept : int
-        Numbers that the run keeps of each step.
+    Of what follows the first state x (n_x,) in those looked at, as derivatives by parameters, nothing is judged; steps
+    that the user's max_step keeps short are not a crawl.  ``troubled(t, x)`` says whether a state is at a known
+    singularity, ``kept`` how many numbers the run keeps of each step.
     """
 
     def __init__(
@@ -272,18 +249,9 @@ class StallCheck:
 
 
 def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, time: float) -> bool:
-    """Whether a run is held where a rate jumps, so that none of its states goes as its rate says.
+    """Whether a run is held where a rate f(t, x) jumps, so that none of its states goes as its rate says.
 
-    Parameters
-    ----------
-    rhs : callable
-        f(t, x).
-    crawl : Crawling
-        Time, state and mean step.
-    moved : (n_x,) array
-        What the states have changed in a while.
-    time : float
-        The while (s).
+    ``moved`` (n_x,) is what the states have changed in a ``time`` (s).
     """
     t, x = crawl.t, crawl.x
     with np.errstate(all="ignore"):
@@ -310,15 +278,9 @@ def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, 
 
 
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:
-    """Which rate is steepest in which state where a run crawls, in words; empty if none is steep for the steps.
+    """Which rate f(t, x) is steepest in which state where a run crawls, in words; empty if none is steep for the steps.
 
-    Parameters
-    ----------
-    rhs : callable
-        f(t, x).
-    names : names of the states
-    atol : float or (n_x,) array
-        Absolute tolerance; the changes tried are no less, nor less than the motion of ten steps.
+    The changes tried are no less than the absolute tolerance, nor than the motion of ten steps.
     """
     t, x = crawl.t, crawl.x
     found, words = 0.0, ""
@@ -343,14 +305,7 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
 
 
 class Crawling(Exception):
-    """Raised inside an integration whose steps lead nowhere.
-
-    Parameters
-    ----------
-    x : (n_x,) array
-    step : float
-        Mean length of the last steps (s).
-    """
+    """Raised inside an integration whose steps, of a mean length (s), lead nowhere."""
 
     def __init__(self, t: float, x: Array, step: float) -> None:
         super().__init__(t, x, step)

@@ -52,23 +52,9 @@ def no_series(module: BoundModel) -> str:
 
 
 def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
-    """Tolerances and step limits as steppers take them.
+    """Tolerances and step limits as steppers of n states take them, or a UsageError for an option that cannot be.
 
-    Parameters
-    ----------
-    n : int
-        Number of states.
-    span : float
-        Length of the run (s), the longest first step.
-    options : mapping
-        rtol, atol (a number or n of them), max_step, first_step.
-    checked : bool
-        Whether they have been checked and completed already.
-
-    Raises
-    ------
-    UsageError
-        An unknown option or a value that cannot be.
+    The span (s) is the longest first step; ``checked`` options have been checked and completed already.
     """
     check_names("option of simulate", options, OPTIONS)
     given = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
@@ -98,19 +84,6 @@ def solver_class(core: Any, name: str) -> Any:
 
     It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
     Jacobian than the module's, it is SciPy's own; SciPy has no Taylor.  A failed evaluation shortens the step.
-
-    Parameters
-    ----------
-    core : Core
-        Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'Radau', 'Taylor'}
-
-    Raises
-    ------
-    MissingDependencyError
-        SciPy is not installed.
-    UsageError
-        From the class: Taylor for another function than the module's ``rhs``.
     """
     scipy = require("scipy.integrate", "scipy", f"method {name}")
     own: Any = getattr(scipy, name, _only_for_modules)

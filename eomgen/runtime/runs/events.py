@@ -59,16 +59,9 @@ def instant(t: float) -> float:
 class RunEvent:
     """An event with the number of times it may still happen.
 
-    Parameters
-    ----------
-    function : callable f(t, x), or None
-        The user's, with SciPy's attributes unless these are given; None where the loop itself evaluates it.
-    terminal : int
-        The run ends when it has happened so often; 0: never.
-    direction : {1, -1, 0}
-        Rising, falling, both; or UNWATCHED.
-    action : {GO_ON, RESET, WAIT}
-        Whether the model's kernel gives a new state, or an impact does.
+    The function f(t, x) is the user's, with SciPy's attributes unless these are given; None where the loop itself
+    evaluates it.  ``terminal`` is the number of times that ends the run, 0 for never; ``direction`` 1 rising, -1
+    falling, 0 both, or UNWATCHED; ``action`` tells whether the model's kernel gives a new state, or an impact does.
     """
 
     def __init__(
@@ -406,16 +399,9 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
 
 
 class Controller:
-    """A function f(t, x) that gives the new value of one sampled state.
+    """A function f(t, x) that gives the new value of one sampled state, at its place in x.
 
-    Parameters
-    ----------
-    name : str
-        The state.
-    place : int
-        Its place in x.
-    function : callable
-        (t, x) -> number; x (n_x,) is the state right before, with what was renewed before this value.
+    x (n_x,) is the state right before, with what was renewed before this value.
     """
 
     def __init__(self, name: str, place: int, function: Callable[[float, Array], Any]) -> None:
@@ -439,19 +425,9 @@ class Controller:
 
 
 class ControlledEvents(Events):
-    """The events of a run in which functions give the new values of sampled states.
+    """The events of a run in which functions f(t, x) give the new values of sampled states, by name.
 
-    Parameters
-    ----------
-    given : None, or one event or several
-        As for :class:`Events`.
-    controllers : mapping of str to callable
-        Sampled state -> f(t, x).
-
-    Raises
-    ------
-    UsageError
-        A name that is no sampled state without a law, or what is no function f(t, x).
+    Refuses a name that is no sampled state without a law, and what is no function f(t, x).
     """
 
     def __init__(self, layout: Layout, given: Any, controllers: Any) -> None:

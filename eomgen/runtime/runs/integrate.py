@@ -85,14 +85,8 @@ def choose_solver(method: Any, purpose: str = "simulate") -> Any:
 
 
 def check_options(solver: Any, options: Collection[str], own: Collection[str]) -> None:
-    """Refuse options that one of SciPy's own methods would only warn about.
-
-    Parameters
-    ----------
-    solver : OdeSolver subclass
-        One that is not SciPy's may take anything.
-    own : names
-        Options of ``simulate`` itself, to suggest.
+    """Refuse options that one of SciPy's own methods would only warn about; ``own`` are those of ``simulate``, to
+    suggest.
     """
     from inspect import signature
 
@@ -139,31 +133,12 @@ def integrate(
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
     """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
 
-    Parameters
-    ----------
-    nodes : sequence of float
-    x0 : (n,) array
-        A state of the module; by a solver in Python others may follow it.
-    method : str or OdeSolver subclass
-        One of the module's own methods, or a class of solvers.
-    t_eval : (n_t,) array, optional
-    options : mapping
-        Of the method.
-    events : Events, optional
-    watch : Progress, optional
-        Told the time by the module's own methods.
-    look : callable, optional
-        Told time, state and number of further steps.
-    rates : callable, optional
-        f(t, x) of a solver in Python.
+    The method is one of the module's own by name, or a class with the calls of SciPy's OdeSolver, to which ``rates`` is
+    f(t, x) and whose state (n,) may go on after that of the module.  ``look`` takes time, state and the number of
+    further steps.
 
-    Returns
-    -------
-    Solution
-    (status, t, x) or None
-        The last evaluation that failed, of the module's own methods.
-    exception or None
-        What stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
+    Returns the solution; (status, t, x) of the last evaluation that failed, of the module's own methods; and what
+    stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
     """
     core: Any = module.core
     start, end = nodes[0], nodes[-1]

@@ -46,13 +46,7 @@ ROUNDS = 50
 
 
 def assemble_with_inputs(layout: Layout, forcing: Forcing, t: float, assembled: Callable[[Array], Array]) -> Array:
-    """The state (n_x,) that is assembled with the inputs that it gives itself.
-
-    Parameters
-    ----------
-    assembled : callable
-        u (n_u,) -> the state assembled with these inputs.
-    """
+    """The state (n_x,) that is ``assembled(u)`` with the inputs u (n_u,) that it gives itself."""
     places = layout.constraint_inputs
 
     def assemble(u: Array) -> tuple[Array, Array]:
@@ -96,22 +90,10 @@ IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the 
 
 
 def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options with every tolerance and limit checked.
+    """The options with every tolerance and limit checked, for n states and a run of ``span`` seconds.
 
-    Parameters
-    ----------
-    n : int
-        Number of states.
-    span : float
-        Length of the run (s), the longest first step.
-    options : mapping
-        rtol and atol (a number or n of them), max_step, first_step, min_step, vectorized; others are left as they are.
-
-    Returns
-    -------
-    dict of str to object
-        rtol and atol as a float or an (n,) array, rtol at least 100 times the spacing of floating-point numbers; the
-        steps as floats, without those that are None.
+    rtol and atol are a float or (n,), rtol at least 100 times the spacing of floating-point numbers; steps are floats,
+    those that are None left out.  Other options are left as they are.
     """
     checked = {name: value for name, value in options.items() if value is not None or not name.endswith("_step")}
     for name in ("rtol", "atol"):
