@@ -139,14 +139,8 @@ def norm2(A: Any) -> float:
 
 
 def definite_factor(M: Array, what: str) -> Array:
-    """Cholesky's L (n, n) of a mass matrix M, for an analysis that holds for positive definite ones only.
-
-    Raises
-    ------
-    NonFiniteError
-        M is not finite.
-    SingularMassMatrixError
-        M is not positive definite; ``what`` names the analysis.
+    """Cholesky's L (n, n) of a mass matrix M, for an analysis, named ``what``, that holds for positive definite ones
+    only.
     """
     if not np.isfinite(M).all():
         raise NonFiniteError(f"{what}: the mass matrix is not finite")

@@ -284,18 +284,10 @@ class AssemblyFailure(NamedTuple):
 def describe_contradiction(
     given: Mapping[str, float], e: Array, row_scales: Array, labels: Sequence[str], limit: float, J: Array
 ) -> str:
-    """Why velocities cannot be assembled.
+    """Why velocities with the rates to be held, by name, cannot be assembled.
 
-    Parameters
-    ----------
-    given : mapping of str to float
-        The rates to be held.
-    e, row_scales, labels : (m,) arrays, sequence of str
-        Scaled residuals of the rows, their scales and names.
-    limit : float
-        Scaled residuals up to which rows are fulfilled.
-    J : array
-        Scaled Jacobian of the constraints.
+    Of the rows (m,) are the scaled residuals e, their scales and labels, and the limit up to which they are fulfilled;
+    J is the scaled Jacobian of the constraints.
     """
     order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= limit]
     dof = J.shape[1] - rank(J).rank
@@ -470,24 +462,12 @@ def close_nearest(
     guess: Mapping[str, float],
     adjust: Callable[[Array], Array] | None = None,
 ) -> Assembly | None:
-    """Close the loops on the branch that is nearest to a guess.
+    """Close the loops on the branch that is nearest to a guess; None where no attempt closes them.
 
-    Parameters
-    ----------
-    system : ConstraintSystem
-    start : (n_q,) array
-        Where coordinates are that are neither given nor guessed.
-    given : mapping of str to float
-        Coordinates of the tree or of cut joints and their exact values.
-    guess : mapping of str to float
-        Rough values of further coordinates, of the tree or of cut joints.
-    adjust : function (n_q,) -> (n_q,), optional
-        Better places of coordinates that nobody gives, such as those of contact points.
-
-    Returns
-    -------
-    Assembly or None
-        Its distance is that of the guessed coordinates, the largest.  None where no attempt closes the loops.
+    Values that are given, of coordinates of the tree or of cut joints, are held exactly; guessed are rough values of
+    further ones; ``start`` (n_q,) is where all others are, and ``adjust(q)`` gives better places of coordinates that
+    nobody gives, such as those of contact points.  The distance of the result is the largest of the guessed
+    coordinates.
     """
     rough, scales = {name: value for name, value in guess.items() if name not in given}, system.scales
     aim, cut = system.with_values(start, {**given, **rough}), system.wanted(rough)
@@ -563,26 +543,10 @@ def assemble_velocity(
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
 ) -> Array:
-    """Velocities with C_q v + C_t = 0, nearest to a guess.
+    """Velocities with C_q v + C_t = 0 at an assembled position, all rows, nearest to a guess.
 
-    Parameters
-    ----------
-    C_q : (m, n) array
-        Constraint Jacobian at the assembled position, all rows.
-    C_t : (m,) array
-    scales : Scales
-    guess : (n,) or (n, m) array, optional
-        Zero by default; the held velocities have their exact values here.  m columns are m motions at this position.
-    held : sequence of int
-        Velocities that are held exactly.
-    equations : VelocityEquations, optional
-        Rates of functions of q to reach exactly.
-    names, labels : sequences of str
-        Names of the velocities (n,) and of the constraint rows (m,), for messages.
-
-    Returns
-    -------
-    (n,) or (n, m) array
+    The guess is (n,), or (n, m) for m motions, zero by default; the held velocities have their exact values there.
+    Equations are rates of functions of q to reach exactly; names (n,) and labels (m,) are for messages.
     """
     v = np.zeros(C_q.shape[1]) if guess is None else np.array(guess, dtype=float)
     free = np.ones(len(v), dtype=bool)

@@ -118,18 +118,11 @@ STEPS = 200_000  #: of one continuation
 
 
 class Continuation:
-    """Follows one curve.
+    """Follows one curve from a position (n_q,) at s = 0.
 
-    Parameters
-    ----------
-    curve : PositionCurve
-    start : (n_q,) array
-        Position at s = 0.
-    extent : float, optional
-        Length in s of the whole range that the curve is a piece of: the pieces of a range to and fro need no shorter
-        steps than one way over all of it.
-    fewest : int
-        Steps at least, however still it stands, so that short driver pulses are not skipped.
+    ``extent`` is the length in s of the whole range that the curve is a piece of: the pieces of a range to and fro need
+    no shorter steps than one way over all of it.  It takes the ``fewest`` steps at least, however still it stands, so
+    that short driver pulses are not skipped.
     """
 
     def __init__(self, curve: PositionCurve, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
@@ -227,19 +220,9 @@ NEWTON = 15  #: Newton steps to one point
 class HeldPath:
     """Closed positions while coordinates, and the time, go along straight lines to given values; s from 0 to 1.
 
-    What is not held moves as little as the constraints allow.
-
-    Parameters
-    ----------
-    system : ConstraintSystem
-        At the time of the start.
-    start : (n_q,) array
-        A closed position.
-    held : mapping of str to float
-        Values at the end, reached exactly, of coordinates of the tree (all four Euler parameters of a rotation or none)
-        and of cut joints.
-    end : float, optional
-        Time at the end, that of the start by default.
+    What is not held moves as little as the constraints allow.  The system is that at the time of the start, a closed
+    position; held values are reached exactly, of coordinates of the tree (all four Euler parameters of a rotation or
+    none) and of cut joints.  The time at the end is that of the start by default.
     """
 
     def __init__(

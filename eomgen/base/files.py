@@ -92,20 +92,10 @@ class MissingFileError(FileNotFoundError, UsageError, code="EG-FILE"):
 
 
 def open_plain(path: str | os.PathLike[str], *, follow: bool = True) -> BinaryIO:
-    """Open a plain file for reading, without waiting for anybody.
+    """Open a plain file for reading, without waiting for anybody; ``follow``: also where a link leads to one.
 
-    Parameters
-    ----------
-    path : str or path
-    follow : bool, optional
-        Whether a link in the place of the file is followed.
-
-    Raises
-    ------
-    UsageError
-        It is not a plain file, or the path is none, such as one with NUL; it is not there (a FileNotFoundError too).
-    OSError
-        It cannot be read.
+    Refuses what is no plain file, a path that is none, such as one with NUL, and one that is not there (a
+    FileNotFoundError too); an OSError says that it cannot be read.
     """
     name = as_name("path", path)
     try:
@@ -152,25 +142,12 @@ PREFIX = 60  #: characters of a file's name in that of the part: names end at 25
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """Open a file for writing whose bytes replace an earlier file when the block ends without an exception.
+    """Open a binary file for writing whose bytes replace an earlier file when the block ends without an exception.
 
     The mode of an earlier file stays, its owner and group where that is allowed.  Missing folders are made.  A device
-    or pipe is written as it is, and so is one that a link leads to.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Yields
-    ------
-    binary file
-
-    Raises
-    ------
-    UsageError
-        The path is a symbolic link to a file, a folder or nothing: its target is not the file that was named.
-    OSError
-        With the path as ``filename``: it cannot be written; the earlier file is as it was.
+    or pipe is written as it is, and so is one that a link leads to.  A symbolic link to a file, a folder or nothing is
+    refused: its target is not the file that was named.  An OSError, with the path as ``filename``, says that it cannot
+    be written; the earlier file is as it was.
     """
     target = as_path("path", path)
     if not target.name:
@@ -246,11 +223,6 @@ def refuse_link(path: Path) -> None:
     """Refuse a symbolic link where a file or folder is to be written.
 
     Links among the folders above are followed; a link to a device or pipe, such as /dev/stdout, is one's own wish.
-
-    Raises
-    ------
-    UsageError
-        With the path and where it leads.
     """
     if not path.is_symlink():
         return

@@ -11,19 +11,7 @@ MOST = 2000  #: names beyond which a comparison with each takes long
 
 
 def closest(name: object, known: Iterable[str], most: int = 1) -> list[str]:
-    """At most so many of the known names, those spelled most alike first; one that differs in case alone is the only.
-
-    Parameters
-    ----------
-    name : object
-        As it was given.
-    known : iterable of str
-    most : int
-
-    Returns
-    -------
-    list of str
-    """
+    """At most so many known names, those spelled most alike first; one that differs in case alone is the only one."""
     from difflib import get_close_matches  # only needed once something is wrong
 
     folded = {option.lower(): option for option in known}
@@ -50,12 +38,7 @@ def joined(*parts: str, by: str = "; ") -> str:
 def undotted(name: str, instances: Mapping[str, str]) -> str:
     """A name whose first part is an instance: its prefix and the rest, instances within instances too.
 
-    Parameters
-    ----------
-    name : str
-        Such as ``leg1.hip``, or ``leg1.shin.end`` of a marker.
-    instances : mapping of str to str
-        Name of an instance -> its prefix.
+    As ``leg1.hip``, or ``leg1.shin.end`` of a marker; ``instances`` has the prefix of each instance.
     """
     head, _, rest = name.partition(".")
     while rest and head in instances:

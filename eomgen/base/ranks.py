@@ -126,22 +126,10 @@ class Partition(NamedTuple):
 
 
 def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict: bool = False) -> Partition:
-    """Split the coordinates.
+    """Split the coordinates of a scaled Jacobian J (m, n) of a rank, fixed for a mechanism.
 
-    Parameters
-    ----------
-    J : (m, n) array
-        Scaled Jacobian.
-    rank : int
-        Number of dependent coordinates, fixed for a mechanism.
-    independent : sequence of int
-        Preferred independent columns; the other columns are preferred as dependent.
-    strict : bool
-        Take exactly this set or fail.
-
-    Returns
-    -------
-    Partition
+    The columns ``independent`` are preferred as such, the others as dependent; ``strict`` takes exactly this set or
+    fails.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)

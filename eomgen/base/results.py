@@ -129,17 +129,7 @@ SHOWN = 72  #: dots in which this inch is shown: sharp on fine screens, and smal
 
 
 def image_html(data: bytes, kind: str, width: int | None = None, words: str = "picture") -> str:
-    """An image that needs no file.
-
-    Parameters
-    ----------
-    data : bytes
-    kind : {'png', 'gif'}
-    width : int, optional
-        In dots of the page.
-    words : str
-        What is to be seen, for those who do not see it.
-    """
+    """An image that needs no file, ``width`` dots of the page wide; ``words`` for those who do not see it."""
     size = f" width='{width}'" if width else ""
     size += f" alt='{html_text(words)}'"
     return f"<img{size} style='max-width:100%;height:auto' src='data:image/{kind};base64,{b64encode(data).decode()}'>"

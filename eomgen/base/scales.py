@@ -115,13 +115,7 @@ class Space(NamedTuple):
 def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:
     """Named coordinates with all four Euler parameters of a rotation where some are given.
 
-    Those left out are 0; together they must have length 1, up to rounding.
-
-    Parameters
-    ----------
-    names, kinds : sequences of str
-        Coordinates; the kind of Euler parameters, which come in fours, is ``"parameter"``.
-    values : mapping of str to float
+    Those left out are 0; together they must have length 1, up to rounding.  Their kind, in fours, is ``"parameter"``.
     """
     result = dict(values)
     parameters = [name for name, kind in zip(names, kinds, strict=True) if kind == "parameter"]
@@ -268,18 +262,10 @@ def largest(values: Array) -> float:
 
 
 def least(J: Array, y: Array) -> Array:
-    """The least x, (n,) or (n, k), with J x = y.
+    """The least x, (n,) or (n, k), with J x = y of a scaled Jacobian J (m, n), y (m,) or (m, k).
 
-    Parameters
-    ----------
-    J : (m, n) array
-        Scaled Jacobian; redundant rows allowed, with y to match.  Rows that are all zero to rounding, as where
-        parameters alone decide whether a loop closes, ask for nothing.
-    y : (m,) or (m, k) array
-
-    Raises
-    ------
-    NonFiniteError
+    Rows may be redundant, with y to match.  Rows that are all zero to rounding, as where parameters alone decide
+    whether a loop closes, ask for nothing.
     """
     if not largest(J) > UNMOVED and np.isfinite(J).all():
         return np.zeros((J.shape[1], *y.shape[1:]))

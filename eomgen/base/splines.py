@@ -16,20 +16,9 @@ Array = np.ndarray
 
 
 def slopes(x: Array, y: Array, kind: str) -> Array:
-    """Slopes at the points.
+    """Slopes at the points x (n,), strictly increasing, of values y (n,), or (n, k) of k tables but for ``monotone``.
 
-    Parameters
-    ----------
-    x : (n,) array
-        Strictly increasing.
-    y : (n,) or (n, k) array
-        Values; k tables at once, except for ``monotone``.
-    kind : {'cubic', 'natural', 'periodic', 'monotone'}
-        Of a table; see :data:`~eomgen.model.fields.TABLES`.
-
-    Returns
-    -------
-    (n,) or (n, k) array
+    The kind is that of a table, 'cubic', 'natural', 'periodic' or 'monotone'; see :data:`~eomgen.model.fields.TABLES`.
     """
     h = np.diff(x)
     rise = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))

@@ -228,17 +228,10 @@ def word_of_check(value: object) -> str | None:
 
 @np.errstate(over="ignore", invalid="ignore")
 def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
-    """The longest distance between two points of one body, wherever the frames of bodies lie.
+    """The longest distance (m) between two points of one body, wherever the frames of bodies lie.
 
-    Parameters
-    ----------
-    bodies : iterable of sequences of (3,) arrays
-        Points of each body in its own frame (m): its centre of mass and its joints.
-
-    Returns
-    -------
-    float
-        m; 0 where no body has two points that differ by more than their rounding.
+    Points are those of each body in its frame: its centre of mass and its joints.  It is 0 where no body has two points
+    that differ by more than their rounding.
     """
     longest = 0.0
     for points in bodies:
@@ -253,22 +246,11 @@ def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
 
 @np.errstate(over="ignore", invalid="ignore")
 def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length: float) -> list[float]:
-    """m l^2 of each body, which what rounding leaves of its inertia is judged by.
+    """m l^2 (kg m^2) of each body, which what rounding leaves of its inertia is judged by.
 
-    Parameters
-    ----------
-    masses : sequence of float
-        kg; a body without mass counts with the largest of all, a mechanism without mass by its largest moment.
-    tensors : sequence of (3, 3) arrays
-        kg m^2.
-    length : float
-        Of :func:`longest_within` (m): the programs that compute inertias shift them over such distances.  If it is 0,
-        the largest radius of gyration takes its place.
-
-    Returns
-    -------
-    list of float
-        kg m^2.
+    A body without mass counts with the largest of all, a mechanism without mass by its largest moment.  The length is
+    that of :func:`longest_within`: the programs that compute inertias shift them over such distances.  If it is 0, the
+    largest radius of gyration takes its place.
     """
     heaviest = max((abs(m) for m in masses), default=0.0)
     if heaviest == 0.0:
@@ -281,22 +263,11 @@ def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length
 def fault_of_inertia(
     tensor: ArrayLike, plane: Sequence[float] | None = None, scale: float = 0.0
 ) -> tuple[str, str] | None:
-    """What is wrong with an inertia about the centre of mass.
+    """The message and remedy for a tensor about the centre of mass that no distribution of mass has; None for others.
 
-    Parameters
-    ----------
-    tensor : (3, 3) array
-        Symmetric, kg m^2.
-    plane : three numbers, optional
-        The axis of a body that moves in a plane only, of which one moment was given: only that moment is judged.
-    scale : float, optional
-        m l^2 (kg m^2) of :func:`inertia_scales`; moments below its rounding say nothing.
-
-    Returns
-    -------
-    (message, remedy) or None
-        None for what a distribution of mass can have.  Two moments that are 0 pass: one moment alone is that of a body
-        that moves in a plane.
+    In a plane, whose axis is given, only the moment about it is judged.  Moments below the rounding of the scale, m l^2
+    of :func:`inertia_scales`, say nothing.  Two moments that are 0 pass: one moment alone is that of a body that moves
+    in a plane.
     """
     full = np.asarray(tensor, dtype=float).reshape(3, 3)
     largest = float(np.abs(full).max())
@@ -371,12 +342,9 @@ def _rotation(values: Any) -> list[Flaw]:
 def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
     """Masses and inertias of all bodies, numbers that are not known being NaN.
 
-    Parameters
-    ----------
-    values : sequence of float
-        Of each body its mass, the nine entries of its tensor about the centre of mass, the axis of the one moment that
-        was given if there is one, and the points whose distances tell its size.
-    bodies : sequence of (name, whether there is an axis, number of points, whether it is judged)
+    Values are of each body its mass, the nine entries of its tensor about the centre of mass, the axis of the one
+    moment that was given if there is one, and the points whose distances tell its size; bodies have a name, whether
+    there is an axis, the number of points, and whether it is judged.
     """
     numbers, at = np.array(values, dtype=float), 0
     masses, tensors, points = list[float](), list[Array](), list[list[Array]]()

@@ -121,12 +121,7 @@ WORDS = {
 class Fail:
     """Raises the exception for a failed kernel; what cores call as ``fail(name, status, t, x)``.
 
-    p and u follow where the call was given any.
-
-    Parameters
-    ----------
-    kernels : Kernels
-        Of the model, which tell what is to blame.
+    p and u follow where the call was given any; the kernels of the model tell what is to blame.
     """
 
     def __init__(self, kernels: Any) -> None:

@@ -565,14 +565,8 @@ def rate_places(layout: Layout) -> dict[int, int]:
 def fill_rates(
     layout: Layout, given: Mapping[str, Any], derive: Callable[[str, str, Any], Any]
 ) -> dict[str, tuple[str, int, Any]]:
-    """Rates that follow from what is given: name -> (the input they are of, how many times it is derived, value).
-
-    Parameters
-    ----------
-    given : mapping
-        Inputs of a run, by name.
-    derive : callable
-        As :func:`derive`.
+    """Rates that follow from inputs given by name: name -> (the input they are of, how many times it is derived,
+    value).
     """
     found: dict[str, tuple[str, int, Any]] = {}
     signals = layout.signals

@@ -53,15 +53,9 @@ def _seal(arrays: Mapping[str, Any], key: str) -> str:
 
 
 def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str, Any]:
-    """All arrays of a sealed .npz file.
+    """All arrays of a .npz file sealed with a key.
 
-    Parameters
-    ----------
-    path : Path
-    compressed : bool
-        Whether its members may be; without, they take no more memory than the file has bytes.
-    key : str
-        What it was sealed with.
+    Members that may not be compressed take no more memory than the file has bytes.
     """
     with open_plain(path) as file:
         try:

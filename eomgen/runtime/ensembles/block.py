@@ -196,15 +196,7 @@ class RunBlock:
 
 
 def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None = None) -> RunBlock:
-    """Run all of a block.
-
-    Parameters
-    ----------
-    threads : int
-        Runs at a time; the results do not depend on it.
-    watch : callable, optional
-        Told now and then how many runs have ended.
-    """
+    """Run all of a block on threads, whose number changes no result; ``watch`` takes how many runs have ended."""
     varied, plan, count = runs.varied, runs.plan, runs.count
     x0, failed, words = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
     core: Any = eager(runs.module.core)
@@ -496,12 +488,7 @@ FORMAT = "eomgen ensemble 2"
 class Store:
     """A folder with a file for each finished block and a manifest that says which ensemble they belong to.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Made if it is not there.
-    identity : dict
-        What the results depend on, JSON-like.
+    The folder is made if it is not there; ``identity`` is what the results depend on, JSON-like.
     """
 
     def __init__(self, folder: str | Path, identity: dict[str, Any]) -> None:

@@ -247,14 +247,9 @@ def forces_on_second(rows: Array) -> Array:
 
 
 class ForceSums:
-    """What is added up of the contacts of each step.
+    """What is added up of the contacts of each step: by name, numbers and shapes of each contact between groups.
 
-    Parameters
-    ----------
-    lists : sequence of (str, int, int)
-        Name, numbers and shapes of each contact between groups.
-    keep : bool
-        Keep single contacts as well.
+    ``keep`` keeps single contacts as well.
     """
 
     def __init__(self, lists: Sequence[tuple[str, int, int]], steps: int, keep: bool) -> None:

@@ -53,14 +53,9 @@ STEPS = 25  #: Newton steps
 
 
 class DrivenCoordinates:
-    """Solves for the motion of a module that is led by some of its coordinates.
+    """Solves for the motion of a bound module whose driven coordinates are as many as its degrees of freedom.
 
-    Parameters
-    ----------
-    module : BoundModel
-        With parameters and inputs bound.
-    led : sequence of str
-        Coordinates of the tree or of cut joints, as many as degrees of freedom.
+    They are of the tree or of cut joints.
     """
 
     def __init__(self, module: BoundModel, led: Sequence[str]) -> None:

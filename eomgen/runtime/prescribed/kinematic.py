@@ -208,12 +208,7 @@ def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
 def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> str:
     """The largest gap that is left when all equations are met as well as they can be.
 
-    Parameters
-    ----------
-    y : (n_led,) array
-        Values of the led coordinates.
-    near : (n_q,) array
-        A closed position beside it.
+    y (n_led,) are the values of the driven coordinates, ``near`` (n_q,) a closed position beside it.
     """
     layout, scales = driven.layout, driven.scales
     system, led = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
