@@ -90,7 +90,7 @@ def limits() -> Iterator[str]:
             yield from (f"{file.name}: a limit without a name: {found}" for found in re.findall(pattern, text))
             try:
                 definitions(text)
-            except AttributeError as error:
+            except (AttributeError, KeyError) as error:
                 yield f"{file.name}: {error}"
 
 

@@ -8,9 +8,8 @@ from itertools import accumulate
 from typing import Any
 
 from ..toolchain.layer import SOLVER_HEADERS, read_header
-from .loop_slopes import BY_BODIES
 from .pair_sums import contact_areas, kept_of, sums_again
-from .program import SHIFTS, Block, Program
+from .program import BY_BODIES, SHIFTS, Block, Program
 
 
 def is_straight(program: Program) -> bool:

@@ -12,7 +12,7 @@ from ..mechanics import Kinematics
 from ..mechanics.methods import METHODS, TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.wrenches import cut_drives
-from .factor import factoring_operations, factorize, has_long_paths, is_unrolled
+from .linear_algebra import factoring_operations, factorize_tree, has_long_paths, is_unrolled
 from .loop_systems import BodyLoops, EmbeddedLoops, estimate
 from .program import Limits
 from .terms import SystemTerms
@@ -128,7 +128,7 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     else:
         turned = embedding.turned
         mass, bias = turned.system if turned else (embedding.mass_matrix, embedding.bias)
-        solution = factorize(mass, kinematics.parent).solve([-h for h in bias])
+        solution = factorize_tree(mass, kinematics.parent).solve([-h for h in bias])
         total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
     chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding

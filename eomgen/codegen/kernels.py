@@ -16,12 +16,11 @@ from ..expr.differentiate import jacobian, jvp
 from ..expr.schedule import count
 from ..mechanics.wrenches import inertial_terms
 from .contact_columns import COLUMNS, ContactColumns, contact_columns
-from .factor import articulated_positivity, is_unrolled
-from .jacobian_blocks import Entries, ResidualSlopes, solve_tree, unrolled_jacobian, unrolled_shift
+from .jacobian_blocks import Entries, LoopSlopes, ResidualSlopes, solve_tree, unrolled_jacobian, unrolled_shift
+from .linear_algebra import articulated_positivity, is_unrolled
 from .loop_motions import MotionLoops, motion_loops
-from .loop_slopes import BY_BODIES, LoopSlopes
 from .loop_systems import BodyLoops, LoopBlocks, straight_loops
-from .program import ALONG, BY_MOTIONS, BY_SYSTEM, COMPOSED, RATES, SHIFTS, Block, Limits, Port, flat
+from .program import ALONG, BY_BODIES, BY_MOTIONS, BY_SYSTEM, COMPOSED, RATES, SHIFTS, Block, Limits, Port, flat
 from .terms import SystemTerms
 
 

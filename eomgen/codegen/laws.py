@@ -10,7 +10,7 @@ from ..base.operations import CONDITION, operations_with
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import jacobian
 from ..expr.tensors import Matrix, combined, dot, eliminate, reduced, substituted_back, total
-from ..native.limits.systems import FIXED
+from ..native.limits import SYSTEMS_FIXED
 
 #: Most pieces of one law: what is written out grows with them.
 MANY = 64
@@ -270,7 +270,7 @@ def _newton(
     certain = certain * _certain([i for i, _ in pieces], dict(zip(bounds, values[n:], strict=True)), gain, n, graph.one)
     apart = total([graph.apply("abs", g - f) for g, f in zip(values[:n], force, strict=True)])
     size = total([graph.apply("abs", g) for g in values[:n]])
-    certain = certain * graph.apply("le", apart, size * FIXED)
+    certain = certain * graph.apply("le", apart, size * SYSTEMS_FIXED)
     found = {law: _if(certain, g) for law, g in zip(laws, values[:n], strict=True)}
     return _at(still, gain, [_if(certain, f) for f in force]), found
 

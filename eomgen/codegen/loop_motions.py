@@ -17,7 +17,7 @@ from functools import cached_property
 from ..base.limits.constraints import LOST
 from ..expr.core import Expr, substitute
 from ..expr.schedule import count
-from ..native.limits.crossings import NEAR_SQUARE
+from ..native.limits import CROSSINGS_NEAR_SQUARE
 from .linear_algebra import (
     Leg,
     OrthogonalFactor,
@@ -141,7 +141,7 @@ class MotionLoops(LoopBlocks):
         parallel, or short beside others, nor so that they move many times as fast.
         """
         graph, s = self.terms.graph, self.s
-        found = self._across(LOST if self._in_a_row else NEAR_SQUARE)
+        found = self._across(LOST if self._in_a_row else CROSSINGS_NEAR_SQUARE)
         for j, k in enumerate(self.terms.preferred):
             square = self._products[j][j] * (s[k] * s[k])
             found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
@@ -154,7 +154,7 @@ class MotionLoops(LoopBlocks):
         lengths = [x * k for x, k in zip(self._factor.squares, scales, strict=True)]
         least: dict[int, Expr] = {}
         for part in self._factor.parts:
-            least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * NEAR_SQUARE)
+            least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * CROSSINGS_NEAR_SQUARE)
         found = []
         for columns, ordinary, apart in self._factor.apart:
             for k in columns:
@@ -190,7 +190,7 @@ class MotionLoops(LoopBlocks):
         a, checks = embedded_accelerations(terms, self._motions, given, here[: terms.n_v], self._legs)
         conditions += self._follows()
         if self._in_a_row:  # else columns tell already that no change point is near
-            columns = self.all_of(self._across(NEAR_SQUARE))
+            columns = self.all_of(self._across(CROSSINGS_NEAR_SQUARE))
             conditions.append(terms.graph.apply("or", columns, self.separate_rows()))
         if self.redundant:  # whose rates may contradict each other
             rate = self.scaled(terms.constraint_rate)

@@ -19,17 +19,18 @@ from ..expr.tensors import total
 from ..mechanics.constraint_functions import ALL, UNIT
 from ..mechanics.diagonal_blocks import DiagonalBlock, diagonal_blocks
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
-from ..native.limits.crossings import NEAR_SQUARE, SMALL
-from .factor import exceeding, outward
+from ..native.limits import CROSSINGS_NEAR_SQUARE, CROSSINGS_SMALL
 from .linear_algebra import (
     Leg,
     Row,
     SparseFactor,
     dot,
+    exceeding,
     factorize,
     gram,
     in_parts,
     minimum_degree,
+    outward,
     quadratic_form,
     rows_of,
     times,
@@ -280,8 +281,12 @@ class LoopBlocks(ABC):
             if group == ALL:
                 size = largest(self.row_squares)
             else:
-                size = unit if group == UNIT else graph.apply("max", largest(own), unit * (SMALL * SMALL))
-            found[group] = size * NEAR_SQUARE
+                size = (
+                    unit
+                    if group == UNIT
+                    else graph.apply("max", largest(own), unit * (CROSSINGS_SMALL * CROSSINGS_SMALL))
+                )
+            found[group] = size * CROSSINGS_NEAR_SQUARE
         return found
 
     def long_rows(self, part: float = 1.0) -> Expr:
@@ -299,7 +304,7 @@ class LoopBlocks(ABC):
         graph, pivots, limits = self.terms.graph, self.solver[0].pivots, self.short_squares
         separate = []
         for pivot, square, group in zip(pivots, self.row_squares, self.groups, strict=True):
-            apart = graph.apply("lt", square * NEAR_SQUARE, pivot)
+            apart = graph.apply("lt", square * CROSSINGS_NEAR_SQUARE, pivot)
             separate.append(graph.apply("and", apart, graph.apply("lt", limits[group], square)))
         return self._as_many_as_the_rank(separate)
 
@@ -369,7 +374,7 @@ class EmbeddedLoops(LoopBlocks):
         parallel too, where no row vanishes; or by the rows of all.
         """
         graph = self.terms.graph
-        columns = [graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles]
+        columns = [graph.apply("lt", size * CROSSINGS_NEAR_SQUARE, part) for size, part in self._angles]
         far = self.all_of([*columns, self.long_rows()])
         if self.gentle and columns and not self.redundant:
             far = graph.apply("or", far, self.separate_rows())
@@ -516,7 +521,7 @@ class BodyLoops(LoopBlocks):
         graph, separate, angles = self.terms.graph, self.separate_rows(), self._angles_of_columns()
         if angles is None:
             return separate
-        columns = [graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles]
+        columns = [graph.apply("lt", size * CROSSINGS_NEAR_SQUARE, part) for size, part in angles]
         return graph.apply("or", self.all_of([*columns, self.long_rows()]), separate)
 
     def _angles_of_columns(self) -> list[tuple[Expr, Expr]] | None:
@@ -539,7 +544,7 @@ class BodyLoops(LoopBlocks):
                     [x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None]
                 )
                 # columns that are short beside the ordinary entry have no angle but that of their rounding
-                angles.append((self.terms.graph.apply("max", size, ordinary * ordinary * NEAR_SQUARE), part))
+                angles.append((self.terms.graph.apply("max", size, ordinary * ordinary * CROSSINGS_NEAR_SQUARE), part))
         return angles
 
 

@@ -11,8 +11,7 @@ from ..contact.pairs import PairCall, PairFunction, pair_call
 from ..errors import cannot
 from ..expr.core import Expr, Graph, reachable
 from .contact_columns import WRENCH
-from .loop_slopes import BY_BODIES
-from .program import Program
+from .program import BY_BODIES, Program
 
 
 class UsedSum(NamedTuple):

@@ -25,6 +25,9 @@ RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
 #: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
 BY_SYSTEM, BY_MOTIONS = ("closing", "dynamics"), ("short_closing", "short_dynamics")
 
+#: Blocks behind the Jacobian of loops: of the state, and of a direction of q and of v.
+BY_BODIES = ("loop_slopes", "slopes_by_position", "slopes_by_velocity")
+
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
 

@@ -33,16 +33,16 @@ from ..mechanics.sparse_rows import SparseRows
 from ..mechanics.switched import SwitchedRow, switched_rows
 from ..mechanics.wrenches import JointWrenches, Row6, joint_reactions
 from ..model.mechanism import Mechanism
-from ..native.limits.systems import UNTOUCHED
-from .factor import factorize
+from ..native.limits import SYSTEMS_UNTOUCHED
 from .laws import MANY, laws_in, pieces_of, solve_laws
+from .linear_algebra import factorize_tree
 from .switched_constraints import AfterEvents, LinearValues, solve_rows
 
 
 def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) -> list[Expr]:
     """l = -(C C^T)^-1 C (M a + h), the multipliers of independent rows C."""
     gram = [[dot(one, other) for other in rows] for one in rows]
-    return factorize(gram, range(-1, len(rows) - 1)).solve([-dot(row, forces) for row in rows])
+    return factorize_tree(gram, range(-1, len(rows) - 1)).solve([-dot(row, forces) for row in rows])
 
 
 def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
@@ -108,7 +108,7 @@ def refuse_undetermined(
 def _depends(found: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
     """Whether what is asked for depends on such multipliers."""
     slopes = list(jacobian(substitute(list(found), dict(values)), list(on)).values())
-    return not all(vanishes(_with_every_choice(slopes), UNTOUCHED, pieces=True))
+    return not all(vanishes(_with_every_choice(slopes), SYSTEMS_UNTOUCHED, pieces=True))
 
 
 def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr]) -> list[Expr]:
@@ -130,8 +130,8 @@ def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr
             S[i, j] = d
         for k in range(0, len(flat), 3):  # forces and moments apart: their scales differ
             some, wrench = S[k : k + 3], values[k : k + 3]
-            related |= np.abs(some.T @ some) > UNTOUCHED
-            moved |= np.abs(some.T @ wrench) > UNTOUCHED
+            related |= np.abs(some.T @ some) > SYSTEMS_UNTOUCHED
+            moved |= np.abs(some.T @ wrench) > SYSTEMS_UNTOUCHED
     for _ in idle:  # what is related to something open is open too
         moved = moved | related @ moved
     return [multiplier for multiplier, is_open in zip(idle, moved, strict=True) if is_open]
@@ -437,7 +437,7 @@ def _motion(
     refuse_without_inertia(kinematics, still, laws)
     right = [[-h for h in bias]]
     right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
-    factor = factorize(mass_matrix, parent)
+    factor = factorize_tree(mass_matrix, parent)
     free = [factor.solve(column) for column in right]
     moved = [factor.solve(row) for row in C]
     schur = [[dot(row, y) for y in moved] for row in C]

@@ -17,10 +17,9 @@ from ..base.limits.numbers import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..base.operations import FUNCTION, OPERATIONS
 from ..errors import cannot
 from ..expr.schedule import Operations
-from ..native.limits import KINDS
-from ..native.limits.crossings import REACH, SHORTEST
+from ..native.limits import CROSSINGS_REACH, CROSSINGS_SHORTEST, KINDS
 from .c_functions import used_calls
-from .factor import factoring_operations
+from .linear_algebra import factoring_operations
 from .pair_sums import refuse_sums
 from .program import Block, Program
 
@@ -55,7 +54,7 @@ def operations_of(program: Program, name: str) -> str:
 
 def states_beside_change_points() -> int:
     """How many states a function looks at, at most, where the position that it is given is next to a change point."""
-    return 1 + 2 * PAIRS * (floor(log2(REACH / SHORTEST)) + 1)
+    return 1 + 2 * PAIRS * (floor(log2(CROSSINGS_REACH / CROSSINGS_SHORTEST)) + 1)
 
 
 def _counted(operations: Operations) -> str:

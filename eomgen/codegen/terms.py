@@ -25,7 +25,7 @@ from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.near_pairs import motion_axes, near_pairs
 from ..mechanics.wrenches import cut_drives, find_wrenches
-from .factor import has_long_paths
+from .linear_algebra import has_long_paths
 from .reactions import multiplier_values
 
 Row = tuple[Expr, ...]
