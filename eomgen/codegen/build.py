@@ -59,11 +59,7 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
     """Decide what functions to generate, of all kernels or some.
 
     The metadata are completed with sizes, shapes and counts.
-
-    Raises
-    ------
-    UsageError
-        An unknown kernel, or a name that is no C identifier.
+    Raises UsageError (an unknown kernel, or a name that is no C identifier).
     """
     name = str(metadata["name"])
     if not (name.isidentifier() and name.isascii()) or name == "eomgen":
@@ -198,10 +194,7 @@ def _spell_graph(program: Program, known: Known) -> list[Any]:
 def _spell(value: Any, known: Known) -> Any:
     """A value as what has one exact ``repr``; objects that many hold by what their fields hash to, once for all.
 
-    Raises
-    ------
-    TypeError
-        It has none.
+    Raises TypeError (it has none).
     """
     kind = type(value)
     if kind in (str, int, float, bool, type(None)):

@@ -113,10 +113,7 @@ TOGETHER = 14
 def series_files(program: Program) -> dict[str, str]:
     """``<name>_series.h`` with the function over ``real``, and ``<name>_series.c``.
 
-    Raises
-    ------
-    NoSeriesError
-        The program has none.
+    Raises NoSeriesError (the program has none).
     """
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")

@@ -67,27 +67,10 @@ def emit_package(
 ) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
-    Parameters
-    ----------
-    program : Program
-    target : {'cython', 'c'}
-    precision : {'double', 'float'}, optional
-        Of the numbers of a ``c`` library.
-    asked : mapping of str to object, optional
-        Further options of the generation, for the provenance.
-    analyses : bool, optional
-        Whether a Python package carries the analyses too.
-
-    Returns
-    -------
-    SourceSet
-        ``c``: sources, header, Makefile, README.md.  ``cython``: a Python package whose root is the
-        folder itself, with pyproject.toml; installs with pip, needs NumPy alone.
-
-    Raises
-    ------
-    UsageError
-        An unknown target or precision, ``float`` for another target than ``c``, analyses for one that is not Python.
+    ``c``: sources, header, Makefile, README.md.  ``cython``: a Python package whose root is the folder itself, with
+    pyproject.toml; installs with pip, needs NumPy alone.  ``asked`` are further options of the generation, for the
+    provenance.  Raises UsageError (an unknown target or precision, ``float`` for another target than ``c``, analyses
+    for one that is not Python).
     """
     row = find_target(target)
     if row.whole:
@@ -199,26 +182,11 @@ MANIFEST = "model.json"  #: lists the files of the package under "files"
 
 
 def write_package(sources: Mapping[str, str], folder: Path) -> Path:
-    """Write a package so that no file is ever half there.
+    """Write a package, texts by relative name, into a folder, so that no file is ever half there; returns the folder.
 
-    Files of an earlier generation that are not part of this one are removed; others are left alone.
-
-    Parameters
-    ----------
-    sources : mapping of str to str
-        Relative file names and their text; ``model.json`` among them.
-    folder : Path
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    UsageError
-        The folder holds something else, or a file in the way that eomgen did not write; the folder, or one in it that
-        files go to, is a symbolic link.
+    Files of an earlier generation that are not part of this one are removed; others are left alone.  Raises UsageError
+    (the folder holds something else, or a file in the way that eomgen did not write; it, or one in it that files go to,
+    is a symbolic link).
     """
     _refuse_links(folder, sources)
     earlier = _earlier_files(folder)

@@ -70,12 +70,7 @@ def sums_again(program: Program) -> list[SumAgain]:
 
 
 def refuse_sums(program: Program, target: str) -> None:
-    """Refuse contacts between groups where a target has no form for them.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse contacts between groups where a target has no form for them. Raises UsageError."""
     names = sorted({function.element for function, *_ in used_sums(program)})
     if names:
         raise cannot(

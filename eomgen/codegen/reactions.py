@@ -78,10 +78,7 @@ def refuse_undetermined(
 
     ``every`` are the wrenches of joints along the axes of S in terms of ``idle``, the multipliers of equations that
     vanish; ``values`` what the symbols of reactions and multipliers stand for, in terms of these too.
-
-    Raises
-    ------
-    ModelError
+    Raises ModelError.
     """
     if not _depends(list(values.values()), {}, idle):
         return
@@ -258,10 +255,7 @@ def refuse_redundant(
 
     ``multipliers`` are the symbols of the rows' multipliers, ``values`` what the symbols of reactions and multipliers
     stand for, in terms of these.
-
-    Raises
-    ------
-    ModelError
+    Raises ModelError.
     """
     mechanism, motion = kinematics.mechanism, kinematics.motion
     if not mobility.redundant or not (shared := _shared(kinematics, mobility, multipliers, values)):
@@ -310,10 +304,8 @@ def _shared(
 def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     """Replace the reactions that laws speak of by what they are at a state.
 
-    Raises
-    ------
-    ModelError
-        A reaction that rigid bodies do not determine, or of a joint that has none; a law of too many pieces.
+    Raises ModelError (a reaction that rigid bodies do not determine, or of a joint that has none; a law of too many
+    pieces).
     """
     refuse_joints(kinematics)
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
@@ -460,9 +452,7 @@ def _reactions(
 ) -> tuple[list[Expr], list[Expr]]:
     """The components in terms of accelerations, multipliers and forces, and the multipliers of ``labels``.
 
-    Raises
-    ------
-    ModelError
+    Raises ModelError.
     """
     graph = kinematics.graph
     wrenches = JointWrenches(kinematics)
@@ -488,12 +478,7 @@ def _reactions(
 
 
 def _row(kinematics: Kinematics, name: str, labels: Sequence[str], laws: Laws) -> str:
-    """The label of an equation, which may be named by its element where that has no other.
-
-    Raises
-    ------
-    ModelError
-    """
+    """The label of an equation, which may be named by its element where that has no other. Raises ModelError."""
     own = [label for label in labels if label.partition(".")[0] == name.partition(".")[0]]
     if name in own:
         return name

@@ -61,10 +61,7 @@ def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = Fals
 def make_series(program: Program) -> Series:
     """The terms of a program's right-hand side.
 
-    Raises
-    ------
-    NoSeriesError
-        It is not straight-line code of smooth operations.
+    Raises NoSeriesError (it is not straight-line code of smooth operations).
     """
     block = next((b for b in program.blocks if b.name == "rhs"), None)
     if program.has_loops:

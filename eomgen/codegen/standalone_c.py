@@ -153,12 +153,7 @@ def single_limit(value: float) -> float:
 
 
 def refuse_double(program: Program) -> None:
-    """Refuse what cannot be written in single precision.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Refuse what cannot be written in single precision. Raises UsageError."""
     refuse_sums(program, "precision='float'")
     laws = program.metadata.get("reaction_laws", [])
     if laws:

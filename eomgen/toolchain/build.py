@@ -53,11 +53,7 @@ def compile_sources(
     without the option ``lanes``, lanes and series are left to :func:`compile_lanes`.  ``library`` is for C programs or
     ctypes: every function that is not static can be called, and C files that all models share are compiled once.  The
     key of the entry may come from :func:`key_of_program`; by default it is that of the sources and flags.
-
-    Raises
-    ------
-    ToolchainError
-        There is no compiler, the compiler fails, or the cache cannot be used.
+    Raises ToolchainError (there is no compiler, the compiler fails, or the cache cannot be used).
     """
     for file in (name, *sources):
         if not re.fullmatch(r"\w[\w.-]*", file):
@@ -159,11 +155,7 @@ def compile_and_link(
 
     ``jobs`` files are compiled at a time, ``link`` are flags of the linker.  Of what is made nothing but the library
     stays in the directory; ``objects`` make further object files, which stay where they are.
-
-    Raises
-    ------
-    ToolchainError
-        The compiler fails, does not come to an end, or made nothing.
+    Raises ToolchainError (the compiler fails, does not come to an end, or made nothing).
     """
     tasks: list[Task] = [
         partial(_compile_file, directory, file, flags, compiler, progress) for file, flags in files.items()
@@ -223,11 +215,7 @@ def compile_lanes(file: Path) -> CacheEntry | None:
     """The library with the lanes and series of a model, compiled now if need be, by the flags of the model.
 
     The model's sources lie beside its library, ``file``, in the cache.  None if no lanes are for this processor.
-
-    Raises
-    ------
-    ToolchainError
-        They cannot be compiled.
+    Raises ToolchainError (they cannot be compiled).
     """
     cache, of = Cache(file.parents[2]), file.parent.name
     try:

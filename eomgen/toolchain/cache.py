@@ -37,10 +37,7 @@ GRACE = 3600.0
 def cache_directory() -> Path:
     """Where builds are kept: the environment variable EOMGEN_CACHE_DIR, else eomgen's folder in the user's cache.
 
-    Raises
-    ------
-    ToolchainError
-        Neither can be told: there is no home directory, no such user, no current directory.
+    Raises ToolchainError (neither can be told: there is no home directory, no such user, no current directory).
     """
     chosen = os.environ.get("EOMGEN_CACHE_DIR")
     try:
@@ -100,10 +97,7 @@ class Cache:
     def find(self, key: str) -> CacheEntry | None:
         """The entry of a key if it is there and every file is as it was published; notes that it was used.
 
-        Raises
-        ------
-        ToolchainError
-            Another user could have written it.
+        Raises ToolchainError (another user could have written it).
         """
         directory = self._entries / key
         if not os.path.isdir(directory):
@@ -120,12 +114,7 @@ class Cache:
         return entry
 
     def require_owner(self) -> None:
-        """Refuse a cache whose folders others own or can write.
-
-        Raises
-        ------
-        ToolchainError
-        """
+        """Refuse a cache whose folders others own or can write. Raises ToolchainError."""
         for folder in (self.root, self._entries, self._attempts):
             if os.path.lexists(folder):
                 files.require_trusted(folder)

@@ -55,11 +55,7 @@ class Commands:
         The directory is for temporary files too, so that a killed compiler leaves nothing elsewhere.  The command may
         take so many seconds, unless EOMGEN_COMPILER_SECONDS says otherwise.  An exit status other than 0 is an error if
         it is said what the command is for, by ``task``.
-
-        Raises
-        ------
-        ToolchainError
-            It cannot be started, takes longer, prints without end, or fails.
+        Raises ToolchainError (it cannot be started, takes longer, prints without end, or fails).
         """
         import shlex
         from subprocess import DEVNULL, PIPE, STDOUT, CompletedProcess, Popen
@@ -208,11 +204,7 @@ def find_compiler(command: str | None = None) -> CompilerInfo:
     Tried in this order: `command`, a command line such as ``"clang-18"`` or ``"ccache gcc"``, the environment variable
     CC, the compiler Python was built with, gcc, clang, cc, zig on the path and zig from the package ziglang. If one of
     the first two is set, no other is tried.
-
-    Raises
-    ------
-    ToolchainError
-        If none works; the message lists what was tried and what to install.
+    Raises ToolchainError (none works; the message lists what was tried and what to install).
     """
     return _find(command, os.environ.get("CC", ""), os.environ.get("PATH", ""))
 

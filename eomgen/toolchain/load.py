@@ -36,11 +36,7 @@ def load_core(entry: CacheEntry) -> Any:
 
     It is named after the model and the key of the build, so different models, and different builds of one model, live
     side by side; loading one build again returns the same core.
-
-    Raises
-    ------
-    ToolchainError
-        If the file cannot be loaded.
+    Raises ToolchainError (the file cannot be loaded).
     """
     return open_core(f"eomgen_models.{entry.name}_{entry.key[:16]}", entry.product)
 
@@ -70,10 +66,8 @@ def open_core(name: str, file: Path) -> Any:
 def find_core(name: str, path: Path) -> Any:
     """The core of a pickled module, which is not loaded, from the file of its code.
 
-    Raises
-    ------
-    ToolchainError
-        The file is gone or damaged, another user could have written it, or it needs another processor.
+    Raises ToolchainError (the file is gone or damaged, another user could have written it, or it needs another
+    processor).
     """
     try:
         if (path.parent / MANIFEST).exists():
@@ -118,10 +112,7 @@ def processor_features() -> frozenset[str]:
 def recipe_of(file: Path) -> str:
     """What the build is made from that the file of a library or core belongs to, as JSON; empty without its sources.
 
-    Raises
-    ------
-    ToolchainError
-        The build is damaged.
+    Raises ToolchainError (the build is damaged).
     """
     try:
         facts, files = read_entry(file.parent)
@@ -253,10 +244,7 @@ class Linear:
 def checked(out: Array, lost: Sequence[Any]) -> Array:
     """What a block gives, but of a state that fails a check.
 
-    Raises
-    ------
-    SingularMassMatrixError
-        Of one state; in a batch it has NaN.
+    Raises SingularMassMatrixError (of one state; in a batch it has NaN).
     """
     failed = reduce(np.logical_or, lost)
     if out.ndim > 1:

@@ -33,12 +33,8 @@ _lock = Lock()
 def find_native() -> ModuleType:
     """The module, built now if need be.
 
-    Raises
-    ------
-    MissingDependencyError
-        It must be built, and Cython is not installed.
-    ToolchainError
-        It must be built, and there is no compiler, there are no headers of Python, or the build fails.
+    Raises MissingDependencyError (it must be built, and Cython is not installed), ToolchainError (it must be built, and
+    there is no compiler, there are no headers of Python, or the build fails).
     """
     name, clone = f"{__package__.partition('.')[0]}.{NAME}", PACKAGE.parent / "pyproject.toml"
     with _lock:
@@ -105,13 +101,7 @@ def build_native(folder: Path) -> None:
 
 
 def find_python_headers() -> Path:
-    """Directory of Python.h.
-
-    Raises
-    ------
-    ToolchainError
-        If it is not installed.
-    """
+    """Directory of Python.h. Raises ToolchainError (it is not installed)."""
     import sysconfig
 
     directory = Path(sysconfig.get_path("include"))

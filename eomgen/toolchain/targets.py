@@ -44,37 +44,18 @@ FMU_KERNELS = (
 
 
 class Target(NamedTuple):
-    """One target.
+    """One target; functions of eomgen as "file.function"."""
 
-    Attributes
-    ----------
-    about : str
-        What comes of it, for help.
-    package : callable or str
-        (Program, context) -> the files of a package that stands alone, by name; or "file.function" within eomgen.  The
-        context is what templates are rendered with: name, doc, metadata, layouts, calls.
-    load : str
-        "file.function" of (program, options, seconds, functions) that makes a core in this process.
-    functions : str
-        "file.function" of (program, options) that makes functions of another library, or of a device, in this process.
-    arrays : bool
-        Whether loops over arrays do better than straight-line code.
-    precisions : bool
-        Whether its numbers may be of single precision.
-    kernels : tuple of str
-        The functions it has, of :data:`~eomgen.base.kernel_table.KERNELS`; all if empty.
-    whole : str
-        "file.function" of (program, module, directory, version) that writes one file instead of a package.
-    """
-
-    about: str
-    package: Callable[[Any, dict[str, Any]], Files] | str = ""
-    load: str = ""
-    functions: str = ""
-    arrays: bool = False
-    precisions: bool = False
-    kernels: tuple[str, ...] = ()
-    whole: str = ""
+    about: str  #: what comes of it, for help
+    #: of (program, context): makes the files of a package that stands alone, by name; the context is what templates are
+    #: rendered with: name, doc, metadata, layouts, calls
+    package: str = ""
+    load: str = ""  #: of (program, options, seconds, functions): makes a core in this process
+    functions: str = ""  #: of (program, options): makes functions of another library, or of a device, in this process
+    arrays: bool = False  #: whether loops over arrays do better than straight-line code
+    precisions: bool = False  #: whether its numbers may be of single precision
+    kernels: tuple[str, ...] = ()  #: the functions it has, of :data:`~eomgen.base.kernel_table.KERNELS`; all if empty
+    whole: str = ""  #: of (program, module, directory, version): writes one file instead of a package
 
     @property
     def module(self) -> bool:
@@ -83,7 +64,7 @@ class Target(NamedTuple):
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
-        found: Files = (self.package if callable(self.package) else find_function(self.package))(program, context)
+        found: Files = find_function(self.package)(program, context)
         return found
 
 
@@ -132,13 +113,7 @@ TARGETS: dict[str, Target] = {
 
 
 def find_target(name: str, allowed: Iterable[str] | None = None) -> Target:
-    """The row of a name.
-
-    Raises
-    ------
-    UsageError
-        There is none, or none among those allowed.
-    """
+    """The row of a name. Raises UsageError (there is none, or none among those allowed)."""
     names = list(TARGETS if allowed is None else allowed)
     if not isinstance(name, str) or name not in names:
         raise no_such(f"no target {name!r}; there are {', '.join(names)}")

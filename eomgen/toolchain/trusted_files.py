@@ -49,17 +49,8 @@ ACL = "system.posix_acl_access"
 def require_trusted(path: str | os.PathLike[str]) -> None:
     """Refuse a folder or file that another user could have filled.
 
-    Parameters
-    ----------
-    path : str or path
-        Must be there.
-
-    Raises
-    ------
-    ToolchainError
-        Naming the first folder, file or link from the top that another user owns or can write, with owner and mode.
-    OSError
-        The path is not there.
+    Raises ToolchainError, which names the first folder, file or link from the top that another user owns or can write,
+    and OSError where the path is not there.
     """
     if not hasattr(os, "geteuid"):
         return
@@ -90,12 +81,7 @@ def require_trusted(path: str | os.PathLike[str]) -> None:
 def read_trusted(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a file in a folder that was checked, after a look at who owns the open file.
 
-    Raises
-    ------
-    ToolchainError
-        Another user owns it or can write it.
-    OSError
-        It is not there, or is no regular file: a link, a pipe.
+    Raises ToolchainError (another user owns it or can write it), OSError (not there, or a link or pipe).
     """
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     with open(os.open(path, flags), "rb", buffering=0) as file:
@@ -194,13 +180,7 @@ PATIENCE = 10.0  #: seconds to wait for a lock that is held for milliseconds; a 
 
 @contextmanager
 def hold(folder: Path) -> Iterator[None]:
-    """Hold a folder.
-
-    Raises
-    ------
-    BlockingIOError
-        Another process, or thread, holds it.
-    """
+    """Hold a folder. Raises BlockingIOError (another process, or thread, holds it)."""
     descriptor = os.open(folder, os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0))
     try:
         _lock(descriptor)
@@ -246,25 +226,13 @@ def _lock(descriptor: int) -> None:
 
 
 class Kept:
-    """A folder of such files.
-
-    Parameters
-    ----------
-    folder : Path
-        Made when the first file is written.
-    """
+    """A folder of such files, made when the first is written."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def read(self, name: str) -> bytes | None:
-        """The content of a file, or None.
-
-        Raises
-        ------
-        ToolchainError
-            Another user could have written it.
-        """
+        """The content of a file, or None. Raises ToolchainError (another user could have written it)."""
         try:
             require_trusted(self.folder)
             data = read_trusted(self.folder / name)
@@ -317,14 +285,7 @@ def sealed(manifest: Mapping[str, Any]) -> str:
 def read_manifest(directory: Path) -> dict[str, Any]:
     """The manifest of an entry as it was written.
 
-    Raises
-    ------
-    ValueError
-        It is damaged.
-    OSError
-        It cannot be read.
-    ToolchainError
-        Another user could have written it.
+    Raises ValueError (it is damaged), OSError (it cannot be read), ToolchainError (another user could have written it).
     """
     require_trusted(directory)
     try:
@@ -340,14 +301,8 @@ def read_manifest(directory: Path) -> dict[str, Any]:
 def read_entry(directory: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
     """The manifest of an entry and the bytes of all its files, each as it was published.
 
-    Raises
-    ------
-    ValueError
-        Something is damaged.
-    OSError
-        Something is missing.
-    ToolchainError
-        Another user could have written it.
+    Raises ValueError (something is damaged), OSError (something is missing), ToolchainError (another user could have
+    written it).
     """
     manifest = read_manifest(directory)
     files: dict[str, str] = manifest["files"]
@@ -379,19 +334,7 @@ class _Text(importlib.abc.SourceLoader):
 
 
 def load_source(name: str, path: str, data: bytes, given: Mapping[str, Any] | None = None) -> ModuleType:
-    """Make a module from its text.
-
-    Parameters
-    ----------
-    name : str
-        Of the module; relative imports go by it.
-    path : str
-        What ``__file__`` says; not read.
-    data : bytes
-        The text.
-    given : mapping, optional
-        What the module knows before it runs.
-    """
+    """Make a module from its text; ``path`` is what ``__file__`` says, ``given`` what it knows before it runs."""
     loader = _Text(path, data)
     spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     assert spec is not None

@@ -43,10 +43,7 @@ CARRIED = ("errors.py", "base", "runtime")
 def emit_device_text(program: Program) -> str:
     """The text of ``<name>.cu``, with the kernels :data:`~eomgen.toolchain.targets.DEVICE_KERNELS`.
 
-    Raises
-    ------
-    UsageError
-        The model calls functions in C, which may use what a device does not have.
+    Raises UsageError (the model calls functions in C, which may use what a device does not have).
     """
     refuse_sums(program, "target 'cuda'")
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]

@@ -40,12 +40,7 @@ from ..program import Program
 
 
 def check_version(version: str) -> str:
-    """The version in full, from '2', '2.0', '3' or '3.0'.
-
-    Raises
-    ------
-    UsageError
-    """
+    """The version in full, from '2', '2.0', '3' or '3.0'. Raises UsageError."""
     for known in FMI_VERSIONS:
         if str(version) in (known, known.partition(".")[0]):
             return known
@@ -53,12 +48,7 @@ def check_version(version: str) -> str:
 
 
 def refuse_impacts(program: Program, holder: str = "an FMU") -> None:
-    """Refuse events and contacts whose impacts the generated code leaves to Python.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Refuse events and contacts whose impacts the generated code leaves to Python. Raises ModelError."""
     remedy = "describe the new velocities with reset, or leave the event out"
     problems = [
         Problem(f"events.{event['name']}.restitution", f"{holder} cannot hold an impact", remedy, code="EG-UNSUPPORTED")

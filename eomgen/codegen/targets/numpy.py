@@ -25,10 +25,7 @@ DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
 def define_functions(program: Program) -> tuple[list[str], list[str]]:
     """Imports and definitions of ``call_<function>`` for the NumPy module; the loader puts :func:`twins` into it.
 
-    Raises
-    ------
-    UsageError
-        A native function has no Python twin.
+    Raises UsageError (a native function has no Python twin).
     """
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
@@ -59,10 +56,7 @@ def twins(program: Program) -> dict[str, Twin]:
 def emit_numpy(program: Program) -> SourceSet:
     """``_core.py``: the functions of a program, its table for the solvers, and the model made of both.
 
-    Raises
-    ------
-    UsageError
-        A native function has no Python twin.
+    Raises UsageError (a native function has no Python twin).
     """
     imports, definitions = define_functions(program)
     text = json.dumps(program.metadata, allow_nan=False)

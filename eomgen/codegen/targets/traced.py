@@ -56,10 +56,7 @@ def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 def emit_traced(program: Program, library: str) -> str:
     """The text of the module ``<name>`` for 'casadi' or 'jax', of :data:`~...toolchain.targets.TRACED_KERNELS`.
 
-    Raises
-    ------
-    UsageError
-        Something in the model has no form that a library can trace.
+    Raises UsageError (something in the model has no form that a library can trace).
     """
     return render("traced/__init__.py.j2", _context(program, library))
 

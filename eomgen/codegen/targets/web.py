@@ -72,13 +72,7 @@ READ = 12_000  #: operations of the equations; longer ones take minutes to write
 
 
 def find_compiler() -> list[str]:
-    """The command of a C compiler for WebAssembly.
-
-    Raises
-    ------
-    ToolchainError
-        There is none.
-    """
+    """The command of a C compiler for WebAssembly. Raises ToolchainError (there is none)."""
     zig, spec = shutil.which("zig"), importlib.util.find_spec("ziglang")
     if zig is None and spec is not None and spec.origin is not None:
         zig = str(Path(spec.origin).with_name("zig"))
@@ -96,12 +90,7 @@ def find_compiler() -> list[str]:
 
 
 def refuse(program: Program) -> None:
-    """Refuse models that cannot run in a page.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Refuse models that cannot run in a page. Raises ModelError."""
     refuse_impacts(program, "a page")
     metadata, remedy = program.metadata, "simulate it, and show the run: traj.animate('run.html')"
     problems = [Problem(f"constraints.{name}", "it closes and opens by impacts, which a page does not compute", remedy,
@@ -199,10 +188,7 @@ def with_arrows(
 def compile_wasm(program: Program, method: str) -> bytes:
     """The model and the library as WebAssembly, or those of an earlier call.
 
-    Raises
-    ------
-    ToolchainError
-        There is no compiler, it fails, or the model calls more of C than its functions of numbers.
+    Raises ToolchainError (there is no compiler, it fails, or the model calls more of C than its functions of numbers).
     """
     command, layer = find_compiler(), read_layer()
     sources = {name: text for name, text in emit_c(program, lanes=False).items() if name.endswith((".c", ".h"))}
