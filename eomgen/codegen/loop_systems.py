@@ -17,8 +17,8 @@ from ..expr.core import Expr, substitute
 from ..expr.schedule import count
 from ..expr.tensors import total
 from ..mechanics.constraint_functions import ALL, UNIT
-from ..mechanics.diagonal_blocks import DiagonalBlock, diagonal_blocks
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
+from ..mechanics.sparse_rows import DiagonalBlock, diagonal_blocks
 from ..native.limits import CROSSINGS_NEAR_SQUARE, CROSSINGS_SMALL
 from .linear_algebra import (
     Leg,

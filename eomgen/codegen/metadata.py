@@ -24,8 +24,7 @@ from ..mechanics import Kinematics
 from ..mechanics.constraint_functions import row_groups, row_scales, row_velocities
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility, initial_values
-from ..mechanics.near_pairs import describe_contacts
-from ..mechanics.wrenches import find_wrenches
+from ..mechanics.wrenches import describe_contacts, find_wrenches
 from ..model.mechanism import FirstOrderState, Input, Output, Parameter
 from ..model.requirements import Requirement
 from .picture import describe_picture

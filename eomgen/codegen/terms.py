@@ -23,8 +23,7 @@ from ..mechanics.methods.embedding import can_differentiate
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
-from ..mechanics.near_pairs import motion_axes, near_pairs
-from ..mechanics.wrenches import cut_drives, find_wrenches
+from ..mechanics.wrenches import cut_drives, find_wrenches, motion_axes, near_pairs
 from .linear_algebra import has_long_paths
 from .reactions import multiplier_values
 

@@ -11,8 +11,7 @@ import sympy
 from ..errors import UnavailableError
 from ..expr.core import Expr
 from ..expr.notation import Notation, literal
-from ..expr.printing import Formulas, number
-from ..expr.printing.formula import ROUNDED, Formula, Letter
+from ..expr.printing.formula import ROUNDED, Formula, Formulas, Letter, number
 from ..mechanics.report import plane_axis
 from ..model.components import with_instance
 from ..reading import Quantities, ReadingView
@@ -47,20 +46,10 @@ class Shown(NamedTuple):
 
 
 class Author:
-    """Writes the quantities of equations as pieces of a document.
+    """Writes the quantities of equations as pieces of a document, on request only the equations of motion.
 
-    Parameters
-    ----------
-    equations : Equations or ReadingView
-    full : bool
-        Whether every quantity is shown, or only the equations of motion.
-
-    Attributes
-    ----------
-    source : Equations
-        What was derived, of which ``equations`` may be a view.
-    put_in : mapping of str to float or None
-        Parameters and inputs for which values were put in, and these; None where other parameters leave them open.
+    ``source`` is what was derived, of which the equations may be a view, ``put_in`` the parameters and inputs for which
+    values were put in, and these; None where other parameters leave them open.
     """
 
     def __init__(self, equations: Any, full: bool) -> None:
@@ -122,16 +111,9 @@ class Author:
         part: str | None = None,
         pick: Callable[[Any], Any] | None = None,
     ) -> list[Piece]:
-        """A quantity that equations have, and its formula; a sentence where the method does not have it.
+        """A quantity by name, and its formula; a sentence where the method does not have it.
 
-        Parameters
-        ----------
-        left : str
-            LaTeX of the left side.
-        name, part : str
-            What :meth:`~eomgen.reading.Readable.written` takes.
-        pick : callable, optional
-            What of the value is shown.
+        ``left`` is the LaTeX of the left side, ``pick`` chooses what of the value is shown.
         """
         try:
             named, value = self.equations.written(name, part)

@@ -70,14 +70,7 @@ def state_values(module: Any, case: SystemState) -> dict[str, float]:
 
 
 def moving_state(module: Any, velocities: Sequence[str]) -> tuple[np.ndarray, bool]:
-    """The declared initial state and False; where it is at rest and can move, its position at velocities 1 and True.
-
-    Parameters
-    ----------
-    module : BoundModel
-    velocities : sequence of str
-        Names of the independent velocities.
-    """
+    """The declared initial state and False; where it is at rest and can move, its position at velocities 1 and True."""
     x = np.array(module.x0())
     position = x[: module.n_q]
     if not velocities or np.any(x[module.n_q : module.n_q + module.n_v]):
@@ -132,13 +125,7 @@ SMALLEST = 4096 * EPS  #: entries that count as 0
 
 
 class Difference(NamedTuple):
-    """Differences of shown formulas from the compiled module, as shares of the largest entry or term.
-
-    Attributes
-    ----------
-    each : dict of str to float
-    states : int
-    """
+    """Differences of shown formulas from the compiled module, as shares of the largest entry or term."""
 
     each: Mapping[str, float]
     states: int

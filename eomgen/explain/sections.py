@@ -460,16 +460,9 @@ MOST = 400  #: lines of the calculation
 
 
 def calculation(author: Author, state: Mapping[str, float], reason: str, moved: bool = False) -> Section:
-    """One state, and every formula that was shown with its numbers.
+    """One state, and every formula that was shown with its numbers; without numbers the reason.
 
-    Parameters
-    ----------
-    author : Author
-    state : mapping of str to float
-        Numbers by name; empty where there are none, for the ``reason``.
-    reason : str
-    moved : bool
-        Whether the independent velocities are 1 in place of the declared ones, which all are 0.
+    ``moved`` tells that the independent velocities are 1 in place of the declared ones, which all are 0.
     """
     title = "Numbers: one state, line by line"
     if not state:

@@ -23,12 +23,7 @@ Function = Callable[..., Any]
 class Evaluator:
     """A schedule that evaluates the same expressions again and again.
 
-    ``names`` are the symbols that will be given, at least those that the outputs depend on.
-
-    Raises
-    ------
-    UsageError
-        The outputs depend on a symbol that is not named.
+    ``names`` are the symbols that will be given, at least those that the outputs depend on; UsageError otherwise.
     """
 
     def __init__(self, outputs: Sequence[Expr], names: Sequence[str]) -> None:

@@ -306,12 +306,7 @@ def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[Coordi
 
 
 def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrapping: Sequence[str]) -> None:
-    """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it."""
     found: list[tuple[str, str, str]] = []  # place, message, remedy
     between = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
     until = "turn the markers (rpy) until z is the axis of the joint between them, or"

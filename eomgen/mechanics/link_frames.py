@@ -59,13 +59,6 @@ class AxisTurns:
 
     Only links beyond an axis that is oblique in its parent's link frame are turned, those whose constants are numbers.
     Nothing is turned where no joint closes a loop.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    topology : Topology
-    symbols : mapping of str to Expr
-        The coordinates of the tree by name.
     """
 
     def __init__(self, mechanism: Mechanism, topology: Topology, symbols: Mapping[str, Expr]) -> None:
@@ -75,14 +68,7 @@ class AxisTurns:
     def turned(self, branch: Branch, holder: Mat3, inner: Frame) -> Mat3 | None:
         """The rotation about z by which both markers of a joint turn; None for none.
 
-        Parameters
-        ----------
-        branch : Branch
-            The joint in the tree.
-        holder : Mat3
-            Its marker on the parent, in the parent's link frame.
-        inner : Frame
-            Its marker on the body.
+        ``holder`` is its marker on the parent, in the parent's link frame, ``inner`` that on the body.
         """
         if not self.topology.cut:
             return None

@@ -253,12 +253,7 @@ class _Written(NamedTuple):
 
 
 def refuse_unusable(mechanism: Mechanism, motion: MarkerMotion, rows: Sequence[Row]) -> None:
-    """Refuse equations that hold what has no rate here, or that are not linear in velocities.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Refuse equations that hold what has no rate here, or that are not linear in velocities."""
     by_name = {row.label.partition(".")[0]: row for row in rows}
     asked = mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()
     problems: list[Problem] = []
@@ -367,11 +362,6 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints, for_a_ti
 
     A wrong number in place of a coordinate is told by assembly, with its size; where nothing is assembled it is told
     here: in equations of velocities, and in all that hold ``for_a_time``, also where parameters stand in them.
-
-    Raises
-    ------
-    ModelError
-        Names the constraints.
     """
     problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
     m = len(constraints.values)

@@ -22,7 +22,7 @@ from ..expr.records import dataclass
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .loops import place_of
-from .sparse_rows import SparseRows, choose_independent, conditioning, independent_rows
+from .sparse_rows import SparseRows, choose_independent, independent_rows
 
 # -- constraints that hold nothing -------------------------------------------------------------------------------------
 
@@ -32,13 +32,7 @@ TRIES = 12  #: directions in which a row is evaluated
 
 
 def require_finite(functions: ConstraintFunctions, q: Array) -> None:
-    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none.
-
-    Raises
-    ------
-    AssemblyError
-        Names the rows.
-    """
+    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none."""
     if not functions.m:
         return
     C, J = functions.position(q)
@@ -57,13 +51,7 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
 
 
 def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
-    """Refuse written constraints that are least or greatest where they hold, as |r|^2 = 0 of two points is.
-
-    Raises
-    ------
-    ModelError
-        Names the constraints.
-    """
+    """Refuse written constraints that are least or greatest where they hold, as |r|^2 = 0 of two points is."""
     if not functions.h:
         return
     k, scales = functions.kinematics, functions.system.scales
@@ -94,17 +82,6 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
 
     Such are a relation whose factors cancel, and one that nothing proves to be an identity.  Rows of joints whose
     slopes vanish identically with the given parameters are no fault: a body may be held twice.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-    numbers : mapping of str to float
-        Values of the parameters.
-
-    Raises
-    ------
-    ModelError
-        Names the constraints and the parameters whose values cancel.
     """
     c, graph = kinematics.constraints, kinematics.graph
     known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
@@ -133,30 +110,20 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
 LARGEST = 120  #: coordinates up to which every one is judged
 
 
-def rate_candidates(J: Array, chosen: Sequence[int]) -> dict[int, float]:
+def rate_candidates(rows: SparseRows, chosen: Sequence[int]) -> dict[int, float]:
     """How well each coordinate would do as independent: columns -> conditioning, the best first.
 
-    Parameters
-    ----------
-    J : (m, n) array
-        Scaled Jacobian at one configuration.
-    chosen : sequence of int
-        The independent columns there.
-
-    Returns
-    -------
-    dict of int to float
-        For a chosen column the conditioning of the chosen set, for any other that of the best set in which it takes
-        the place of a chosen one; columns that cannot are left out.  Empty where there is no choice.
+    For a chosen column it is that of the chosen set, for any other that of the best set in which it takes the place of
+    a chosen one; columns that cannot are left out.  Empty where there is no choice.
     """
-    n = J.shape[1]
-    if not len(J) or not chosen or n > LARGEST or (n - len(chosen)) * len(chosen) > LARGEST:
+    m, n = rows.J.shape
+    if not m or not chosen or n > LARGEST or (n - len(chosen)) * len(chosen) > LARGEST:
         return {}
-    found = dict.fromkeys(chosen, conditioning(J, chosen))
+    found = dict.fromkeys(chosen, rows.conditioning(chosen))
     for k in range(n):
         if k not in found:
             swaps = ([k if i == old else i for i in chosen] for old in chosen)
-            found[k] = max(conditioning(J, columns) for columns in swaps)
+            found[k] = max(map(rows.conditioning, swaps))
     ordered = sorted(found.items(), key=lambda item: -round(item[1], 6))
     return {k: value for k, value in ordered if value > CHOSEN}
 
@@ -179,15 +146,7 @@ def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
 
 
 def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
-    """Assemble at t = 0; where that fails for the drivers, say so.
-
-    Raises
-    ------
-    AssemblyError
-        The loops do not close, or not with the values that the drivers ask for.
-    ModelError
-        There are more drivers than degrees of freedom, and they contradict each other.
-    """
+    """Assemble at t = 0; where that fails for the drivers, or more of them than freedoms contradict, say so."""
     drivers = driver_rows(functions)
     try:
         found = functions.close_nearest(given, guess)
@@ -367,47 +326,27 @@ PROBES = 4  #: further assembled configurations at which the rank is judged
 
 @dataclass(frozen=True)
 class Mobility:
-    """What the numbers say about a mechanism.
+    """What the numbers say about a mechanism; velocities are called by the coordinate whose rate they are, if any."""
 
-    Attributes
-    ----------
-    q_reference : (n_q,) tuple
-        Assembled at the declared initial values.
-    rank : int
-        Largest rank of the constraint Jacobian found at ``configurations`` assembled configurations.
-    n_dof : int
-        Degrees of freedom, n_v - rank: of the velocities, nonholonomic rows included.
-    n_positions : int
-        Degrees of freedom of the configuration, n_v less the rank of the holonomic rows.
-    independent, dependent : tuple of str
-        The partition of the velocities, each called by the coordinate whose rate it is, if there is one.
-    independent_rows : tuple of int
-        Constraint rows that carry the rank at the reference; the others are ``redundant`` there.
-    conditioning : float
-        How well the independent coordinates move the mechanism at the reference: 1 perfect, 0 not at all.
-    assumed : bool
-        True when parameters had no value, so that the rank was judged with made-up ones.
-    """
-
-    q_reference: tuple[float, ...]
-    rank: int
-    n_dof: int
+    q_reference: tuple[float, ...]  #: assembled at the declared initial values
+    rank: int  #: largest rank of the constraint Jacobian at ``configurations`` assembled configurations
+    n_dof: int  #: degrees of freedom, n_v - rank: of the velocities, nonholonomic rows included
     independent: tuple[str, ...]
     dependent: tuple[str, ...]
-    independent_rows: tuple[int, ...]
-    redundant: tuple[str, ...]
-    conditioning: float
+    independent_rows: tuple[int, ...]  #: constraint rows that carry the rank at the reference
+    redundant: tuple[str, ...]  #: the others there
+    conditioning: float  #: how well the independent coordinates move the mechanism there: 1 perfect, 0 not at all
     length_scale: float
     row_scales: tuple[float, ...] = ()  #: typical size of each constraint row
     configurations: int = 1
     ranks: tuple[int, ...] = ()
-    assumed: bool = False
+    assumed: bool = False  #: whether parameters had no value, so that the rank was judged with made-up ones
     residual: float = 0.0  #: largest scaled residual of the loops at the reference
     restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
     guessed: tuple[tuple[str, float, float], ...] = ()  #: coordinate, its guess, its value; largest difference first
     guess_distance: float = 0.0  #: largest scaled difference of a guessed coordinate
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
-    n_positions: int = 0
+    n_positions: int = 0  #: degrees of freedom of the configuration, n_v less the rank of the holonomic rows
     instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
     candidates: tuple[tuple[str, float], ...] = ()  #: coordinates that can be independent there; conditioning
     driven: bool = False  #: whether a constraint depends on time
@@ -426,11 +365,8 @@ def initial_values(
 def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     """Assemble the mechanism at its declared initial values and find its mobility.
 
-    Parameters
-    ----------
-    kinematics : Kinematics
-    independent : names of coordinates that should be independent ones; the model's own by default.  Where they are
-        fewer than the degrees of freedom, the best conditioned others join them.
+    Where the coordinates named as independent, the model's own by default, are fewer than the degrees of freedom, the
+    best conditioned others join them.
 
     Raises
     ------
@@ -610,7 +546,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
         n_positions=len(functions.system.scales.q) - max(_position_ranks(functions, configurations, judged)),
         instantaneous=n - ranks[0],
-        candidates=tuple((names[k], value) for k, value in rate_candidates(judged[0].J, chosen).items()),
+        candidates=tuple((names[k], value) for k, value in rate_candidates(judged[0], chosen).items()),
         driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
     )
 

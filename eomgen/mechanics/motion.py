@@ -246,12 +246,8 @@ COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 class MarkerMotion:
     """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
 
-    Parameters
-    ----------
-    coordinates : mapping
-        ``name -> (value, rate, acceleration)`` of every joint coordinate, tree and cut.
-    turning : mapping, optional
-        ``name -> (predecessor, successor, axis)`` of the angular velocities that are velocities of cut joints.
+    ``coordinates`` has value, rate and acceleration of every joint coordinate, tree and cut, ``turning`` predecessor,
+    successor and axis of the angular velocities that are velocities of cut joints, both by name.
     """
 
     def __init__(
@@ -418,13 +414,7 @@ class MarkerMotion:
         return substitute([found], known)[0]
 
     def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
-        """What a force element does, in terms of the tree.
-
-        Raises
-        ------
-        ModelError
-            It depends on itself, or it exerts nothing on a body.
-        """
+        """What a force element does, in terms of the tree; refused if it depends on itself."""
         exerted = mechanism.wrench_quantities.get(name)
         quantity, element = mechanism.element_quantities[name] if exerted is None else ("", exerted.element)
         if name in self._open:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
 from math import comb
@@ -38,29 +38,6 @@ def independent_rows(J: Array, rank: int) -> Indices:
     return np.array(sorted(chosen), dtype=np.intp)
 
 
-def redundant_rows(J: Array, rank: int, labels: Sequence[str]) -> list[str]:
-    """Labels of the rows that follow from the others at this configuration."""
-    kept = set(independent_rows(J, rank).tolist())
-    return [label for row, label in enumerate(labels) if row not in kept]
-
-
-def conditioning(J: Array, independent: Sequence[int] | Indices, size: float | None = None) -> float:
-    """How well a set of independent coordinates moves the mechanism: 1 is perfect, 0 not at all.
-
-    The smallest singular value of J_d divided by the largest of J, where d are the other columns; ``size`` is that
-    largest one, where it is known already.
-    """
-    n = J.shape[1]
-    dependent = np.delete(np.arange(n), np.asarray(independent, dtype=np.intp))
-    if not dependent.size:
-        return 1.0
-    values = algebra.singular_values(J[:, dependent])
-    if len(values) < len(dependent):
-        return 0.0
-    size = algebra.norm2(J) if size is None else size
-    return float(values[len(dependent) - 1] / size) if size else 0.0
-
-
 # -- chains of rows ----------------------------------------------------------------------------------------------------
 
 # Rows that share no coordinate, nor are connected through others, make parts of their own, whose singular values are
@@ -89,15 +66,7 @@ class ChainStep(NamedTuple):
 
 
 class Chain:
-    """The levels of one part turned one after the other.
-
-    Parameters
-    ----------
-    J : (m, n) array
-    levels : sequence of Level
-    least : float
-        Singular values of a level that are not above it are dropped.
-    """
+    """The levels of one part turned one after the other; singular values of a level not above ``least`` are dropped."""
 
     def __init__(self, J: Array, levels: Sequence[Level], least: float) -> None:
         self.start, self.steps, self.rank, self.dropped = levels[0].columns, list[ChainStep](), 0, 0.0
@@ -227,7 +196,10 @@ class SparseRows:
         return max((algebra.norm2(self.J[np.ix_(*place)]) for place in self._places if len(place[0])), default=0.0)
 
     def conditioning(self, independent: Sequence[int] | Indices) -> float:
-        """As :func:`conditioning` finds it."""
+        """How well a set of independent coordinates moves the mechanism: 1 is perfect, 0 not at all.
+
+        The smallest singular value of J_d divided by the largest of J, where d are the other columns.
+        """
         chosen, least = np.zeros(self.J.shape[1], dtype=bool), np.inf
         chosen[np.asarray(independent, dtype=np.intp)] = True
         if chosen.all():
@@ -249,21 +221,9 @@ ENUMERATED, DECOMPOSED = 500, 20_000
 
 
 def choose_independent(jacobians: Sequence[SparseRows], rank: int, prefer: Sequence[int] = ()) -> Indices:
-    """The independent coordinates that stay best conditioned over several configurations.
+    """The n - rank independent columns, ascending, that stay best conditioned at several assembled configurations.
 
-    Parameters
-    ----------
-    jacobians : sequence of SparseRows
-        Scaled Jacobians (m, n) at assembled configurations.
-    rank : int
-        Rank of the constraints.
-    prefer : sequence of int
-        Columns to choose first where the worst conditioning stays within a factor of 100 of the best possible.
-
-    Returns
-    -------
-    (n - rank,) array of int
-        Columns in ascending order.
+    Those to ``prefer`` come first where the worst conditioning stays within a factor of 100 of the best possible.
     """
     n = jacobians[0].J.shape[1]
     size = n - rank
@@ -317,3 +277,84 @@ def _pivots(rows: Array, count: int, order: Sequence[int]) -> set[int]:
         held = np.flatnonzero(direction)
         work[np.ix_(held, moved)] -= np.outer(direction[held], along[moved])
     return chosen
+
+
+# -- block triangular form ---------------------------------------------------------------------------------------------
+
+# Duff, Erisman and Reid, *Direct Methods for Sparse Matrices* (2nd ed. 2017), chapter 6: rows are matched with columns,
+# and the strong components (Tarjan 1972) of what then depends on what are the blocks.
+
+
+class DiagonalBlock(NamedTuple):
+    """Rows that determine as many columns once those of earlier blocks are known."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
+def match(rows: Sequence[Mapping[int, object]]) -> dict[int, int] | None:
+    """The row of each column where every row has a column of its own; None if there is no such pairing."""
+    row_of: dict[int, int] = {}
+    column_of: dict[int, int] = {}
+
+    def place(start: int) -> bool:
+        came: dict[int, int] = {}  # column -> row it was reached from
+        waiting = [start]
+        while waiting:
+            i = waiting.pop()
+            for k in rows[i]:
+                if k in came:
+                    continue
+                came[k] = i
+                if k in row_of:
+                    waiting.append(row_of[k])
+                    continue
+                while True:  # every row on the way moves one column on
+                    row = came[k]
+                    previous = column_of.get(row, -1)
+                    row_of[k], column_of[row] = row, k
+                    if row == start:
+                        return True
+                    k = previous
+        return False
+
+    return row_of if all(place(i) for i in range(len(rows))) else None
+
+
+def diagonal_blocks(rows: Sequence[Mapping[int, object]]) -> list[DiagonalBlock] | None:
+    """The blocks of a matrix with as many rows as columns; None if it is singular whatever its numbers are."""
+    row_of = match(rows)
+    if row_of is None:
+        return None
+    column_of = {i: k for k, i in row_of.items()}
+    needs = {i: [row_of[k] for k in rows[i] if k in row_of and row_of[k] != i] for i in range(len(rows))}
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    stack: list[int] = []
+    found: list[DiagonalBlock] = []
+    for root in range(len(rows)):
+        if root in index:
+            continue
+        work = [(root, iter(needs[root]))]
+        index[root] = low[root] = len(index)
+        stack.append(root)
+        while work:
+            i, rest = work[-1]
+            step = next(rest, None)
+            if step is not None:
+                if step not in index:
+                    index[step] = low[step] = len(index)
+                    stack.append(step)
+                    work.append((step, iter(needs[step])))
+                elif step in stack:
+                    low[i] = min(low[i], index[step])
+                continue
+            work.pop()
+            if work:
+                low[work[-1][0]] = min(low[work[-1][0]], low[i])
+            if low[i] == index[i]:
+                cut = stack.index(i)
+                members = sorted(stack[cut:])
+                del stack[cut:]
+                found.append(DiagonalBlock(tuple(members), tuple(sorted(column_of[j] for j in members))))
+    return found

@@ -171,19 +171,9 @@ def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[
 
 
 def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> Topology:
-    """Choose the spanning tree.
+    """Choose the spanning tree, in which joints of coordinates named as independent are kept first.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        Every body must be connected to ground (the description checks it).
-    independent : names of coordinates
-        Joints bearing one of these are kept in the tree first.
-
-    Raises
-    ------
-    ModelError
-        A loop has only joints that cannot be cut, or a body is held by pure constraints alone.
+    Refused are loops of joints that cannot be cut, and bodies that are connected by pure constraints alone.
     """
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)

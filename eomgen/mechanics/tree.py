@@ -29,11 +29,7 @@ Turns = tuple[Expr, list[tuple[int, float]]]  #: an angle, and the coordinates i
 def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
     """The angle about z of a rotation that is about z at every q, else None.
 
-    Returns
-    -------
-    angle : Expr
-        A constant plus coordinates with factors 1 and -1; equal to ``atan2(R_10, R_00)`` up to full turns.
-    terms : list of (index into q, factor)
+    It is a constant plus coordinates with factors 1 and -1, equal to ``atan2(R_10, R_00)`` up to full turns.
     """
     angle = atan2(rotation[1][0], rotation[0][0])
     places = {x.id: j for j, x in enumerate(q)}
@@ -264,20 +260,12 @@ def _reverse(rotation: Mat3, position: Vec3, column: Twist) -> Twist:
 
 @dataclass(frozen=True)
 class JointRates:
-    """Motion of one link relative to its parent.
+    """Motion of one link relative to its parent."""
 
-    Attributes
-    ----------
-    spin, spin_rate : Vec3
-        Relative angular velocity sum s v and the sum s' v, link axes.
-    slide, slide_rate : Vec3
-        Velocity of the link's origin seen from the parent, and its change at v' = 0, parent link axes.
-    """
-
-    spin: Vec3
-    spin_rate: Vec3
-    slide: Vec3
-    slide_rate: Vec3
+    spin: Vec3  #: relative angular velocity sum s v, link axes
+    spin_rate: Vec3  #: the sum s' v
+    slide: Vec3  #: velocity of the link's origin seen from the parent, parent link axes
+    slide_rate: Vec3  #: its change at v' = 0
 
     def product(self, link: Link, above: Vec3) -> Twist:
         """Acceleration of the link against its parent, which turns at ``above``, at v' = 0: Coriolis, centripetal."""

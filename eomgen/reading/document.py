@@ -10,9 +10,8 @@ from typing import NamedTuple
 from ..base.results import image_html
 from ..base.texts import html_text, visible
 from ..expr.notation import Notation
-from ..expr.printing import latex, latex_lines, mathml, mathml_lines, text
 from ..expr.printing.formula import Formula, Letter, Matrix
-from ..expr.printing.writers import row
+from ..expr.printing.writers import latex, latex_lines, mathml, mathml_lines, row, text
 
 # -- parts of a document -----------------------------------------------------------------------------------------------
 

@@ -64,19 +64,10 @@ LANGUAGES = {
 
 
 def write_format(equations: Readable, form: str) -> str:
-    """The equations of motion as the text of a file.
+    """The equations of motion as the text of a file, in one of :data:`~eomgen.toolchain.targets.FORMATS`.
 
-    Parameters
-    ----------
-    equations : Readable
-    form : str
-        One of :data:`~eomgen.toolchain.targets.FORMATS`.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function
-        of the symbols, in alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define
-        M and f.
-
-    Returns
-    -------
-    str
+    ``matlab``, ``octave``, ``julia`` and ``c`` give a function of the symbols, in alphabetical order, for M and f;
+    ``sympy`` and ``mathematica`` give statements that define M and f.
 
     Raises
     ------

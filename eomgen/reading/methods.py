@@ -94,13 +94,7 @@ QUARTER = "quarter()"  #: symbol of a quarter of a turn while values are put in
 
 
 def read_value(graph: Graph, name: str, value: Any) -> Expr:
-    """The expression of a number, a text or a SymPy expression; functions of time stand for what they are called.
-
-    Raises
-    ------
-    UsageError
-        It is none of these.
-    """
+    """The expression of a number, a text or a SymPy expression; functions of time stand for what they are called."""
     try:
         if isinstance(value, str):
             return parse(value, graph, graph.symbol)
@@ -114,21 +108,10 @@ def read_value(graph: Graph, name: str, value: Any) -> Expr:
 
 
 def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
-    """Values by name, names and values looked at.
+    """Values by name; refused are unknown names, those given twice, and values that are no expressions.
 
-    Parameters
-    ----------
-    given : mapping
-    allowed : sequence of str
-    what : str
-        What the names are, in messages.
-    plain : callable
-        ``left.hinge`` of an instance of a component -> ``left_hinge``, in names and in values.
-
-    Raises
-    ------
-    UsageError
-        An unknown name, one that is given twice, or a value that is no expression.
+    ``what`` is what the names are, in messages; ``plain`` makes ``left_hinge`` of ``left.hinge`` in an instance of a
+    component.
     """
     if not isinstance(given, Mapping):
         raise ill_typed(f"values are given by name, as a mapping does, not {quoted(given)}")
@@ -204,13 +187,7 @@ BLOCKS = ("augmented", "newton_euler", "amalgamated")  #: methods that solve one
 
 
 def require_method(quantities: Quantities, what: str, methods: tuple[str, ...]) -> None:
-    """Refuse a quantity of other methods.
-
-    Raises
-    ------
-    UnavailableError
-        It lists the methods that have the quantity.
-    """
+    """Refuse a quantity of other methods, which the message lists."""
     method = quantities.tree.method
     if method not in methods:
         have = " or ".join(repr(name) for name in methods)

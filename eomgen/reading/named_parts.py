@@ -104,16 +104,10 @@ def grouped(
     constants: Collection[str],
     moving: Collection[str],
 ) -> dict[PartMeaning, list[tuple[Any, Any]]]:
-    """Named parts by meaning.
+    """Named parts by meaning, each after those that it uses, in groups and among them.
 
-    Parameters
-    ----------
-    named : sequence of (sympy.Symbol, sympy.Expr)
-        In an order in which each uses only those before it; so are those of each group, and the groups.
-    outputs : mapping of PartMeaning to sequence of sympy.Expr
-        What uses the parts: entries of the mass matrix, of the right side, of the constraints.
-    constants, moving : collection of str
-        Names of parameters; of velocities and inputs.
+    ``outputs`` are what uses the parts: entries of the mass matrix, of the right side, of the constraints.
+    ``constants`` are names of parameters, ``moving`` those of velocities and inputs.
     """
     known = {symbol.name: meaning for symbol, _ in named for form, meaning in NAMES if form.fullmatch(symbol.name)}
     inside = {symbol: x.free_symbols for symbol, x in named}
@@ -199,16 +193,8 @@ def find_blocks(
 ) -> MatrixBlocks | None:
     """Groups, None where there is one group of coordinates or where there are too many groups.
 
-    Parameters
-    ----------
-    inertia : sequence of sequence of bool
-        Where the mass matrix (n, n) does not vanish.
-    constraints : sequence of sequence of bool
-        Where the Jacobian (m, n) does not vanish.
-    labels : sequence of str
-        Of the rows of the Jacobian, the joint before the first dot.
-    branches : sequence of int
-        Of each coordinate the branch of the tree, counted at ground; those of one branch stay together.
+    ``inertia`` and ``constraints`` tell where mass matrix (n, n) and Jacobian (m, n) do not vanish, whose rows have
+    labels, the joint before the first dot.  Coordinates of one branch of the tree, counted at ground, stay together.
     """
     n = len(inertia)
     group = [branches.index(branch) for branch in branches]

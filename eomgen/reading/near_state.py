@@ -30,12 +30,7 @@ from .quantities import Quantities, Row, Rows
 def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: Mapping[str, Any]) -> None:
     """Refuse a state at which no acceleration of the independent coordinates follows.
 
-    Raises
-    ------
-    PartitionError
-        The mass matrix is not finite: the independent velocities do not determine the others.
-    SingularMassMatrixError
-        It has no inverse.
+    Either the mass matrix is not finite, as the independent velocities do not determine the others, or has no inverse.
     """
     n, mobility = len(mass), quantities.mobility
     if n == 0:
@@ -63,13 +58,7 @@ def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
 def require_finite(
     quantities: Quantities, matrices: Mapping[str, Sequence[Sequence[Expr]]], at: Mapping[str, Any]
 ) -> None:
-    """Refuse a state at which an entry of a matrix has no value.
-
-    Raises
-    ------
-    NonFiniteError
-        It names the first such entry.
-    """
+    """Refuse a state at which an entry of a matrix has no value, by the name of the first."""
     for letter, rows in matrices.items():
         for i, row in enumerate(rows):
             samples = list(_samples(quantities, row))
@@ -136,14 +125,6 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     """A and B at a state; velocities that ``at`` does not name are 0.
 
     ``equilibrium`` tells that the accelerations vanish there.
-
-    Raises
-    ------
-    UnavailableError
-        Rates of coordinates were given as functions of velocities, or constraints depend on inputs.
-    SingularMassMatrixError, PartitionError, NonFiniteError
-        The mass matrix has no inverse at the state, or the independent velocities do not determine the others,
-        or an entry has no value.
     """
     kinematics, graph = quantities.kinematics, quantities.graph
     if kinematics.state_names:

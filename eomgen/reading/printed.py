@@ -13,7 +13,6 @@ from ..base.names import acceleration_name
 from ..elements.frames import GROUND
 from ..expr.core import Expr, symbols_of
 from ..expr.notation import Notation, dotted, raised
-from ..expr.printing import PAGE, Formulas, Order, number, text, width
 from ..expr.printing.formula import (
     COORDINATE,
     DIGITS,
@@ -24,16 +23,19 @@ from ..expr.printing.formula import (
     PARAMETER,
     RATE,
     Formula,
+    Formulas,
     Letter,
     Matrix,
     Name,
     Number,
+    Order,
     Product,
     Relation,
     Sum,
     Words,
+    number,
 )
-from ..expr.printing.writers import TIGHT
+from ..expr.printing.writers import PAGE, TIGHT, text, width
 from .document import Folded, FormulaLine, Piece, Row, Sentence
 from .named_parts import PartMeaning, find_blocks, grouped
 from .readable import BODIES, LOOPS, PARTS, Readable
@@ -113,14 +115,7 @@ SAMPLED = "sampled states, constant until the next time t, where they take these
 
 
 class PrintedEquations:
-    """Formulas of M(q) v' = f and what else a display says.
-
-    Parameters
-    ----------
-    equations : Readable
-    digits : int, optional
-        Of long numbers; all of them by default.
-    """
+    """Formulas of M(q) v' = f and what else a display says, on request with fewer digits of long numbers."""
 
     def __init__(self, equations: Readable, digits: int = DIGITS) -> None:
         self.equations = equations.in_plain_symbols()
@@ -406,19 +401,7 @@ class _Matrix(NamedTuple):
 
 
 class PrintedParts:
-    """What a display of large equations says.
-
-    Parameters
-    ----------
-    printed : PrintedEquations
-    short : int
-        Characters of an entry that stands in its matrix itself.
-
-    Attributes
-    ----------
-    names : Notation
-        How names are printed, those of the parts too.
-    """
+    """What a display of large equations says; entries of up to ``short`` characters stand in their matrix itself."""
 
     def __init__(self, printed: PrintedEquations, short: int = SHORT) -> None:
         self.short = short

@@ -143,14 +143,7 @@ LONGEST = 5_000  #: operations of all of them together
 
 
 class Written(NamedTuple):
-    """SymPy expressions, with the named parts that they use.
-
-    Attributes
-    ----------
-    intermediates : list of (sympy.Symbol, sympy.Expr)
-        In an order in which each uses only those before it; empty where everything is written out.
-    expressions : list of sympy.Expr
-    """
+    """SymPy expressions, with the named parts that they use, each after those that it uses."""
 
     intermediates: list[tuple[Any, Any]]
     expressions: list[Any]
@@ -195,12 +188,7 @@ Rows = tuple[Row, ...]
 
 
 def require_bodies(kinematics: Kinematics) -> None:
-    """Refuse what belongs to bodies where there are none.
-
-    Raises
-    ------
-    UnavailableError
-    """
+    """Raise if the model has no bodies."""
     if kinematics.mechanism.bare:
         kind = "a Lagrangian" if kinematics.mechanism.lagrangian is not None else "given equations"
         raise UnavailableError(
@@ -227,13 +215,7 @@ class SpatialMotion(NamedTuple):
 
 
 class Quantities:
-    """Every quantity of one derivation, each formed when it is first asked for.
-
-    Parameters
-    ----------
-    kinematics, mobility, tree
-        What was derived, in a graph of their own (:meth:`~eomgen.reading.derivation.Derivation.fresh`).
-    """
+    """Every quantity of one derivation, in a graph of its own, each formed when it is first asked for."""
 
     def __init__(self, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
         self.kinematics, self.mobility, self.tree = kinematics, mobility, tree

@@ -91,17 +91,10 @@ SHOWN = 8  #: names that a message lists
 
 
 class Quantity(cached_property[Made]):
-    """A row of the table: an attribute that is made when it is first asked for.
+    """A row of the table: an attribute that ``make`` forms of the equations and its name when it is first asked for.
 
-    Parameters
-    ----------
-    make : callable
-        (equations, name of the attribute) -> its value.
-    doc : str
-    offered : str
-        Of what equations a display names it among those to read next; of none by default.
-    by_name : bool
-        Whether each body, marker or joint has one.
+    ``offered`` is of what equations a display names it among those to read next; ``by_name`` whether each body, marker
+    or joint has one.
     """
 
     def __init__(

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from ..base.texts import fold, html_text, visible
 from ..expr.latex import SUPERSCRIPTS, read_latex, text_form
 from ..expr.notation import Notation
-from ..expr.printing import latex, text
 from ..expr.printing.formula import DIGITS, ROUNDED, Matrix, times
-from ..expr.printing.writers import TIGHT
+from ..expr.printing.writers import TIGHT, latex, text
 from .document import Folded, FormulaLine, Look, Piece, Row, Sentence, Table, Text, html, tex_formula, written
 from .printed import (
     FOLDED,
@@ -40,21 +39,9 @@ BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, D
 
 
 def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES, digits: int = ROUNDED) -> str:
-    """Coordinates and equations, in matrix form where it fits, else entry by entry.
+    """Coordinates and equations, in matrix form where it fits, else entry by entry, of at most so many columns.
 
-    Parameters
-    ----------
-    equations : Readable
-    columns : int
-        Longest line.
-    lines : int
-        Of formulas; what is beyond is left out, and how to get it is said.
-    digits : int
-        Of long numbers.
-
-    Returns
-    -------
-    str
+    Formulas beyond ``lines`` are left out, and how to get them is said; long numbers have so many digits.
     """
     printed = PrintedEquations(equations, digits)
     name = visible(equations.kinematics.mechanism.name, lines=False)

@@ -258,19 +258,7 @@ def _last(kinematics: Kinematics, link: Link) -> int:
 
 
 class ForceSlopes:
-    """Derivatives of M a + h on the tree.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-        One that :func:`can_differentiate`.
-
-    Attributes
-    ----------
-    mass_matrix : (n, n) rows
-    bias : (n,) h
-    by_velocity : (row, column) -> d(M a + h)/dv
-    """
+    """Derivatives of M a + h on a tree that one :func:`can_differentiate`: M, h, and d(M a + h)/dv by its places."""
 
     def __init__(self, kinematics: Kinematics) -> None:
         self._kinematics = kinematics

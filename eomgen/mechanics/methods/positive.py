@@ -29,18 +29,7 @@ FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of 
 
 @dataclass(frozen=True)
 class IdleMotion:
-    """Velocities (n,) that move no mass at a configuration.
-
-    Attributes
-    ----------
-    q : (n_q,) array
-    v : (n,) array
-        In the order of the freedoms.
-    what : str
-        "no inertia" or "negative inertia".
-    numbers : mapping of str to float
-        Parameters and inputs.
-    """
+    """Velocities v (n,), in the order of the freedoms, that move no mass at a configuration q (n_q,)."""
 
     q: np.ndarray
     v: np.ndarray
@@ -103,17 +92,8 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     """Refuse a degree of freedom that moves no mass at any configuration tried, unless the model is one without mass.
 
     Kinematics needs no masses: a mechanism without any mass, inertia and force element is taken for what it is, and so
-    is any model whose ``check_inertia`` is ``note`` or ``off``.
-
-    Returns
-    -------
-    str
-        What has no inertia, for the calls that need it; empty where all motions have.
-
-    Raises
-    ------
-    ModelError
-        Names the coordinates that move nothing.
+    is any model whose ``check_inertia`` is ``note`` or ``off``.  Returned is what has no inertia, for the calls that
+    need it; empty where all motions have.
     """
     problems = find_idle(kinematics, mobility, tree)
     if not problems:

@@ -190,27 +190,12 @@ class TreeMotion(NamedTuple):
 
 
 class ArticulatedBodies:
-    """One sweep inwards and one outwards.
+    """One sweep inwards and one outwards over the links, in tree order.
 
-    Parameters
-    ----------
-    graph : Graph
-    links : sequence of Link
-        Tree order.
-    inertias : sequence of SpatialInertia
-    products : sequence of Twist
-        Acceleration of each link relative to its parent at v' = 0.
-    loads : sequence of Wrench
-        On each link at zero acceleration, less what is applied.
-    forces : sequence of Expr
-        (n,) along the velocities.
-    drives : mapping of int to Expr
-        Inertias of drives.
-    base : sequence of Twist
-        Per link the acceleration of ground that acts as gravity does; zero below what falls freely.
-    rows : sequence of ConstraintRow, optional
-    term : float
-        Added to G relative to the largest diagonal entry of what is taken out at one link: redundant rows need it.
+    ``products`` are the accelerations of links relative to their parents at v' = 0, ``loads`` the wrenches on them at
+    zero acceleration, less what is applied, ``forces`` (n,) are along the velocities, ``drives`` inertias by velocity.
+    ``base`` is per link the acceleration of ground that acts as gravity does, zero below what falls freely.  ``term``
+    is added to G relative to the largest diagonal entry of what is taken out at one link: redundant rows need it.
     """
 
     def __init__(

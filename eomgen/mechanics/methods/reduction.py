@@ -15,8 +15,8 @@ from ...expr.evaluate import evaluate
 from ...expr.tensors import dot
 from ...expr.vectors import Rows
 from .. import Kinematics
-from ..diagonal_blocks import diagonal_blocks
 from ..mobility import Mobility
+from ..sparse_rows import diagonal_blocks
 
 
 class VelocityTransformation(NamedTuple):
@@ -71,16 +71,10 @@ def transform_velocities(
 
 
 class LoopNames:
-    """Names for what is formed on the way to the dependent velocities.
-
-    Attributes
-    ----------
-    given : list of (str, Expr)
-        Names, which stand as symbols in what follows, and their values, in order.
-    """
+    """Names for what is formed on the way to the dependent velocities."""
 
     def __init__(self, kinematics: Kinematics, independent: Sequence[str]) -> None:
-        self.given: list[tuple[str, Expr]] = []
+        self.given: list[tuple[str, Expr]] = []  #: names, which stand as symbols in what follows, and their values
         self._graph = kinematics.graph
         self._labels, n = kinematics.velocity_labels, len(kinematics.v)
         self._columns = {n: "a", n + 1: "b"} | {
