@@ -21,7 +21,6 @@ from ..expr.without_gc import timed, without_gc
 from ..mechanics import Kinematics, analyse
 from ..mechanics.methods import GIVEN, METHODS, TreeEquations, direct_equations
 from ..mechanics.mobility import Mobility, find_mobility
-from ..mechanics.report import MechanismReport, report
 from ..model.sympy_face import names_of
 from ..model.visit import Undotted
 from ..runtime.argument_checks import unknown
@@ -29,6 +28,7 @@ from . import Displayed
 
 if TYPE_CHECKING:
     from ..codegen.choice import Choice
+    from ..mechanics.report import MechanismReport
     from ..model.mechanism import Mechanism
 
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
@@ -63,6 +63,8 @@ class Derivation(Displayed):
     @cached_property
     def report(self) -> MechanismReport:
         """Bodies, joints, loops, rank, degrees of freedom, partition."""
+        from ..mechanics.report import report
+
         return report(self.kinematics, self.mobility)
 
     @cached_property
