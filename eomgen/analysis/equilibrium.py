@@ -185,7 +185,8 @@ def equilibrium(
     """Find a position at rest in which all forces are in balance (by virtual work) and no first-order state changes.
 
     Newton's iteration is tried first, then the motion in a viscous fluid, then damped Gauss-Newton steps.  Angles in
-    loops are those to which a motion from the declared position leads, not whole turns away.
+    loops are those to which a motion leads from the declared position, or from a guess of all coordinates, not whole
+    turns away.
 
     Parameters
     ----------
@@ -245,30 +246,39 @@ def equilibrium(
             "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
     point, steps = find_balance(search, q)
-    return describe(search, reached(search, point) if module.layout.n_h else point, steps)
+    if module.layout.n_h:
+        whole = guess is not None and not isinstance(guess, Mapping)
+        point = reached(search, point, q, None if whole else [*(guess or {}), *wanted])
+    return describe(search, point, steps)
 
 
-def reached(search: Search, point: SearchPoint) -> SearchPoint:
-    """The same position with its angles as a motion from the declared position leads there.
+def reached(search: Search, point: SearchPoint, start: Array, named: Sequence[str] | None) -> SearchPoint:
+    """The same position with its angles as a motion leads there that moves the named coordinates, or independent ones.
 
-    Steps of a search may turn a rocker right round, which no motion does.  In another assembly mode, to which none
-    leads, they are those nearest to the declared position.
+    Steps of a search may turn a rocker right round, which no motion does.  The motion begins at the declared position,
+    or at the start of the search where that is a whole position (``named`` is None) or of another assembly mode.
     """
     layout, q = search.layout, point.q
     initial = Initial(point.module.kernels, search.t)
-    with suppress(AssemblyError, PartitionError):
-        reference = initial.reference()
-        angles = [layout.q.index(name) for name in layout.q if layout.unit(name) == "rad"]
-        there = nearest = q.copy()
-        nearest[angles] -= 2.0 * np.pi * np.round((q - reference)[angles] / (2.0 * np.pi))
-        for ends in (nearest, q):
-            with suppress(AssemblyError):
-                found = initial.follow(reference, {layout.q[i]: float(ends[i]) for i in layout.independent_q})
-                there = there if initial.apart(found, q) else found
-        if not np.allclose(there, q, atol=1.0):
-            turned, _, balanced = newton(search, search.at(there, point.s, point.unknowns), reach=REACH)
-            return turned if balanced and not initial.apart(turned.q, q) else point
-    return point
+    angles = [layout.q.index(name) for name in layout.q if layout.unit(name) == "rad"]
+    free = {layout.q[i]: float(q[i]) for i in layout.independent_q}
+    values = {
+        name: value for name, value in read_coordinates(point.module, q, search.t).items() if name in (named or ())
+    }
+    motions = [(initial.reference, values or free)] * (named is not None) + [(lambda: start, free)]
+    for begin, ends in motions:
+        with suppress(AssemblyError, PartitionError):
+            if np.abs(q - (here := begin()))[angles].max(initial=0.0) < np.pi:
+                return point
+            there = initial.follow(here, ends)
+            if not initial.apart(there, q):
+                break
+    else:
+        return point
+    if np.allclose(there, q, atol=1.0):
+        return point
+    turned, _, balanced = newton(search, search.at(there, point.s, point.unknowns), reach=REACH)
+    return turned if balanced and not initial.apart(turned.q, q) else point
 
 
 def _states(module: BoundModel, guess: Any) -> Array:

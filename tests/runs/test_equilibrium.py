@@ -38,6 +38,15 @@ def test_no_link_is_turned_right_round(guess: dict[str, float]) -> None:
     np.testing.assert_allclose(mod.x0(phi=found["phi"])[:3], found.q, rtol=0, atol=1e-9)
 
 
+def test_turns_of_a_guess_in_another_assembly_mode_stay() -> None:
+    mod = compiled("spring_four_bar")
+    for turns in (-1.0, 0.0, 1.0):
+        for guess in mod.branches(phi=0.3 + 2.0 * np.pi * turns):
+            rest = mod.equilibrium(guess).q
+            np.testing.assert_allclose(rest, guess, rtol=0, atol=3.0)
+            np.testing.assert_allclose(mod.equilibrium(rest).q, rest, rtol=0, atol=1e-9)
+
+
 def energy(phi: float, free: float) -> float:
     """Potential of the four-bar, from the reference's formula."""
     return float(2 * 9.81 * np.sin(phi) + 12.5 * (2 * np.cos(phi / 2) - free) ** 2)
