@@ -375,6 +375,7 @@ class ContactShapes(Field):
     """A list of shapes {shape, on, ...}."""
 
     argument, annotation = "sequence of mapping", "Sequence[Mapping[str, Any]] | Mapping[str, Any]"
+    holds = "marker"
     schema = any_of(ref("contact_shape"), array(ref("contact_shape"), 1))
     defines = define("contact_shape", _shape_schema)[1]
     read = by("shapes")

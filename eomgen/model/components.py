@@ -303,7 +303,9 @@ def add_instance(target: Description, component: Component, instance: Instance, 
                 made.path = f"{section}.{made.name}"
                 target.sections[section].append(made)
                 for key, kind in fields_of(section, entry.values).items():
-                    for name, where in _attachments_in(entry.values.get(key), key) if kind.holds in _HOLDERS else ():
+                    given = entry.values.get(key) if kind.holds in _HOLDERS else None
+                    one = isinstance(given, Mapping) and isinstance(made.values[key], list)  # shape in place of a list
+                    for name, where in _attachments_in([given] if one else given, key):
                         if name in instance.at:
                             note_attachment(name, f"{made.path}.{where}")
     for name, (body, placed) in renaming.markers.items():

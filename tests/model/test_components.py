@@ -359,6 +359,25 @@ def test_faults_in_the_file_of_a_component(folder: Path, old: str, new: str, tol
         load(folder, ARM, "arm.yaml").check()
 
 
+@pytest.mark.parametrize(("at", "told"), [("groundd", "NAME-UNKNOWN :"), ("{body: ground, at: [1]}", "TYPE .at:")])
+def test_faults_of_what_shapes_are_on(tmp_path: Path, at: str, told: str) -> None:
+    text = """name: m
+components:
+  ball:
+    attachments: [floor]
+    bodies: {b: {mass: 1, inertia: {zz: 1}}}
+    joints: {p: {type: planar, between: [ground, b]}}
+    forces:
+      c: {type: contacts, first: {shape: half_plane, on: floor}, second: {shape: circle, on: b, radius: 1},
+        stiffness: 9}
+add:
+  one: {component: ball, at: {floor: AT}}
+"""
+    code, place = told.split()
+    with refused(f"EG-{code} :11: add.one.at.floor{place}"):
+        load(tmp_path, text.replace("AT", at)).check()
+
+
 def test_recursion_is_refused_with_its_cycle(folder: Path) -> None:
     text = ARM.replace("add:\n      upper:", "add:\n      more: {component: limb, at: root}\n      upper:")
     refuses("EG-CIRCLE limb,", lambda: load(folder, text).check())
