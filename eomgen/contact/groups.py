@@ -20,7 +20,7 @@ from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
-from .pair_laws import HOLLOWS, PairLaw, meet, pair_kind
+from .pair_laws import HOLLOWS, MEETINGS, PairLaw, class_of, pair_kind, pair_states
 from .pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
 from .point import CURVED
 from .profiles import never_reached
@@ -37,13 +37,10 @@ from .states import (
     POLYGON,
     SHAPE_FIELDS,
     ContactShapes,
+    FeatureKind,
     ShapeParts,
-    alike,
     cells_of,
-    class_of,
     groups_of_entry,
-    pair_states,
-    part_of,
 )
 
 # -- the element -------------------------------------------------------------------------------------------------------
@@ -175,10 +172,10 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
-    def _groups(self) -> list[dict[str, list[_Part]]]:
+    def _groups(self) -> list[dict[FeatureKind, list[_Part]]]:
         """Features of both groups, by class, of those classes that meet something."""
         groups = [_features(group) for group in (self.first, self.second) if group]
-        met = set[tuple[int, str]]()
+        met = set[tuple[int, FeatureKind]]()
         for g, own in enumerate(groups):
             for h, other in enumerate(groups):
                 if g != h or len(groups) == 1:
@@ -186,12 +183,13 @@ class ContactGroups(Force):
                     met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
         return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
 
-    def _meet(self, kinds: tuple[str, str], own: list[_Part], other: list[_Part]) -> bool:
+    def _meet(self, kinds: tuple[FeatureKind, FeatureKind], own: list[_Part], other: list[_Part]) -> bool:
         """Whether parts of two classes meet, and act on each other."""
-        if not meet(kinds) or kinds[0] not in HOLLOWS:
-            return meet(kinds)
+        hollow, meet = kinds[0].name, (kinds[0].name, kinds[1].name) in MEETINGS
+        if not meet or hollow not in HOLLOWS:
+            return meet
         pairs = [(one.feature.sizes, two.feature.sizes[0]) for one in own for two in other]
-        never = all(never_reached(kinds[0], sizes, radius) for sizes, radius in pairs)
+        never = all(never_reached(hollow, sizes, radius) for sizes, radius in pairs)
         return not never and not self.normal_law.elastic(other[0].feature.sizes[0].graph.one).is_zero
 
     def met_shapes(self) -> list[str]:
@@ -266,17 +264,17 @@ class ContactGroups(Force):
         for i, (g, first) in enumerate(keys):
             for j, (h, second) in enumerate(keys):
                 apart = g != h or len(groups) == 1
-                twice = alike(first, second) and i > j  # round beside round, once
+                twice = first.name == second.name and i > j  # round beside round, once
                 own, other = groups[g][first], groups[h][second]
                 if apart and not twice and self._meet((first, second), own, other):
                     sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
-                    height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
+                    height = own[0].shape.sizes[0] if first.name == FIELD else None
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
                     if self.on_bed:
                         places = tuple(self._slots * x.column for x in own)
                         kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(own))
                     elif self.states:
-                        block = blocks[g, h, class_of(first, second), part_of(second)]
+                        block = blocks[g, h, class_of(first.name, second.name), second.name]
                         rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
                         columns = tuple(self._slots * block.places * x.column for x in other)
                         kind = replace(kind, held=(rows, columns))
@@ -330,23 +328,22 @@ def _lines(parts: Sequence[_Part]) -> tuple[tuple[int, int], ...]:
     return tuple((start, len(group)) for start, group in zip(starts, rows, strict=False))
 
 
-def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
+def _features(shapes: Sequence[ContactShape]) -> dict[FeatureKind, list[_Part]]:
     """Features of shapes, by class; parts are numbered in this order."""
-    found: dict[str, list[_Part]] = {}
+    found: dict[FeatureKind, list[_Part]] = {}
     before: dict[str, int] = {}
-    heights: dict[Expr, str] = {}  # fields of one height are of one class
+    heights: dict[Expr, int] = {}  # fields of one height are of one class
     for number, shape in enumerate(shapes):
         for feature in shape.features():
+            column, kind = before.get(feature.kind, 0) + feature.slot, FeatureKind(feature.kind, feature.number)
             if feature.kind == FIELD:
-                kind = heights.setdefault(shape.sizes[0], f"{FIELD}{len(heights)}")
-                feature = feature._replace(kind=kind)
-            column = before.get(feature.kind, 0) + feature.slot
-            found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
-        for kind, count in shape.parts().parts.items():
-            before[kind] = before.get(kind, 0) + count
+                kind = FeatureKind(FIELD, heights.setdefault(shape.sizes[0], 1 + len(heights)))
+            found.setdefault(kind, []).append(_Part(shape, feature, number, column))
+        for name, count in shape.parts().parts.items():
+            before[name] = before.get(name, 0) + count
     polygons = 0  # which are of one class, whatever the number of their corners
     for kind, parts in found.items():
-        if part_of(kind) == POLYGON:
+        if kind.name == POLYGON:
             found[kind] = [part._replace(column=polygons + k) for k, part in enumerate(parts)]
             polygons += len(parts)
     return found

@@ -1,12 +1,12 @@
-"""Contacts between groups: which features of shapes meet, and the law of one kind of pair."""
+"""Contacts between groups: the table of features that meet, the states of pairs, and the law of one kind of pair."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from operator import add
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 from ..elements.forces.force import MarkerLoad, View, where
 from ..elements.forces.friction import DryFriction
@@ -17,34 +17,105 @@ from ..expr.core import Expr, Graph, reachable, substitute
 from ..expr.differentiate import jvp
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import BlockEllipsoid, EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
-from .fields import FieldEllipsoid, FieldRound, HeightField, planted
+from .fields import FieldEllipsoid, FieldRound, planted
 from .limits import NOWHERE
 from .pair_features import CHOSEN, EDGE, OTHER, OWN, PIECE
 from .pair_sums import POSE
 from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
-from .profiles import WALLS, ArcRound, BowlRound, EdgeRound, InsideRound, NotchRound
+from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
 from .rounds import AtHeight, BlockRound, EdgeRod, PolygonRound, RodRod, RoundRound, SegmentRound
-from .shapes import SOLE, greatest
-from .soil_beds import SoilCell, cell_of
+from .shapes import WHOLE_PLATE, greatest
+from .soil_beds import SoilCell
 from .soil_wheels import SoilWheel
-from .states import BED_CELL, BLOCK, CORE, HOLLOW, INSIDE, MET, POLYGON, part_of, places_of
+from .states import BED_CELL, BLOCK, CORE, FIELD, FIELD_SHAPE, INSIDE, POLYGON, FeatureKind, ShapeParts
 
 # -- features that meet ------------------------------------------------------------------------------------------------
 
 
 #: Features at which an overlap acts back, with the elastic part of the law alone.
-HOLLOWS = ("notch", "bowl")
-#: Features of the first shapes of :data:`~.states.MET` that have several.
-_SURFACES = {"ground": ("edge", "arc"), HOLLOW: HOLLOWS}
-#: Classes of features that meet: the first is a surface, or both are of one class.
-MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
+HOLLOWS = ("inner_corner", "hollow_arc")
 
 
-def meet(kinds: tuple[str, str]) -> bool:
-    """Whether features of two classes meet, in this order."""
-    return (part_of(kinds[0]), part_of(kinds[1])) in MEETINGS
+class Given(NamedTuple):
+    """What the contact of two features is made of."""
+
+    laws: tuple[str, Marker, Marker, NormalLaw, DryFriction | None]
+    first: Any  #: sizes
+    second: Any
+    radius: Expr  #: of the second, where it is a point with a radius
+    witness: int  #: which of several places of contact it is
+    field: Any  #: of a height field alone
+    height: Callable[[], Vec3] | None  #: from the plane of the first to the second, of shapes of the plane
+
+
+Make = Callable[[Given], Contact]
+
+
+def _each(first: str, second: Sequence[str], make: Make) -> dict[tuple[str, str], Make]:
+    return {(first, one): make for one in second}
+
+
+def _on_segment(g: Given) -> Contact:
+    return SegmentRound(*g.laws, g.first[0], (g.first[1], g.radius))
+
+
+def _two_rods(kind: type[RodRod]) -> Make:
+    return lambda g: kind(*g.laws, (g.first[0], g.second[0]), (g.first[1], g.second[1]))
+
+
+def _on_block(g: Given) -> Contact:
+    x, y, z, edge = g.first
+    return BlockRound(*g.laws, (x, y, z), edge, g.radius)
+
+
+def _on(kind: type[ProfilePiece] | type[PolygonRound]) -> Make:
+    return lambda g: kind(*g.laws, g.first, g.radius)
+
+
+def _in_hollow(kind: type[ProfilePiece]) -> Make:
+    return lambda g: kind(*g.laws[:3], PartlyDamped(g.laws[3], g.radius.graph.zero), None, g.first, g.radius)
+
+
+def _wheel_on_edge(g: Given) -> Contact:
+    """On soil, which has no energy that parts could share."""
+    return EdgeRound(*g.laws, (*g.first[:WALLS], g.radius.graph.zero, *g.first[WALLS + 1 :]), g.radius)
+
+
+def _on_cell(kind: str) -> Make:
+    return lambda g: SoilCell(*g.laws, kind, g.second, g.first[0], None if g.height is None else g.height())
+
+
+_OUTLINED = ("round", "corner", "vertex", "pad")
+#: Features that meet -> their contact.  The first is a surface, or both are of one class.
+MEETINGS: dict[tuple[str, str], Make] = {
+    ("round", "round"): lambda g: RoundRound(*g.laws, (g.first[0], g.radius)),
+    ("rod", "rod"): _two_rods(RodRod),
+    **_each("rod", ("round", "rounded_corner"), _on_segment),
+    **_each("segment", ("round", "corner", "vertex"), _on_segment),
+    ("ellipsoid", "round"): lambda g: EllipsoidRound(*g.laws, g.first, g.radius),
+    ("ellipsoid", "rod"): lambda g: EllipsoidRod(*g.laws, g.first, g.second[1], g.radius),
+    ("ellipsoid", "ellipsoid"): lambda g: EllipsoidEllipsoid(*g.laws, (g.first, g.second)),
+    (BLOCK, "round"): _on_block,
+    (BLOCK, "ellipsoid"): lambda g: BlockEllipsoid(*g.laws, g.first[:3], g.second),
+    **_each(CORE, ("rounded_corner", "tip"), _on_block),
+    **_each("rounded_edge", ("rounded_edge", "axis"), _two_rods(EdgeRod)),
+    **_each(FIELD, ("round", "end"), lambda g: FieldRound(*g.laws, g.field, g.radius)),
+    (FIELD, "ellipsoid"): lambda g: FieldEllipsoid(*g.laws, g.field, g.second),
+    **_each(POLYGON, ("round", "corner"), _on(PolygonRound)),
+    (POLYGON, POLYGON): lambda g: PolygonPolygon(*g.laws, g.first, g.second, g.witness),
+    **_each("edge", _OUTLINED, _on(EdgeRound)),
+    ("edge", "wheel"): _wheel_on_edge,
+    **_each("arc", (*_OUTLINED, "wheel"), _on(ArcRound)),
+    **_each(INSIDE, _OUTLINED, _on(InsideRound)),
+    **_each("inner_corner", ("round", "corner"), _in_hollow(InnerCornerRound)),
+    **_each("hollow_arc", ("round", "corner"), _in_hollow(HollowArcRound)),
+    **_each("half", (*_OUTLINED, "end", "wheel"), lambda g: SpherePlane(*g.laws, g.radius)),
+    ("half", "ellipsoid"): lambda g: EllipsoidPlane(*g.laws, g.second),
+    (BED_CELL, "wheel"): _on_cell("wheel"),
+    (BED_CELL, WHOLE_PLATE): _on_cell(WHOLE_PLATE),
+}
 
 
 class ShapeMotion(NamedTuple):
@@ -56,77 +127,98 @@ class ShapeMotion(NamedTuple):
     angular_velocity: Vec3
 
 
-def touching(
-    kinds: tuple[str, str],
-    markers: tuple[Marker, Marker],
-    sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
-    law: Contact,
-    witness: int = 0,
-    field: HeightField | None = None,
-) -> Contact:
-    """The contact of one feature with another at one of its places; ``law`` has the laws."""
-    first, radius = sizes[0], sizes[1][0]
-    normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
-    friction = law.friction
-    if kinds[1] == "pad":
-        area, width = sizes[1]
+def touching(names: tuple[str, str], given: Given) -> Contact:
+    """The contact of one feature with another at one of its places, by laws that are not yet of their radii."""
+    normal, friction = given.laws[3:]
+    normal = normal.at(lambda: joint_radius(given.first[0], given.radius) if names[0] == "round" else given.radius)
+    radius = given.radius
+    if names[1] == "pad":
+        area, width = given.second
         normal, radius = normal.on_pad(area, width), radius.graph.zero
         friction = None if friction is None else friction.on_pad(area)
-    laws = (law.name, *markers, normal, friction)
-    if kinds[0] == "round":
-        return RoundRound(*laws, (first[0], radius))
-    if part_of(kinds[1]) == POLYGON:
-        return PolygonPolygon(*laws, first, sizes[1], witness)
-    if kinds[1] == "ellipsoid":
-        x, y, z = sizes[1]
-        if field is not None:
-            return FieldEllipsoid(*laws, field, (x, y, z))
-        if kinds[0] == "half":
-            return EllipsoidPlane(*laws, (x, y, z))
-        if kinds[0] == BLOCK:
-            return BlockEllipsoid(*laws, (first[0], first[1], first[2]), (x, y, z))
-        return EllipsoidEllipsoid(*laws, ((first[0], first[1], first[2]), (x, y, z)))
-    if field is not None:
-        return FieldRound(*laws, field, radius)
-    if kinds[0] == "ellipsoid":
-        x, y, z = first
-        return (
-            EllipsoidRod(*laws, (x, y, z), sizes[1][1], radius)
-            if kinds[1] == "rod"
-            else (EllipsoidRound(*laws, (x, y, z), radius))
-        )
-    if kinds[0] in (BLOCK, CORE):
-        x, y, z, edge = first
-        return BlockRound(*laws, (x, y, z), edge, radius)
-    if kinds[0] == "rounded_edge":
-        return EdgeRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
-    if kinds[1] == "rod":
-        return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
-    if kinds[0] == "half":
-        return SpherePlane(*laws, radius)
-    if kinds[0] in HOLLOWS:
-        elastic = (law.name, *markers, PartlyDamped(normal, radius.graph.zero), None)
-        return (NotchRound if kinds[0] == "notch" else BowlRound)(*elastic, first, radius)
-    if part_of(kinds[0]) == INSIDE:
-        return InsideRound(*laws, first, radius)
-    if kinds[1] == "rim" and kinds[0] == "edge":
-        first = (*first[:WALLS], radius.graph.zero, *first[WALLS + 1 :])  # soil has no energy that parts could share
-    if kinds[0] in ("edge", "arc"):
-        return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
-    if kinds[0] in ("segment", "rod"):
-        return SegmentRound(*laws, first[0], (first[1], radius))
-    return PolygonRound(*laws, first, radius)
+    return MEETINGS[names](given._replace(laws=(*given.laws[:3], normal, friction), radius=radius))
 
 
 def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
     """How far points of a feature are from its centre that its turning moves along a normal; 0 of what is round."""
     if kind == "ellipsoid":
         return greatest(sizes)
-    if part_of(kind) == POLYGON:
+    if kind == POLYGON:
         return sizes[-1]  # of the numbers that matter, see PolygonPolygon
-    if kind == SOLE:
+    if kind == WHOLE_PLATE:
         return sizes[0]
-    return sizes[0] + sizes[1] if kind in ("rod", "rounded_edge", "spine") else graph.zero
+    return sizes[0] + sizes[1] if kind in ("rod", "rounded_edge", "axis") else graph.zero
+
+
+# -- states of pairs ---------------------------------------------------------------------------------------------------
+
+# A pair is a shape with a surface, or a round one, beside a part of another shape that meets it: a circle, a corner, a
+# point of a plate.  The pieces of a profile share the states of their shape.
+
+
+#: Parts that meet surfaces, in the order in which their states stand.
+PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
+#: Classes of first parts of which each has states of its own; those of all others are of surfaces.
+_APART = ("round", "rod", POLYGON, "ellipsoid", BLOCK)
+#: Kind of shape -> what it is where it is the first of a pair.
+_FIRST = {
+    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
+    "profile": "edge", "smooth_profile": "edge", "outline": "edge", "smooth_outline": "edge", "sprocket": "edge",
+    "half_plane": "half", "half_space": "half", "ellipsoid": "ellipsoid", "cuboid": BLOCK, FIELD_SHAPE: FIELD,
+}  # fmt: skip
+
+
+class PairStates(NamedTuple):
+    """Where the pairs of some first shapes with parts of one class stand among all pairs."""
+
+    start: int
+    columns: int
+    rows: Mapping[int, int]  #: number of the first shape in its group -> row
+    once: bool  #: whether the parts meet among themselves, each two once
+    places: int = 1  #: how many places of contact a pair has
+
+    def of_first(self, shape: int, row: int) -> int:
+        """The number of a first part: of its shape, or where parts meet among themselves of its number among these."""
+        if self.once:
+            return self.start + self.places * (row * self.columns - row * (row + 1) // 2 - row - 1)
+        return self.start + self.places * self.rows[shape] * self.columns
+
+
+def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int, int, str, str], PairStates], int]:
+    """Blocks of pairs by (group of the first, of the second, class of the first, class of the second); all pairs."""
+    found: dict[tuple[int, int, str, str], PairStates] = {}
+    start = 0
+    for g, h in [(0, 0)] if len(groups) == 1 else [(0, 1), (1, 0)]:
+        for first in (*_APART, "surface"):
+            for second in PARTS:
+                if first == second and g > h:  # met already
+                    continue
+                columns = sum(shape.parts.get(second, 0) for shape in groups[h])
+                own = [k for k, shape in enumerate(groups[g]) if _meets(shape.kind, first, second)]
+                if not own or not columns:
+                    continue
+                once = first == second and g == h
+                count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
+                places = places_of((first, second))
+                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once, places)
+                found[g, h, first, second] = block
+                start += places * (count * (count - 1) // 2 if once else len(own) * columns)
+    return found, start
+
+
+def class_of(first: str, second: str) -> str:
+    """The class of a first part: its own where parts of one class meet each other, else that of surfaces."""
+    return first if first in _APART and (first != POLYGON or second == POLYGON) else "surface"
+
+
+def places_of(names: tuple[str, str]) -> int:
+    """At how many places two features touch."""
+    return 2 if names == (POLYGON, POLYGON) else 1
+
+
+def _meets(kind: str, first: str, second: str) -> bool:
+    own = _FIRST.get(kind, "")
+    return (own, second) in MEETINGS and class_of(own, second) == first
 
 
 # -- laws --------------------------------------------------------------------------------------------------------------
@@ -225,7 +317,7 @@ class PairLaw(NamedTuple):
 
 def pair_kind(
     law: PairLaw,
-    kinds: tuple[str, str],
+    kinds: tuple[FeatureKind, FeatureKind],
     tables: tuple[int, int],
     sizes: tuple[int, int],
     place: Callable[[Expr], int],
@@ -247,7 +339,8 @@ def pair_kind(
         Of a height field, which is the first of the two.
     """
     graph = Graph()
-    flat = law.planar and kinds[0] != "half"  # which has no extent along its normal to leave out
+    names = kinds[0].name, kinds[1].name
+    flat = law.planar and names[0] != "half"  # which has no extent along its normal to leave out
     pair = _PairView(graph, flat)
     view = cast(View, pair)  # contacts ask for markers alone, not for angles and coordinates of joints
     places: list[int] = []
@@ -264,37 +357,36 @@ def pair_kind(
     friction = None if law.friction is None else law.friction.mapped(own)
     field = None if height is None else planted(height, graph, own)
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
-    lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if law.planar else None
-    polygons = part_of(kinds[0]) == part_of(kinds[1]) == POLYGON
-    inside = part_of(kinds[0]) == INSIDE
+    lateral = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2] if law.planar else None
+    polygons = names == (POLYGON, POLYGON)
+    inside = names[0] == INSIDE
     corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else (sizes[0] // PIECE,) if inside else ()
     sizes = (OWN, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
     given = [
         tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
     ]
-    out = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if law.planar else vec.zero(graph)
+    out = vec.transpose(view.rotation(markers[names[0] == "half"]))[2] if law.planar else vec.zero(graph)
     exerted: list[list[Expr]] = []
     held: list[Expr] = []
     rates: list[Expr] = []
     witnesses: list[Expr] = []
     touch: list[Expr] = []
-    for witness in range(places_of(kinds)):
+    for witness in range(places_of(names)):
         states = tuple(graph.symbol(f"s{len(held) + k}") for k in range(law.slots))
         held += states
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
-        bare = SpherePlane(law.name, *markers, push, dry, graph.zero)
-        on_cell = kinds[0] == BED_CELL
-        if on_cell:
-            contact: Contact = cell_of(bare, given[1], given[0][0], kinds[1], pair.height() if flat else None)
-        else:
-            contact = touching(kinds, markers, (given[0], given[1]), bare, witness, field)
+        sides = (law.name, *markers)
+        laws = (*sides, push, dry)
+        one = Given(laws, given[0], given[1], given[1][0], witness, field, pair.height if flat else None)
+        contact = touching(names, one)
+        on_cell = isinstance(contact, SoilCell)
         if flat and not on_cell:
-            contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
-        if kinds[1] == "rim" and not on_cell:
-            across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
-            contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)
+            contact = AtHeight(*sides, contact.normal_law, contact.friction, contact, pair.height())
+        if names[1] == "wheel" and not on_cell:
+            across = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2]
+            contact = SoilWheel(*sides, push, dry, contact, given[1][0], given[1][1], across)
         exerted.append(_exerted(contact, view, lost))
-        if states and (lost or kinds[0] in HOLLOWS):
+        if states and (lost or names[0] in HOLLOWS):
             rates += [graph.zero] * law.slots
         elif states:
             rates += (
@@ -303,18 +395,18 @@ def pair_kind(
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
         facing, gap = contact.nearness(view)
-        touch = [*facing, gap, turning_radius(kinds[1], given[1], graph)]
+        touch = [*facing, gap, turning_radius(names[1], given[1], graph)]
         if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
             owned = graph.apply("lt", 0.0, share)
             # what is inside has come there through the outline
-            away = -NOWHERE if inside or kinds[0] in HOLLOWS else graph.apply("min", depth, 0.0)
+            away = -NOWHERE if inside or names[0] in HOLLOWS else graph.apply("min", depth, 0.0)
             touch[3] = where(owned, depth, away)
             depth = where(owned, depth, -NOWHERE)
         witnesses += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
     results = [*(reduce(add, found) for found in zip(*exerted, strict=True)), *rates]
-    names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
-    names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
-    seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
+    symbols = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
+    symbols += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
+    seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in symbols}
     counts = [len(found) for found in (results, results, touch, witnesses)]
     every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses])
     starts = [0, *itertools.accumulate(counts)]
@@ -327,7 +419,7 @@ def pair_kind(
         flat,
         tuple(places),
         nodes,
-        (*names, *(f"d_{name}" for name in names)),
+        (*symbols, *(f"d_{name}" for name in symbols)),
         tuple(ids[: len(results)]),
         tuple(ids[len(results) :]),
         tuple(seen),

@@ -147,7 +147,7 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
     return ProfilePart("arc", middle, c, sizes, sqrt(half * half + rise * rise), False)
 
 
-def beside_bowls(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
+def beside_hollow_arcs(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The pieces of a smooth ring, with the hollow arcs that lie beyond their ends."""
     found = []
     for k, one in enumerate(ring):
@@ -370,34 +370,34 @@ class ArcRound(SurfaceRound):
 _SAMPLES = 12  #: points of an arc at which the room inside is measured
 
 
-def notch(corner: Point, before: Point, after: Point, width: Expr) -> ProfilePart:
+def inner_corner(corner: Point, before: Point, after: Point, width: Expr) -> ProfilePart:
     """The inner corner between two edges of given directions; its x axis points out of the solid.
 
     Sizes: cosine and sine of half of the angle between the edges.
     """
     out = unit((-before[1] - after[1], before[0] + after[0]))
     cosine, sine = dot(out, after), out[0] * after[1] - out[1] * after[0]
-    return ProfilePart("notch", corner, out, (cosine, -sine, width), width.graph.zero, False)
+    return ProfilePart("inner_corner", corner, out, (cosine, -sine, width), width.graph.zero, False)
 
 
-def bowls(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
+def hollow_arcs(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The hollow arcs among some pieces, as far as numbers tell."""
     arcs = [one for one in pieces if one.kind == "arc"]
-    return [one._replace(kind="bowl") for one in arcs if one.sizes[0].value is None or one.sizes[0].value > 0.0]
+    return [one._replace(kind="hollow_arc") for one in arcs if one.sizes[0].value is None or one.sizes[0].value > 0.0]
 
 
-def notches(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
+def inner_corners(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The inner corners among some corners, as far as numbers tell."""
-    found = [one for one in pieces if one.kind == "notch"]
+    found = [one for one in pieces if one.kind == "inner_corner"]
     return [one for one in found if one.sizes[0].value is None or one.sizes[0].value > EVEN]
 
 
 def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
     """Whether a circle of a radius that is known never holds a place where parts of its overlap grow together."""
-    if kind == "bowl":
+    if kind == "hollow_arc":
         bend = sizes[0].value
         return radius.value is not None and bend is not None and radius.value * bend <= 1.0
-    return kind == "notch" and radius.is_zero
+    return kind == "inner_corner" and radius.is_zero
 
 
 def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
@@ -442,7 +442,7 @@ def clearance_of_arcs(pieces: Sequence[ProfilePart]) -> float:
     return ROOM * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
 
 
-class NotchRound(ProfilePiece):
+class InnerCornerRound(ProfilePiece):
     """At an inner corner that is farther from the centre than the edges beside it."""
 
     def share(self, view: View) -> Expr:
@@ -461,7 +461,7 @@ class NotchRound(ProfilePiece):
         return self._touching(view, where(apart, distance, 0.0), normal, reach)
 
 
-class BowlRound(ProfilePiece):
+class HollowArcRound(ProfilePiece):
     """At the far side of a hollow arc of curvature k, seen from beyond its centre.
 
     It is (1 + q) / k away, q = |(k x, 1 - k y)|.
@@ -533,7 +533,7 @@ def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
         edge(points[k], one, sides[k], sides[k + 2], width, walls=True, endless=(k == 1, k == last - 1))
         for k, one in enumerate(edges)
     ]
-    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
+    return found + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
 
 
 def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
@@ -549,7 +549,7 @@ def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
     for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
         found += biarcs(a, b, s, t, width)
-    return beside_bowls([*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
+    return beside_hollow_arcs([*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
 
 
 def _tangents(points: Sequence[Point]) -> list[Point]:
@@ -573,7 +573,7 @@ def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
     ways = [unit(one) for one in edges]
     n = len(points)
     found = [edge(points[k], edges[k], edges[k - 1], edges[(k + 1) % n], width, walls=True) for k in range(n)]
-    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(n)]
+    return found + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(n)]
 
 
 def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
@@ -583,7 +583,7 @@ def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
     found: list[ProfilePart] = []
     for k in range(n):
         found += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
-    return beside_bowls(found)
+    return beside_hollow_arcs(found)
 
 
 class Tooth(NamedTuple):
@@ -656,7 +656,7 @@ def sprocket_ring(
         pieces += [one._replace(origin=_turned(one.origin, turn), along=_turned(one.along, turn)) for one in tooth]
         places += [_turned(point, turn) for point in line]
     tops = [point for k, point in enumerate(places) if k % len(line) in (0, len(line) - 1)]
-    return beside_bowls(pieces), tops, places
+    return beside_hollow_arcs(pieces), tops, places
 
 
 def _pitch_radius(teeth: int, pitch: Expr) -> Expr:

@@ -26,13 +26,13 @@ from .profiles import (
     Point,
     ProfilePart,
     arc_points,
-    bowls,
     clearance_of_arcs,
     cross,
     half_gap,
+    hollow_arcs,
+    inner_corners,
     length,
     minus,
-    notches,
     peaks,
     piece_numbers,
     smooth_pieces,
@@ -43,11 +43,11 @@ from .profiles import (
     straight_ring,
 )
 from .rounds import cuboid_parts
-from .states import BED, BED_CELL, FIELD, GROUNDS, INSIDE, WHEEL, ShapeParts, parts_of
+from .states import BED, BED_CELL, FIELD, GROUNDS, INSIDE, POLYGON, WHEEL, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
-SOLE = "sole"  #: a plate on a bed
+WHOLE_PLATE = "whole_plate"  #: a plate on a bed
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _STEPS = 24  #: lines of which the picture of an ellipse is made
 
@@ -69,6 +69,8 @@ class Feature(NamedTuple):
         which has no other side.
     slot : int
         Its number among those of its class on the shape.
+    number : int
+        How many corners or pieces it has, where its law differs by it.
     """
 
     kind: str
@@ -77,6 +79,7 @@ class Feature(NamedTuple):
     bound: Expr | None
     thickness: Expr
     slot: int = 0
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ class ContactShape:
         """Its parts."""
         frame, zero = self.marker.frame, self.marker.frame.position[0].graph.zero
         if self.is_wheel:
-            return [Feature("rim", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
+            return [Feature("wheel", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("circle", "sphere"):
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
@@ -123,8 +126,8 @@ class ContactShape:
             return [Feature(FIELD, frame, (), None, zero)]
         if self.kind == "plate":
             return self._pads(frame)
-        if self.kind == SOLE:
-            return [Feature(SOLE, frame, self.sizes[:2], self.sizes[0], self.sizes[0])]
+        if self.kind == WHOLE_PLATE:
+            return [Feature(WHOLE_PLATE, frame, self.sizes[:2], self.sizes[0], self.sizes[0])]
         if self.kind == BED:
             return self._cells(frame)
         if self.kind in ("segment", "capsule"):
@@ -132,7 +135,7 @@ class ContactShape:
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
             whole, *ends = ("segment", "corner") if self.kind == "segment" else ("rod", "end", "tip")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            wholes = [whole] if self.kind == "segment" else [whole, "spine"]  # the same again, for edges of cuboids
+            wholes = [whole] if self.kind == "segment" else [whole, "axis"]  # the same again, for edges of cuboids
             return [Feature(one, along, (half, radius), half + radius, thick) for one in wholes] + [
                 Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k)
                 for end in ends
@@ -150,7 +153,7 @@ class ContactShape:
         points = [
             Feature("vertex", _moved(frame, (x, y, zero)), (zero,), zero, thick, k) for k, (x, y) in enumerate(corners)
         ]
-        return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
+        return [Feature(POLYGON, frame, tuple(edges), sqrt(reach), thick, number=len(corners)), *points]
 
     @property
     def is_wheel(self) -> bool:
@@ -201,7 +204,7 @@ class ContactShape:
 
     def on_bed(self) -> ContactShape:
         """The shape as it lies on a bed: a plate as a whole."""
-        return replace(self, kind=SOLE) if self.kind == "plate" else self
+        return replace(self, kind=WHOLE_PLATE) if self.kind == "plate" else self
 
     def _points(self) -> list[Point]:
         """Points of a profile or an outline."""
@@ -237,11 +240,11 @@ class ContactShape:
             Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
             for one in surface
         ]
-        hollows = [*notches(pieces), *bowls(pieces)]
+        hollows = [*inner_corners(pieces), *hollow_arcs(pieces)]
         found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
         reach = None if self.kind in GROUNDS else greatest([length(one.origin) + one.half for one in surface])
-        kind = f"{INSIDE}{len(surface)}"
-        found.append(Feature(kind, frame, (*piece_numbers(surface), told), reach, depth))
+        numbers = (*piece_numbers(surface), told)
+        found.append(Feature(INSIDE, frame, numbers, reach, depth, number=len(surface)))
         for k, (x, y) in tops:
             found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
         return found
@@ -297,7 +300,7 @@ class ContactShape:
             zero = self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (zero, self.sizes[0])]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
-        if self.kind in ("plate", SOLE):
+        if self.kind in ("plate", WHOLE_PLATE):
             half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]

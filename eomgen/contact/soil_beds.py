@@ -11,7 +11,6 @@ from operator import truediv
 from typing import NamedTuple
 
 from ..elements.forces.force import Load, View, beyond_zero, where
-from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
@@ -19,7 +18,7 @@ from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from .point import Contact, Touch
-from .shapes import SOLE
+from .shapes import WHOLE_PLATE
 from .soil_laws import SoilPressure, SoilShear
 
 STATES = ("shear", "grip", "sinkage")  #: of a cell, in the order in which laws hold them
@@ -93,10 +92,10 @@ class SoilCell(Contact):
 
     def _column(self, view: View) -> _Column:
         _, x, y, ahead, up = self._place(view)
-        if self.kind != SOLE:
-            return _under_rim(self.sizes[0], x, y)
+        if self.kind != WHOLE_PLATE:
+            return _under_wheel(self.sizes[0], x, y)
         axis = vec.transpose(view.rotation(self.second))[0]
-        return _under_sole(self.sizes[0], self.size, x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
+        return _under_plate(self.sizes[0], self.size, x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
 
     def touch(self, view: View) -> Touch:
         reach, _, _, ahead, up = self._place(view)
@@ -192,7 +191,7 @@ class SoilCell(Contact):
         return sinking * part + apply("max", 0.0, over) / law.settling
 
 
-def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
+def _under_wheel(radius: Expr, x: Expr, y: Expr) -> _Column:
     """Of a wheel, whose centre is at x, y.
 
     Cells beside a wheel come to it at a distance of BESIDE R.  Its rim is above the ground there until the axle is at
@@ -226,7 +225,7 @@ def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
     return _Column(inside, depth, normal, steep, (radius * normal[0], radius * normal[1]), away, gap)
 
 
-def _under_sole(length: Expr, size: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
+def _under_plate(length: Expr, size: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
     """Of a plate, whose middle is at x, y and whose axis has two parts: every point of it presses by a rounded wedge.
 
     Where its axis is (e_x, e_y), at -x from its middle, the lowest of these wedges counts, that of the point s:
@@ -271,9 +270,3 @@ def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> l
         found += [rate - free * state for rate, state in zip(rates, own, strict=True)]
         found.append(beyond_zero(deeper, partial(truediv, squares)))
     return found
-
-
-def cell_of(law: Contact, sizes: tuple[Expr, ...], size: Expr, kind: str, height: Vec3 | None) -> SoilCell:
-    """The contact of a feature with a cell; ``law`` has the markers and laws."""
-    normal: NormalLaw = law.normal_law
-    return SoilCell(law.name, law.first, law.second, normal, law.friction, kind, sizes, size, height)

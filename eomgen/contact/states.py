@@ -1,4 +1,4 @@
-"""Shapes of contacts between groups: their kinds and keys, and the states that pairs of them have."""
+"""Shapes of contacts between groups: their kinds and keys, and how many parts of each class they have."""
 
 from __future__ import annotations
 
@@ -31,10 +31,7 @@ from ..elements.kinds import (
     typed_schema,
 )
 
-# -- states of pairs ---------------------------------------------------------------------------------------------------
-
-# A pair is a shape with a surface, or a round one, beside a part of another shape that meets it: a circle, a corner, a
-# point of a plate.  The pieces of a profile share the states of their shape.
+# -- parts of shapes ---------------------------------------------------------------------------------------------------
 
 
 MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
@@ -44,41 +41,21 @@ WHEEL = "wheel"  #: a circle with a width
 BED = "bed"  #: soil that remembers by place, in cells
 BED_CELL = "cell"  #: class of the cells, whose states belong to no pair
 TEETH = 3  #: fewest teeth of a sprocket
-#: Parts that meet surfaces, in the order in which their states stand.
-PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres and ellipsoids meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
 INSIDE = "inside"  #: class of the insides of closed outlines, which what is deep in them meets
-HOLLOW = "hollow"  #: class of places of outlines where parts of an overlap grow together
-FIELD = "field"  #: class of height fields, of which those of one height have one number
-_ROUND = ("round", "rod", POLYGON)
-#: Classes of first parts that are told apart; all others are surfaces.
-_APART = (*_ROUND, "ellipsoid", BLOCK)
-#: Kind of shape -> what it is where it is the first of a pair.
-_FIRST = {
-    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
-    "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
-    "sprocket": "ground", "half_plane": "half", "half_space": "half",
-    "ellipsoid": "ellipsoid", "cuboid": BLOCK, "height_field": FIELD,
-}  # fmt: skip
-#: What is met by each of these.
-MET = {
-    "round": ("round",),
-    "rod": ("round", "rod", "rounded_corner"),
-    "ellipsoid": ("round", "rod", "ellipsoid"),
-    BLOCK: ("round", "ellipsoid"),
-    CORE: ("rounded_corner", "tip"),
-    "rounded_edge": ("rounded_edge", "spine"),
-    FIELD: ("round", "end", "ellipsoid"),
-    "segment": ("round", "corner", "vertex"),
-    POLYGON: ("round", "corner", POLYGON),
-    "ground": ("round", "corner", "vertex", "pad", "rim"),
-    INSIDE: ("round", "corner", "vertex", "pad"),
-    HOLLOW: ("round", "corner"),
-    "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad", "rim"),
-    BED_CELL: ("rim", "sole"),
-}
+FIELD = "field"  #: class of height fields, whose number tells those of different heights
+
+
+class FeatureKind(NamedTuple):
+    """A class of features, and how many corners or pieces they have, or which height, where their laws differ by it."""
+
+    name: str
+    number: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.name}{self.number or ''}"
 
 
 class ShapeParts(NamedTuple):
@@ -86,22 +63,6 @@ class ShapeParts(NamedTuple):
 
     kind: str
     parts: Mapping[str, int]
-
-
-class PairStates(NamedTuple):
-    """Where the pairs of some first shapes with parts of one class stand among all pairs."""
-
-    start: int
-    columns: int
-    rows: Mapping[int, int]  #: number of the first shape in its group -> row
-    once: bool  #: whether the parts meet among themselves, each two once
-    places: int = 1  #: how many places of contact a pair has
-
-    def of_first(self, shape: int, row: int) -> int:
-        """The number of a first part: of its shape, or where parts meet among themselves of its number among these."""
-        if self.once:
-            return self.start + self.places * (row * self.columns - row * (row + 1) // 2 - row - 1)
-        return self.start + self.places * self.rows[shape] * self.columns
 
 
 def parts_of(kind: str, points: int = 0) -> ShapeParts:
@@ -112,61 +73,13 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
-        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1},
+        "capsule": {"rod": 1, "end": 2, "tip": 2, "axis": 1}, "ellipsoid": {"ellipsoid": 1},
         "cuboid": {"end": 8, "rounded_corner": 8, "rounded_edge": 12},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
-        "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
+        "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"wheel": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2}, BED: {BED_CELL: points},
     }  # fmt: skip
     return ShapeParts(kind, found.get(kind, {}))
-
-
-def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int, int, str, str], PairStates], int]:
-    """Blocks of pairs by (group of the first, of the second, class of the first, class of the second); all pairs."""
-    found: dict[tuple[int, int, str, str], PairStates] = {}
-    start = 0
-    for g, h in [(0, 0)] if len(groups) == 1 else [(0, 1), (1, 0)]:
-        for first in (*_APART, "surface"):
-            for second in PARTS:
-                if first == second and g > h:  # met already
-                    continue
-                columns = sum(shape.parts.get(second, 0) for shape in groups[h])
-                own = [k for k, shape in enumerate(groups[g]) if _meets(shape.kind, first, second)]
-                if not own or not columns:
-                    continue
-                once = first == second and g == h
-                count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
-                places = places_of((first, second))
-                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once, places)
-                found[g, h, first, second] = block
-                start += places * (count * (count - 1) // 2 if once else len(own) * columns)
-    return found, start
-
-
-def class_of(feature: str, met: str) -> str:
-    """The class of a first part: its own where parts of one class meet each other, else that of surfaces."""
-    own, other = part_of(feature), part_of(met)
-    return own if own in _APART and (own != POLYGON or other == POLYGON) else "surface"
-
-
-def part_of(feature: str) -> str:
-    """The class of a feature, whatever the number of its corners."""
-    return feature.rstrip("0123456789")
-
-
-def alike(first: str, second: str) -> bool:
-    """Whether two features are of one class, whose parts meet each other once."""
-    return part_of(first) == part_of(second)
-
-
-def places_of(kinds: tuple[str, str]) -> int:
-    """At how many places two features touch."""
-    return 2 if part_of(kinds[0]) == part_of(kinds[1]) == POLYGON else 1
-
-
-def _meets(kind: str, first: str, second: str) -> bool:
-    own = _FIRST.get(kind, "")
-    return own != "" and class_of(own, second) == first and second in MET[own]
 
 
 def cells_of(groups: Sequence[Sequence[ShapeParts]]) -> int:
