@@ -130,10 +130,10 @@ def directions() -> Iterator[str]:
             here, there = ("base" if one == "errors" else one for one in (here, there))  # one floor
             if here != there and here not in ("", "__main__") and there and rows[there] >= rows[here]:
                 yield f"{name} imports {other}, which stands in the same row of ARCHITECTURE.md or above"
-    carried = {part.removesuffix(".py") for part in import_module("eomgen.codegen.package").CARRIED}
+    included = {part.removesuffix(".py") for part in import_module("eomgen.codegen.package").CONTENTS}
     for name, others in graph.items():
-        homes = {other.split(".")[1] for other in others if "." in other} - carried
-        if f"{name}.".split(".")[1] in carried and (homes := homes - BEYOND.get(name.removeprefix("eomgen."), set())):
+        homes = {other.split(".")[1] for other in others if "." in other} - included
+        if f"{name}.".split(".")[1] in included and (homes := homes - BEYOND.get(name.removeprefix("eomgen."), set())):
             yield f"{name} imports {', '.join(sorted(homes))}, which packages do not carry"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE
 from ..base.results import Result, same_keys
+from ..base.scales import largest
 from ..base.texts import number
 from ..errors import AssemblyError, PartitionError, ill_placed, ill_shaped
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
@@ -247,8 +248,8 @@ def equilibrium(
         )
     point, steps = find_balance(search, q)
     if module.layout.n_h:
-        whole = guess is not None and not isinstance(guess, Mapping)
-        point = reached(search, point, q, None if whole else [*(guess or {}), *wanted])
+        named = [*(guess or {}), *wanted] if guess is None or isinstance(guess, Mapping) else None
+        point = reached(search, point, q, named)
     return describe(search, point, steps)
 
 
@@ -265,10 +266,13 @@ def reached(search: Search, point: SearchPoint, start: Array, named: Sequence[st
     values = {
         name: value for name, value in read_coordinates(point.module, q, search.t).items() if name in (named or ())
     }
-    motions = [(initial.reference, values or free)] * (named is not None) + [(lambda: start, free)]
+    motions: list[tuple[Callable[[], Array], dict[str, float]]] = [(lambda: start, free)]
+    if named is not None:
+        motions.insert(0, (initial.reference, values or free))
     for begin, ends in motions:
         with suppress(AssemblyError, PartitionError):
-            if np.abs(q - (here := begin()))[angles].max(initial=0.0) < np.pi:
+            here = begin()
+            if largest((q - here)[angles]) < np.pi:
                 return point
             there = initial.follow(here, ends)
             if not initial.apart(there, q):

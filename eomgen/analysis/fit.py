@@ -81,9 +81,9 @@ class Fit(Result):
         with np.errstate(invalid="ignore"):
             spread = np.sqrt(np.diag(self.covariance))
             self.correlation = self.covariance / np.outer(spread, spread)
-        note = {name for direction in self.undetermined for name in direction}
+        free = {name for direction in self.undetermined for name in direction}
         self.errors = {
-            name: float("inf") if name in note else float(error) for name, error in zip(self.names, spread, strict=True)
+            name: float("inf") if name in free else float(error) for name, error in zip(self.names, spread, strict=True)
         }
 
     def _certainty(self, active: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Array, list[dict[str, float]]]:
@@ -283,7 +283,7 @@ def fit(
     values: Array = problem.start
     result: Any = None
     problem.sigma = known or {name: problem.spread(name) for name in columns}
-    problem.residuals(values, note=True)
+    problem.residuals(values, warn=True)
     for _ in range(1 if known else ROUNDS):
         if result is not None:
             problem.sigma = {name: problem.noise(values, name) for name in columns}
@@ -374,7 +374,7 @@ class _Problem:
         with silent():
             return simulate(self.module, **self.arguments(values, one))
 
-    def residuals(self, values: Array, note: bool = False) -> Array:
+    def residuals(self, values: Array, warn: bool = False) -> Array:
         """(run - data) / sigma where something was measured; infinite where there is no run, unless that is told."""
         parts = []
         for one in self.experiments:
@@ -382,13 +382,13 @@ class _Problem:
                 run = self.run(values, one)
                 complete = len(run.t) == len(one.t)
             except (SimulationError, ParameterError):
-                if note:
+                if warn:
                     raise
                 complete = False
             for name, measured in one.columns.items():
                 there = np.isfinite(measured)
                 if not complete:
-                    if note:
+                    if warn:
                         raise SimulationError("the run ends at an event before the last measured time", code="EG-EVENT")
                     parts.append(np.full(int(there.sum()), np.inf))
                 else:

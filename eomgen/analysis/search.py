@@ -525,8 +525,8 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     residual find.
     """
     start = search.start(q)
-    first, steps, result = newton(search, start, reach=REACH)
-    if result:
+    first, steps, balanced = newton(search, start, reach=REACH)
+    if balanced:
         return first, steps
     ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
         lambda: newton(search, start),
@@ -537,13 +537,13 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
         ways.insert(0, lambda: creep(search, start))
     ends = [start, first]
     for way in ways:
-        point, more, result = way()
+        point, more, balanced = way()
         ends.append(point)
         steps += more
-        if not result:
-            point, more, result = newton(search, point)
+        if not balanced:
+            point, more, balanced = newton(search, point)
             steps += more
-        if result:
+        if balanced:
             return point, steps
     raise _failure(search, min(ends, key=lambda end: float(np.abs(search.residual(end.here, end.here)).max())))
 

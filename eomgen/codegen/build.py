@@ -216,7 +216,7 @@ def _spell(value: Any, known: Known) -> Any:
         if id(value) not in known:
             # what is worked out once and kept is no part of it
             fields = getattr(kind, "__dataclass_fields__", vars(value))
-            told = [_spell(getattr(value, name), known) for name in fields if name != "place"]
-            known[id(value)] = value, hashlib.sha256(repr((list(fields), told)).encode()).hexdigest()
+            spelled = [_spell(getattr(value, name), known) for name in fields if name != "place"]
+            known[id(value)] = value, hashlib.sha256(repr((list(fields), spelled)).encode()).hexdigest()
         return [kind.__qualname__, known[id(value)][1]]
     raise TypeError(f"{kind.__name__} has no text")

@@ -272,7 +272,7 @@ def _literals(text: str) -> list[list[str]]:
     Octal escapes have three digits, so that none of them takes a digit of the text.
     """
     pieces = (text[k : k + LITERAL] for k in range(0, len(text), LITERAL))
-    return [list(_lines(UNSAFE.sub(lambda found: f"\\{ord(found[0]):03o}", piece))) for piece in pieces]
+    return [list(_lines(UNSAFE.sub(lambda result: f"\\{ord(result[0]):03o}", piece))) for piece in pieces]
 
 
 def _lines(escaped: str) -> Iterator[str]:

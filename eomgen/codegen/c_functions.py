@@ -22,14 +22,14 @@ Calls = dict[str, tuple[Function, list[Orders]]]  # by name of the function, its
 def used_calls(program: Program) -> Calls:
     """The functions that a program calls, with the orders of derivatives that it needs, by name."""
     graph, operations = program.graph, program.called
-    found: Calls = {}
+    result: Calls = {}
     pairs = {call.function.name: call.function for op in operations if (call := pair_call(graph, op)) is not None}
     called = [graph.calls[op] for op in operations if pair_call(graph, op) is None]
     inner = {op: call for f in pairs.values() for kind in f.kinds for op, call in kind.calls}
     called += [call for op, call in inner.items() if op not in operations]
     for function, orders in sorted(called, key=lambda call: (call[0].name, call[1])):
-        found.setdefault(function.name, (function, []))[1].append(orders)
-    return found
+        result.setdefault(function.name, (function, []))[1].append(orders)
+    return result
 
 
 def c_name(program: str, function: str, orders: Sequence[int]) -> str:
@@ -72,11 +72,11 @@ def declarations(program: Program, calls: Calls) -> list[str]:
 
 def plain_declarations(program: str, called: Iterable[tuple[Function, Orders]]) -> list[str]:
     """Declarations of calls for a file that computes with doubles alone, by the names that blocks have for them."""
-    found = []
+    result = []
     for f, orders in called:
         name, each = c_name(program, f.name, orders), each_name(f.name, orders)
-        found.append(f"EOMGEN_PIECE {_head(name, f.arity)};\n#define {each} {name}")
-    return found
+        result.append(f"EOMGEN_PIECE {_head(name, f.arity)};\n#define {each} {name}")
+    return result
 
 
 def function_files(program: Program, calls: Calls) -> dict[str, str]:

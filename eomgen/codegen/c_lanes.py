@@ -62,8 +62,8 @@ def lane_blocks(program: Program) -> dict[str, Block]:
     """The blocks that have lanes, by name; those of the right-hand side first."""
     first = rhs_blocks(program)
     named = public_blocks(program).union(first)
-    found = [b for b in program.blocks if b.name in named]
-    return {b.name: b for b in sorted(found, key=lambda b: b.name not in first)}
+    result = [b for b in program.blocks if b.name in named]
+    return {b.name: b for b in sorted(result, key=lambda b: b.name not in first)}
 
 
 def lane_kernels(program: Program) -> list[str]:
@@ -170,7 +170,7 @@ class _SeriesPrinter:
         users: dict[int, set[int]] = {}
         for _, i in self._places:
             users.setdefault(self._multiple(i)[0], set()).add(i)
-        self._shared = {base for base, found in users.items() if len(found) > 1}
+        self._shared = {base for base, result in users.items() if len(result) > 1}
         for made in (self._places, self._pairs, self.kept):
             made.clear()
         self._lines = {i: self._rule(i, self._terms[i]) for i in needed}
@@ -194,7 +194,7 @@ class _SeriesPrinter:
 
     def _multiple(self, i: int, among: Container[int] | None = None) -> tuple[int, _Factor]:
         """The term of which a term is a multiple but for order 0, the furthest or one of these, and the factor."""
-        found, factor = (i, _Factor()), _Factor()
+        result, factor = (i, _Factor()), _Factor()
         while True:
             term = self._terms[i]
             kind, (p, q) = term.kind, (*term.operands, -1, -1)[:2]
@@ -207,12 +207,12 @@ class _SeriesPrinter:
                     number = self._terms[still].kind == "number"
                     by = _Factor(self._terms[still].value) if number else _Factor(1.0, (self._zero(still),))
             else:
-                return found
+                return result
             factor = factor * by
             if not 0.0 < abs(factor.number) < inf:
-                return found
+                return result
             if among is None or i in among:
-                found = i, factor
+                result = i, factor
 
     def _scaled(self, name: str, factor: _Factor) -> str:
         """A sum times what stays the same."""
@@ -272,8 +272,8 @@ class _SeriesPrinter:
             return f"{self._zero(q)}*b{p}" if self._changes(p) else f"{self._zero(p)}*b{q}"
         if p == q:
             return f"{self._sum(p, p)} + 2.0*{self._zero(p)}*b{p}"
-        early, late = (p, q) if self._depth[p] <= self._depth[q] else (q, p)
-        return f"{self._sum(p, q)} + {self._zero(late)}*b{early} + {self._zero(early)}*b{late}"
+        early, later = (p, q) if self._depth[p] <= self._depth[q] else (q, p)
+        return f"{self._sum(p, q)} + {self._zero(later)}*b{early} + {self._zero(early)}*b{later}"
 
     _absorb = _mul
 
@@ -284,8 +284,8 @@ class _SeriesPrinter:
         rest, last = self._sum(i, q), f"a{i}*b{q}"
         if not self._changes(p):
             return f"-({rest} + {last})*{inverse}"
-        late = self._depth[q] > self._depth[p]
-        return f"(b{p} - {rest} - {last})*{inverse}" if late else f"(b{p} - ({rest} + {last}))*{inverse}"
+        later = self._depth[q] > self._depth[p]
+        return f"(b{p} - {rest} - {last})*{inverse}" if later else f"(b{p} - ({rest} + {last}))*{inverse}"
 
     def _sqrt(self, i: int, term: Term, p: int) -> str:
         return f"absorbing(b{p} - {self._sum(i, i)}, 0.5*{self._reciprocal(i)})"  # 0 where what is under it stays 0

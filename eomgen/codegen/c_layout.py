@@ -127,11 +127,11 @@ def places_again(program: Program, block: Block) -> dict[str, str]:
         return {}
     lengths = dict(_areas_of_bodies(program))
     count = lengths["COEFFICIENTS"] + lengths["TURNING"]
-    found, at = {}, count + len(again)
+    result, at = {}, count + len(again)
     for k, function in enumerate(one.function for one in again):
-        found[function.name] = f"w + (x - w) + {count + k}, w + (x - w) + {at}"
+        result[function.name] = f"w + (x - w) + {count + k}, w + (x - w) + {at}"
         at += kept_of(function)
-    return found
+    return result
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:

@@ -47,22 +47,22 @@ class RowRun(NamedTuple):
 def runs_of(table: Sequence[Sequence[int]]) -> list[RowRun]:
     """A table as runs, which give its rows one after the other."""
     rows = [tuple(row) for row in table]
-    found: list[RowRun] = []
+    result: list[RowRun] = []
     single: list[Row] = []  # rows that fit no run
     at = 0
     while at < len(rows):
         period, times = _longest(rows, at)
         if times * period > 2 * period:  # a run holds each row of its period twice
             if single:
-                found.append(RowRun(single, (), 1))
+                result.append(RowRun(single, (), 1))
                 single = []
             steps = [_step(rows[at + k], rows[at + period + k]) for k in range(period)]
-            found.append(RowRun(rows[at : at + period], steps, times))
+            result.append(RowRun(rows[at : at + period], steps, times))
             at += period * times
         else:
             single.append(rows[at])
             at += 1
-    return [*found, RowRun(single, (), 1)] if single else found
+    return [*result, RowRun(single, (), 1)] if single else result
 
 
 def _step(first: Row, second: Row) -> Row:
@@ -101,17 +101,17 @@ SINGLED = 8  #: bodies of which no result is read, up to which the text names th
 
 def _tables(function: PairFunction) -> list[dict[str, Any]]:
     """The tables of shapes, and where the shapes stand in the work array; places count from behind the bodies."""
-    found: list[dict[str, Any]] = []
+    result: list[dict[str, Any]] = []
     start = number = 0
     begun = POSE * function.bodies
     for k, rows in enumerate(function.tables):
         table = written([(row[0], *(x - begun if x >= 0 else x for x in row[1:])) for row in rows])
         sizes, length = len(rows[0]) - PLACE - REST, placed_length(rows)
         own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length, "lined": False}
-        found.append({**table, **own, "start": start, "number": number})
+        result.append({**table, **own, "start": start, "number": number})
         number += len(rows)
         start += len(rows) * length
-    return found
+    return result
 
 
 def pair_files(program: Program) -> dict[str, str]:

@@ -26,26 +26,26 @@ ALIKE = 2
 def print_rolled(program: Program, block: Block) -> Printed | None:
     """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
     name, texts = f"{block.name}_block", references(program, block)
-    found = find_segments(program, block, {i: _place(text) for i, text in texts.items()})
-    if ALIKE * found.written > found.carried_out:
+    result = find_segments(program, block, {i: _place(text) for i, text in texts.items()})
+    if ALIKE * result.written > result.performed:
         return None
-    found.lists.again = places_again(program, block)
-    recurrences = _find_recurrences(found)
+    result.lists.again = places_again(program, block)
+    recurrences = _find_recurrences(result)
     printed = [
-        _print_kind(program, found, kind, along, f"{name}_{n}")
-        for n, (kind, along) in enumerate(zip(found.kinds, recurrences, strict=True))
+        _print_kind(program, result, kind, along, f"{name}_{n}")
+        for n, (kind, along) in enumerate(zip(result.kinds, recurrences, strict=True))
     ]
-    made = {i for k in found.kinds for segment in k.members for i in segment}
+    made = {i for k in result.kinds for segment in k.members for i in segment}
     direct = tuple((k, y.id) for k, y in enumerate(block.outputs) if y.id not in made)
     bare = tuple(sorted({y.id for y in block.checks} - made))
     pieces = Pieces((), direct, bare, 0)
     printer = BlockPrinter(program, texts, pieces)
     main = direct_results(printer, pieces)
     main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
-    angles, first = _print_angles(found, name)
-    runs, calls = _print_runs(found.runs, name, len(found.kinds))
+    angles, first = _print_angles(result, name)
+    runs, calls = _print_runs(result.runs, name, len(result.kinds))
     text = function_text(f"static flag {name}", [*main, *first, *calls])
-    return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
+    return Printed("\n".join([*printed, angles + runs + text]), (), result.work)
 
 
 class PlaceTable:
@@ -82,11 +82,11 @@ def _place(text: str) -> Place:
     return (text, 0) if text == "t" else (text[0], int(text[2:-1]))
 
 
-def _print_list(found: Segments, i: int, name: str) -> str:
+def _print_list(result: Segments, i: int, name: str) -> str:
     """A function that makes a list of a sum over pairs."""
     by_array: dict[str, list[tuple[int, float]]] = {}
-    for place, operand in found.lists.fills(i):
-        array, at = found.places[operand]
+    for place, operand in result.lists.fills(i):
+        array, at = result.places[operand]
         by_array.setdefault(array, []).append((place, at))
     tables, filled = "", []
     for array, pairs in by_array.items():
@@ -101,7 +101,7 @@ def _print_list(found: Segments, i: int, name: str) -> str:
             )
             value = form.format(f"{source}[i]")
         filled.append(f"for (int i = 0; i < {len(pairs)}; i++) {{ w[{to}[i]] = {value}; }}")
-    lines = "\n".join(f"    {line}" for line in ("(void)first; (void)last;", *found.lists.lines(i, filled)))
+    lines = "\n".join(f"    {line}" for line in ("(void)first; (void)last;", *result.lists.lines(i, filled)))
     head = f"static EOMGEN_APART flag {name}(EOMGEN_ARGUMENTS, int first, int last)"
     return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
 
@@ -117,15 +117,15 @@ class Recurrence(NamedTuple):
     unread: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
 
 
-def _find_recurrences(found: Segments) -> list[Recurrence]:
+def _find_recurrences(collected: Segments) -> list[Recurrence]:
     """Of every kind; kinds that read much of it are left as they are, since registers are few."""
     result = []
     read: set[int] = set()
-    for kind in found.kinds:
+    for kind in collected.kinds:
         stride, n = len(kind.exports), len(kind.members)
         reads, first = {}, {}
         for column in zip(*kind.reads, strict=True):
-            places = [int(at) if array == "w" else -1 for array, at in (found.places[j] for j in column)]
+            places = [int(at) if array == "w" else -1 for array, at in (collected.places[j] for j in column)]
             e = places[1] - kind.start if n > 1 else -1
             follows = 0 <= e < stride and all(at == kind.start + m * stride + e for m, at in enumerate(places[1:]))
             if follows and e not in first and n > FEW:
@@ -140,21 +140,21 @@ def _find_recurrences(found: Segments) -> list[Recurrence]:
     return [
         Recurrence(reads, first, frozenset(e for e in first if read.isdisjoint(
             range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
-        for kind, (reads, first) in zip(found.kinds, result, strict=True)
+        for kind, (reads, first) in zip(collected.kinds, result, strict=True)
     ]  # fmt: skip
 
 
-def _print_kind(program: Program, found: Segments, kind: SegmentKind, recurrence: Recurrence, name: str) -> str:
+def _print_kind(program: Program, result: Segments, kind: SegmentKind, recurrence: Recurrence, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
-    if found.lists.is_list(kind.members[0][0]):
-        return _print_list(found, kind.members[0][0], name)
+    if result.lists.is_list(kind.members[0][0]):
+        return _print_list(result, kind.members[0][0], name)
     n = len(kind.members)
     table = PlaceTable("i", n)
     numbers: dict[tuple[float, ...], int] = {}
     fixed, loads = {}, {}
     for column in zip(*kind.reads, strict=True):
         i = column[0]
-        where = [found.places[j] for j in column]
+        where = [result.places[j] for j in column]
         array = where[0][0]
         if array == "const":
             values = tuple(value for _, value in where)
@@ -174,15 +174,17 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, recurrence
         if e not in recurrence.unread
     }
     results = {
-        i: tuple(table.text([found.results[one[k]][at] for one in kind.members]) for at in range(len(found.results[i])))
+        i: tuple(
+            table.text([result.results[one[k]][at] for one in kind.members]) for at in range(len(result.results[i]))
+        )
         for k, i in enumerate(statements)
-        if i in found.results
+        if i in result.results
     }
     kept = {*(statements[index] for index in kind.exports), *results}
-    checks = found.checks.intersection(statements)
+    checks = result.checks.intersection(statements)
     inlined = conditions(program.graph, statements, kept, checks)
     printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
-    printer.lists = found.lists
+    printer.lists = result.lists
     printer.named = frozenset(statements[kind.exports[e]] for e in recurrence.first)
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
     lines += [f"r{e} = {printer.real(statements[kind.exports[e]])};" for e in recurrence.first]
@@ -220,12 +222,12 @@ def _rows(rows: Sequence[Sequence[float]]) -> str:
     return ",\n".join("    { " + ", ".join(repr(x) for x in row) + " }" for row in rows)
 
 
-def _print_angles(found: Segments, name: str) -> tuple[str, list[str]]:
+def _print_angles(result: Segments, name: str) -> tuple[str, list[str]]:
     """Sines and cosines of all symbols that are angles: a table of their places, if it needs one, and statements."""
-    n = len(found.angles)
+    n = len(result.angles)
     if not n:
         return "", []
-    at = [int(found.places[a][1]) for a in found.angles]
+    at = [int(result.places[a][1]) for a in result.angles]
     apart, table = f"{at[0]} + ", ""
     closing = ""
     if at != list(range(at[0], at[0] + n)):
@@ -253,14 +255,14 @@ def _print_runs(runs: Sequence[tuple[int, int]], name: str, kinds: int) -> tuple
         return "", lines
     flat = [number for run in runs for number in run]
     table = f"EOMGEN_SHARED const int {name}_runs[{len(flat)}] = {{\n{_lines(flat)}\n}};\n"
-    cases = [f"    case {k}: EOMGEN_REJECT({name}_{k}(t, x, u, c, out, w, first, last)) break;" for k in range(kinds)]
+    labels = [f"    case {k}: EOMGEN_REJECT({name}_{k}(t, x, u, c, out, w, first, last)) break;" for k in range(kinds)]
     return table, [
         f"int done[{kinds}] = {{ 0 }};",
         f"for (int r = 0; r < {len(flat)}; r += 2) {{",
         f"    const int kind = {name}_runs[r], first = done[kind], last = first + {name}_runs[r + 1];",
         "    done[kind] = last;",
         "    switch (kind) {",
-        *cases,
+        *labels,
         "    }",
         "}",
     ]
@@ -284,10 +286,10 @@ class BranchPrinter(BlockPrinter):
         self._first = {b: a for a, b in pairs.second.items()}
         self._both: dict[Operand, str] = {}  #: vectors of this piece
         self._count = 0
-        self._alone: set[int] = set()  #: elements that have a variable of their own in this piece
+        self._single: set[int] = set()  #: elements that have a variable of their own in this piece
 
     def lines(self, piece: PrintedFunction) -> list[str]:
-        self._both, self._alone = {}, set()
+        self._both, self._single = {}, set()
         return super().lines(piece)
 
     def _new(self, key: Operand, text: str, result: list[str]) -> str:
@@ -320,8 +322,8 @@ class BranchPrinter(BlockPrinter):
         a = self._first.get(i, i)
         if a not in self._second:
             super()._read(i, piece, loaded, result)
-        elif i not in self._alone:
-            self._alone.add(i)
+        elif i not in self._single:
+            self._single.add(i)
             self._name_waiting(result)
             minus = "-" if i != a and self._sign[a] < 0 else ""
             if self._own(a) in self._both:

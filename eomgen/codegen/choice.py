@@ -86,13 +86,13 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
 
 def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
     """The recursive form with the mass matrix, forces and inverse dynamics of the other where these are shorter."""
-    found = copy(recursive)
-    found.take_mass_matrix(embedding)
+    result = copy(recursive)
+    result.take_mass_matrix(embedding)
     if count(list(embedding.bias)).total < count(list(recursive.bias)).total:
-        found.bias = embedding.bias
+        result.bias = embedding.bias
     if count(list(embedding.inverse_dynamics)).total < count(list(recursive.inverse_dynamics)).total:
-        found.inverse_dynamics = embedding.inverse_dynamics
-    return found
+        result.inverse_dynamics = embedding.inverse_dynamics
+    return result
 
 
 def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> bool:
@@ -104,8 +104,8 @@ def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> 
     known = (*kinematics.names, *kinematics.velocity_names, *numbers, "t")
     evaluate = Evaluator([bodies.is_sound], known)
     rest = [0.0] * len(kinematics.velocity_names)
-    found = [bool(evaluate([*sample, *rest, *numbers.values(), 0.0])[0] == 1.0) for sample in mobility.samples]
-    return found[0] and 2 * sum(found) > len(found)
+    result = [bool(evaluate([*sample, *rest, *numbers.values(), 0.0])[0] == 1.0) for sample in mobility.samples]
+    return result[0] and 2 * sum(result) > len(result)
 
 
 def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:

@@ -64,19 +64,19 @@ def contact_columns(terms: SystemTerms) -> ContactColumns | None:
         call = pair_call(graph, graph.nodes[i][0])
         if call is None or call.part != "sum" or not call.function.states:
             continue
-        function, given = call.function, graph.nodes[graph.nodes[i][1]][1:]
+        function, raw = call.function, graph.nodes[graph.nodes[i][1]][1:]
         start, first = POSE * function.bodies, function.first_state
         places = tuple(k for k in range(first) if k < start or function.data[k - start] is None)
-        sums.append(StatedSum(function, places, tuple(index.get(k, -1) for k in given[first:])))
-        operands += [Expr(graph, given[k]) for k in places]
+        sums.append(StatedSum(function, places, tuple(index.get(k, -1) for k in raw[first:])))
+        operands += [Expr(graph, raw[k]) for k in places]
     if len({one.function.name for one in sums}) < len(sums):
         return None
-    found = _dependences(graph, order, sums, index)
-    if found is None or any(found.get(y.id, frozenset()) - {LOADED} for y in residual[:begun]):
+    result = _dependences(graph, order, sums, index)
+    if result is None or any(result.get(y.id, frozenset()) - {LOADED} for y in residual[:begun]):
         return None
     rows: dict[int, list[int]] = {k: [] for one in sums for k in one.slots if k >= 0}
     for k in range(begun, n):
-        on = found.get(residual[k].id, frozenset())
+        on = result.get(residual[k].id, frozenset())
         if LOADED in on:
             return None
         for column in on:
@@ -96,7 +96,7 @@ def _dependences(
     """The states of pairs that nodes depend on but for what pairs exert on bodies; None where that is not known."""
     slots = {one.function.name: one.slots for one in sums}
     held = {k for one in sums for k in one.slots}
-    found: dict[int, frozenset[int]] = {i: frozenset([k]) for i, k in index.items() if k in held}
+    result: dict[int, frozenset[int]] = {i: frozenset([k]) for i, k in index.items() if k in held}
     for i in order:
         operation, *operands = graph.nodes[i]
         call = pair_call(graph, operation)
@@ -110,16 +110,16 @@ def _dependences(
             if number == WRENCH * function.bodies:
                 return None
             if number < WRENCH * function.bodies:
-                found[i] = frozenset([LOADED])
+                result[i] = frozenset([LOADED])
                 continue
             each = min(kind.states for kind in function.kinds)
             first = (number - WRENCH * function.bodies - 1) // each * each
-            found[i] = frozenset(slots[function.name][first : first + each]) - {-1}
+            result[i] = frozenset(slots[function.name][first : first + each]) - {-1}
         elif operation not in ("const", "sym"):
-            sets = {found[k] for k in operands if k in found}
+            sets = {result[k] for k in operands if k in result}
             if sets:
-                found[i] = next(iter(sets)) if len(sets) == 1 else frozenset().union(*sets)
-    return found
+                result[i] = next(iter(sets)) if len(sets) == 1 else frozenset().union(*sets)
+    return result
 
 
 def _groups(rows: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
@@ -156,5 +156,5 @@ def _along(
             mapping[Expr(graph, i)] = symbols[starts[call.function.name] + call.numbers[0]]
     along = jvp(substitute(residual, mapping), dict(zip(symbols, seeds, strict=True)))
     names = tuple(f"d(load[{k}])" for k in range(total))
-    alone = symbols_of(along).isdisjoint(f"load[{k}]" for k in range(total))
-    return names, tuple(along) if alone else None
+    independent = symbols_of(along).isdisjoint(f"load[{k}]" for k in range(total))
+    return names, tuple(along) if independent else None

@@ -131,7 +131,7 @@ def _followed(program: Program, q: list[float], v: Array, dependent: list[int]) 
     none = np.zeros(len(dependent))
     rows = [y for block in program.blocks if block.name == "velocity_constraints" for y in block.outputs]
     values = [program.metadata[key] for key in ("p_values", "u_values")]
-    if not rows or any(x is None for given in values for x in given):
+    if not rows or any(x is None for raw in values for x in raw):
         return none
     names = [*program.coordinates, *program.velocities, *program.parameters, *program.inputs, program.time]
     try:
@@ -143,10 +143,10 @@ def _followed(program: Program, q: list[float], v: Array, dependent: list[int]) 
         units = np.eye(len(v))[dependent]
         start = residual(np.zeros(len(v)))
         slopes = np.array([residual(unit) - start for unit in units]).T
-        found = algebra.lstsq(slopes, -start)
+        result = algebra.lstsq(slopes, -start)
     except (EomgenError, ArithmeticError, np.linalg.LinAlgError):
         return none
-    return found if np.isfinite(found).all() else none
+    return result if np.isfinite(result).all() else none
 
 
 def describe_layouts(program: Program) -> list[tuple[str, list[str]]]:
@@ -194,17 +194,17 @@ def _entries(
 USED = ("numpy", "sympy")
 
 
-def trace_provenance(program: Program, target: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+def trace_provenance(program: Program, target: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """Where a package comes from.
 
     ``model``, ``model_digest`` (SHA-256 of the mechanism, the same for all methods and targets), ``options`` of the
     generation that change the equations or the numbers (``method`` as it was chosen), ``versions``.
     """
     facts = program.metadata
-    found = {name: metadata.version(name) for name in USED}
+    result = {name: metadata.version(name) for name in USED}
     return {
         "model": program.name,
         "model_digest": facts.get("model_digest"),
-        "options": {"method": facts.get("method"), "target": target, **asked},
-        "versions": {"eomgen": facts.get("eomgen"), "python": platform.python_version(), **found},
+        "options": {"method": facts.get("method"), "target": target, **options},
+        "versions": {"eomgen": facts.get("eomgen"), "python": platform.python_version(), **result},
     }

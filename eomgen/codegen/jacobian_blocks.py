@@ -106,17 +106,17 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
     symbols = terms.symbols((*terms.q, *terms.v))
     if not _fits(terms, slopes.limits, len(symbols)):
         return None
-    found: list[tuple[Entries, Solved]] = []
+    result: list[tuple[Entries, Solved]] = []
     if slopes.forces is not None:
         solved = solve_tree(terms, slopes.forces.mass_matrix, slopes.forces.bias)
-        found.append((slopes.joined(slopes.forces, solved.accelerations), solved))
-    if (terms.accelerations is None or not found) and slopes.is_short(terms.inverse_dynamics):
+        result.append((slopes.joined(slopes.forces, solved.accelerations), solved))
+    if (terms.accelerations is None or not result) and slopes.is_short(terms.inverse_dynamics):
         solved = solve_tree(terms, terms.mass_matrix, terms.bias)
-        found.append((_at(terms, slopes.by_formula(), solved.accelerations), solved))
-    if not found:
+        result.append((_at(terms, slopes.by_formula(), solved.accelerations), solved))
+    if not result:
         return None
     rates = jacobian(list(terms.q_dot), symbols)
-    made = [(_rows(terms, rates, entries, solved, len(symbols)), solved.checks) for entries, solved in found]
+    made = [(_rows(terms, rates, entries, solved, len(symbols)), solved.checks) for entries, solved in result]
     rows, checks = min(made, key=lambda one: count([*one[0], *one[1]]).total)
     return (rows, checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
 
@@ -129,8 +129,8 @@ def unrolled_shift(
         return None
     symbols = terms.symbols(names)
     solved = solve_tree(terms, terms.mass_matrix, terms.bias)
-    found = jacobian(list(terms.inverse_dynamics), symbols)
-    rows = _rows(terms, {}, _at(terms, found, solved.accelerations), solved, len(names))
+    result = jacobian(list(terms.inverse_dynamics), symbols)
+    rows = _rows(terms, {}, _at(terms, result, solved.accelerations), solved, len(names))
     return (rows, solved.checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
 
 
@@ -255,7 +255,7 @@ class LoopSlopes:
         directions = {x.id for x in (*self.dq, *self.dv)}
         fixed: set[int] = set()
         turning: set[int] = set()
-        found: dict[int, None] = {}
+        result: dict[int, None] = {}
         both = [y.id for column in self._columns for y in column]
         for i in reachable(graph, both):
             kind, *args = graph.nodes[i]
@@ -267,11 +267,11 @@ class LoopSlopes:
                 if not turning.isdisjoint(args):
                     turning.add(i)
                     needed = [j for k in args if k not in turning for j in list_operands(graph, k)]
-                    found.update(dict.fromkeys(k for k in needed if k not in fixed))
+                    result.update(dict.fromkeys(k for k in needed if k not in fixed))
                 elif fixed.issuperset(args):
                     fixed.add(i)
-        found.update(dict.fromkeys(i for i in both if i not in turning and i not in fixed))
-        return [Expr(graph, i) for i in found]
+        result.update(dict.fromkeys(i for i in both if i not in turning and i not in fixed))
+        return [Expr(graph, i) for i in result]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -292,5 +292,5 @@ class LoopSlopes:
         mapping = dict(zip(self.coefficients, self.terms.symbols(self.names), strict=True))
         which = BY_BODIES.index(name) - 1
         changes = substitute(self._columns[which], mapping)
-        given = (Port("coefficients", self.names), ports[2 + which])
-        return Block(name, given, tuple(changes), (len(changes),), public=False)
+        raw = (Port("coefficients", self.names), ports[2 + which])
+        return Block(name, raw, tuple(changes), (len(changes),), public=False)

@@ -253,10 +253,10 @@ class BlockMaker:
 
     def public(self, name: str) -> Block | None:
         """The public kernel of this name if it is straight-line code for this system, else None."""
-        found = self._straight(name)
-        if found is None:
+        result = self._straight(name)
+        if result is None:
             return None
-        outputs, checks = found
+        outputs, checks = result
         kernel = NAMED[name]
         ports = tuple(map(self.port, kernel.inputs))
         return Block(name, ports, tuple(outputs), kernel.shape(self.terms.sizes), tuple(checks))
@@ -273,8 +273,8 @@ class BlockMaker:
         if name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             return [*terms.q_dot, *accelerations], checks
-        if (found := self._written_derivative(name)) is not None:
-            return found[0], [*self._turned, *found[1]]
+        if (result := self._written_derivative(name)) is not None:
+            return result[0], [*self._turned, *result[1]]
         if name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             return terms.outputs, ()
         if name == "outputs" and self.unrolled:
@@ -287,8 +287,8 @@ class BlockMaker:
         if self._touching and name not in SHIFTS:
             return None
         if name == "inverse_dynamics_derivatives":
-            found = self._inverse_slopes()
-            return None if found is None else (found, [])
+            result = self._inverse_slopes()
+            return None if result is None else (result, [])
         if not self.unrolled or name not in ("jacobian", *SHIFTS):
             return None
         if name == "jacobian":
@@ -300,24 +300,24 @@ class BlockMaker:
 
         By recursion over composite bodies, whose mass matrix comes along, or by differentiating the formula.
         """
-        terms, slopes, found = self.terms, self.slopes, list[Entries]()
+        terms, slopes, result = self.terms, self.slopes, list[Entries]()
         width = len(terms.q) + terms.n_v
         if slopes.forces is not None:
             mass = {(i, width + k): x for i, row in enumerate(slopes.forces.mass_matrix) for k, x in enumerate(row)}
-            found.append(slopes.by_recursion | mass)
+            result.append(slopes.by_recursion | mass)
         symbols = terms.symbols((*terms.q, *terms.v, *terms.a))
         nodes = len(reachable(terms.graph, (x.id for x in terms.inverse_dynamics)))
         if len(symbols) * nodes <= self.limits.jacobian_recursive:
-            found.append(jacobian(list(terms.inverse_dynamics), symbols))
-        if not found:
+            result.append(jacobian(list(terms.inverse_dynamics), symbols))
+        if not result:
             return None
-        entries = min(found, key=lambda one: count(list(one.values())).total)
+        entries = min(result, key=lambda one: count(list(one.values())).total)
         return [entries.get((i, k), terms.graph.zero) for i in range(terms.n_v) for k in range(width + terms.n_v)]
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
-        given = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
-        return (*self._behind(name), *(given if self.terms.general_rates else ()))
+        raw = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
+        return (*self._behind(name), *(raw if self.terms.general_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
         if name in ALONG:
@@ -410,12 +410,12 @@ class BlockMaker:
                 ports, results = self.contacts.block(name, terms)
                 return block(name, ports, results, self._turned if name == "contact_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
-                given = [self.port(port) for port in DAE]
-                y = [symbol for port in given for symbol in port.symbols]
+                raw = [self.port(port) for port in DAE]
+                y = [symbol for port in raw for symbol in port.symbols]
                 along = Port("directions", tuple(f"d({symbol})" for symbol in y))
                 seeds = dict(zip(terms.symbols(y), terms.symbols(along.symbols), strict=True))
                 results = jvp(_dae_residual(terms), seeds)
-                return Block(name, (*given, along), tuple(results), (len(results),), public=False)
+                return Block(name, (*raw, along), tuple(results), (len(results),), public=False)
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
                 seeds = self._seeds("q", "v", "a")
                 return block(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))

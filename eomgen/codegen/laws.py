@@ -22,7 +22,7 @@ _BENDS = {"abs", "sign", "max", "min", "select"} | _CONDITIONS  #: what has two 
 
 def pieces_of(law: Expr, speaks: Callable[[str], bool]) -> list[Expr] | None:
     """The smooth pieces of a law that depend on symbols of which one speaks; None where there are too many."""
-    found: dict[Expr, None] = {}
+    result: dict[Expr, None] = {}
     waiting: list[tuple[Expr, frozenset[int]]] = [(law, frozenset())]
     while waiting:
         x, decided = waiting.pop()
@@ -30,23 +30,23 @@ def pieces_of(law: Expr, speaks: Callable[[str], bool]) -> list[Expr] | None:
         choice = _next_choice(x, dependent, decided)
         if choice is not None:
             waiting += [(side, decided | {choice.id}) for side in _sides(x, choice, dependent)]
-        elif x.id in dependent and -x not in found:
-            found[x] = None
-        if len(found) + len(waiting) > MANY:
+        elif x.id in dependent and -x not in result:
+            result[x] = None
+        if len(result) + len(waiting) > MANY:
             return None
-    return list(found)
+    return list(result)
 
 
 def dependent_on(entries: Sequence[Expr], speaks: Callable[[str], bool]) -> set[int]:
     """Ids of all nodes that depend on such symbols."""
-    found: set[int] = set()
+    result: set[int] = set()
     for graph in {entry.graph for entry in entries}:
         for i in reachable(graph, [entry.id for entry in entries]):
             node = graph.nodes[i]
-            inner = speaks(node[1]) if node[0] == "sym" else node[0] != "const" and not found.isdisjoint(node[1:])
+            inner = speaks(node[1]) if node[0] == "sym" else node[0] != "const" and not result.isdisjoint(node[1:])
             if inner:
-                found.add(i)
-    return found
+                result.add(i)
+    return result
 
 
 def _next_choice(x: Expr, dependent: set[int], decided: frozenset[int]) -> Expr | None:
@@ -54,13 +54,13 @@ def _next_choice(x: Expr, dependent: set[int], decided: frozenset[int]) -> Expr 
     nodes = x.graph.nodes
 
     def open_in(roots: Sequence[int]) -> list[int]:
-        found = []
+        result = []
         for i in reachable(x.graph, roots):
             if i in dependent and i not in decided and nodes[i][0] in _BENDS:
                 by = nodes[i][1]
                 if nodes[i][0] != "select" or (by in dependent and by not in decided):
-                    found.append(i)
-        return found
+                    result.append(i)
+        return result
 
     every = open_in([x.id])
     if not every:
@@ -126,15 +126,15 @@ def grows_from_zero(A: Matrix, one: Expr) -> Expr:
 
 def _minor_sums(A: Matrix) -> list[Expr]:
     """Sums of the principal minors of each size from 1 on (D. K. Faddeev, V. N. Faddeeva (1963), sec. 47)."""
-    n, found = len(A), list[Expr]()
+    n, result = len(A), list[Expr]()
     power = [list(row) for row in A]
     for k in range(1, n + 1):
         e = total([power[i][i] for i in range(n)]) / float(k)
-        found.append(e)
+        result.append(e)
         if k < n:
             rest = [[(e if i == j else e * 0.0) - power[i][j] for j in range(n)] for i in range(n)]
             power = [[dot(row, column) for column in zip(*rest, strict=True)] for row in A]
-    return found
+    return result
 
 
 def _halves(part: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -181,16 +181,16 @@ STEPS = 7
 def laws_in(entries: Sequence[Expr], speaks: Callable[[str], bool]) -> list[Expr]:
     """The laws in the entries of one load: parts in which it is linear, or the entries where they are fewer."""
     dependent = dependent_on(entries, speaks)
-    found: dict[Expr, None] = {}
+    result: dict[Expr, None] = {}
     for entry in entries:
-        _parts(entry, dependent, found)
+        _parts(entry, dependent, result)
     spoken = [entry for entry in dict.fromkeys(entries) if entry.id in dependent]
-    if len(found) <= len(spoken) or any(pieces_of(entry, speaks) is None for entry in spoken):
-        return list(found)
-    return list(found) if all(_is_symbol(x) for x in found) else spoken
+    if len(result) <= len(spoken) or any(pieces_of(entry, speaks) is None for entry in spoken):
+        return list(result)
+    return list(result) if all(_is_symbol(x) for x in result) else spoken
 
 
-def _parts(x: Expr, dependent: set[int], found: dict[Expr, None]) -> None:
+def _parts(x: Expr, dependent: set[int], result: dict[Expr, None]) -> None:
     """Note the parts of an expression in which it is linear, with factors that do not depend on reactions."""
     waiting = [x.id]
     while waiting:
@@ -203,7 +203,7 @@ def _parts(x: Expr, dependent: set[int], found: dict[Expr, None]) -> None:
         elif operation == "div" and operands[1] not in dependent:
             waiting.append(operands[0])
         else:
-            found[Expr(x.graph, i)] = None
+            result[Expr(x.graph, i)] = None
 
 
 def _is_symbol(x: Expr) -> bool:
@@ -219,20 +219,20 @@ def solve_laws(
     """
     one = symbols[0].graph.one
     linear = [j for j, law in enumerate(laws) if _is_symbol(law)]
-    curved = [j for j in range(len(laws)) if j not in linear]
+    nonlinear = [j for j in range(len(laws)) if j not in linear]
     certain = one
     if linear:
         places = [symbols.index(laws[j]) for j in linear]
-        still, gain, certain = _eliminated(places, linear, curved, still, gain)
+        still, gain, certain = _eliminated(places, linear, nonlinear, still, gain)
     else:
         gain = [list(row) for row in gain]
-    if not curved:
+    if not nonlinear:
         return [_if(certain, N) for N in still] if linear else list(still), {}
-    return _newton([laws[j] for j in curved], symbols, still, gain, certain)
+    return _newton([laws[j] for j in nonlinear], symbols, still, gain, certain)
 
 
 def _eliminated(
-    places: Sequence[int], linear: Sequence[int], curved: Sequence[int], still: Sequence[Expr], gain: Matrix
+    places: Sequence[int], linear: Sequence[int], nonlinear: Sequence[int], still: Sequence[Expr], gain: Matrix
 ) -> tuple[list[Expr], Matrix, Expr]:
     """N0 and K of the other laws, those that are N[places] being solved for; and 1 where these are certain."""
     one = still[0].graph.one
@@ -243,7 +243,7 @@ def _eliminated(
     )
     parts = [[row[j] for j in linear] for row in gain]
     base = [combined(N, part, rest) for N, part in zip(still, parts, strict=True)]
-    rows = [[combined(row[m], part, by[m]) for m in curved] for row, part in zip(gain, parts, strict=True)]
+    rows = [[combined(row[m], part, by[m]) for m in nonlinear] for row, part in zip(gain, parts, strict=True)]
     return base, rows, certain
 
 
@@ -271,8 +271,8 @@ def _newton(
     apart = total([graph.apply("abs", g - f) for g, f in zip(values[:n], force, strict=True)])
     size = total([graph.apply("abs", g) for g in values[:n]])
     certain = certain * graph.apply("le", apart, size * SYSTEMS_FIXED)
-    found = {law: _if(certain, g) for law, g in zip(laws, values[:n], strict=True)}
-    return _at(still, gain, [_if(certain, f) for f in force]), found
+    result = {law: _if(certain, g) for law, g in zip(laws, values[:n], strict=True)}
+    return _at(still, gain, [_if(certain, f) for f in force]), result
 
 
 def _if(certain: Expr, x: Expr) -> Expr:

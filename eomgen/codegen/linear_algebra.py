@@ -67,15 +67,15 @@ def quadratic_form(columns: Sequence[Row], N: Sequence[Row], legs: Sequence[Leg]
     apart = set().union(*(leg[0] for leg in legs))
     rest = [{k: x for k, x in column.items() if k not in apart} for column in columns]
     across = [{k: x for k, row in enumerate(N) if (x := dot(row, column)) is not None} for column in rest]
-    found: list[Row] = [{} for _ in columns]
+    result: list[Row] = [{} for _ in columns]
     for i, column in enumerate(rest):
         for k, other in enumerate(across[: i + 1]):
             if (entry := dot(column, other)) is not None:
-                found[i][k] = found[k][i] = entry
+                result[i][k] = result[k][i] = entry
     for _, K, C in legs:
-        for row, more in zip(found, quadratic_form(C, quadratic_form(K, N)), strict=True):
+        for row, more in zip(result, quadratic_form(C, quadratic_form(K, N)), strict=True):
             row |= {k: row[k] + x if k in row else x for k, x in more.items()}
-    return found
+    return result
 
 
 def gram(rows: Sequence[Mapping[int, Expr]]) -> list[Row]:
@@ -199,7 +199,7 @@ def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
     for i, row in held.items():
         for k in row:
             touching[k].add(i)
-    found, waiting, new = [], set(range(n)), len(held)
+    result, waiting, new = [], set(range(n)), len(held)
 
     known: dict[int, tuple[set[int], set[int]]] = {}  #: column -> columns of the same rows, and the others of these
 
@@ -218,7 +218,7 @@ def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
             return None
         left = tuple(range(new, new + len(rows) - len(columns)))
         new += len(left)
-        found.append(Front(tuple(sorted(rows)), tuple(sorted(columns)), tuple(sorted(others)), left))
+        result.append(Front(tuple(sorted(rows)), tuple(sorted(columns)), tuple(sorted(others)), left))
         for k in others:
             touching[k] = (touching[k] - rows) | set(left)
         for j in others.union(*(held[i] for k in others for i in touching[k] if i in held)):
@@ -227,7 +227,7 @@ def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
             del held[i]
         held |= {i: set(others) for i in left}
         waiting -= columns
-    return found
+    return result
 
 
 def work(order: Sequence[Front], right: int) -> int:
@@ -310,27 +310,27 @@ def _longest(order: Sequence[Front]) -> int:
 
 def connected(rows: Sequence[Row]) -> list[set[int]]:
     """The sets of columns that rows connect."""
-    found: list[set[int]] = []
+    result: list[set[int]] = []
     for row in rows:
-        touched = [part for part in found if not part.isdisjoint(row)]
-        found = [part for part in found if part.isdisjoint(row)]
-        found += [set(row).union(*touched)] if row else []
-    return found
+        touched = [part for part in result if not part.isdisjoint(row)]
+        result = [part for part in result if part.isdisjoint(row)]
+        result += [set(row).union(*touched)] if row else []
+    return result
 
 
 def _product(a: Row, b: Row, zero: Expr) -> Expr:
-    found = dot(a, b)
-    return zero if found is None else found
+    result = dot(a, b)
+    return zero if result is None else result
 
 
 def _combined(part: Row, rows: Sequence[Row]) -> Row:
     """A combination of rows."""
-    found: Row = {}
+    result: Row = {}
     for i, factor in part.items():
         for k, x in rows[i].items():
             term = factor * x
-            found[k] = found[k] + term if k in found else term
-    return {k: x for k, x in found.items() if not x.is_zero}
+            result[k] = result[k] + term if k in result else term
+    return {k: x for k, x in result.items() if not x.is_zero}
 
 
 def _split(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list[Apart]]:

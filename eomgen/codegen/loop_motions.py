@@ -80,8 +80,8 @@ class MotionLoops(LoopBlocks):
     def _particular(self, right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
         """x (n,) with C_q x = right and no independent part, and what redundant rows leave of right."""
         x = [self.terms.graph.zero] * self.terms.n_v
-        found, left = self._factor.solve(right)
-        for k, value in zip(self.dependent, found, strict=True):
+        result, left = self._factor.solve(right)
+        for k, value in zip(self.dependent, result, strict=True):
             x[k] = value
         return x, left
 
@@ -101,7 +101,7 @@ class MotionLoops(LoopBlocks):
     @cached_property
     def _legs(self) -> list[Leg]:
         """The parts that fewer rows hold than freedoms drive."""
-        zero, one, found = self.terms.graph.zero, self.terms.graph.one, list[Leg]()
+        zero, one, result = self.terms.graph.zero, self.terms.graph.one, list[Leg]()
         for part in self._factor.parts:
             held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
             rows = [self.rows[i] for i in held]
@@ -109,8 +109,8 @@ class MotionLoops(LoopBlocks):
             if len(held) < sum(map(bool, C)):
                 units = [[one if j == i else zero for j in range(len(self._left))] for i in held]
                 K = rows_of([self._particular(unit)[0] for unit in units])
-                found.append(({self.dependent[k] for k in part}, K, C))
-        return found
+                result.append(({self.dependent[k] for k in part}, K, C))
+        return result
 
     @cached_property
     def _weighted(self) -> list[Row]:
@@ -141,11 +141,11 @@ class MotionLoops(LoopBlocks):
         parallel, or short beside others, nor so that they move many times as fast.
         """
         graph, s = self.terms.graph, self.s
-        found = self._across(LOST if self._in_a_row else CROSSINGS_NEAR_SQUARE)
+        result = self._across(LOST if self._in_a_row else CROSSINGS_NEAR_SQUARE)
         for j, k in enumerate(self.terms.preferred):
             square = self._products[j][j] * (s[k] * s[k])
-            found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
-        return found
+            result.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
+        return result
 
     def _across(self, limit: float) -> list[Expr]:
         """Whether every column has more than this part of its square across those before it."""
@@ -155,12 +155,12 @@ class MotionLoops(LoopBlocks):
         least: dict[int, Expr] = {}
         for part in self._factor.parts:
             least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * CROSSINGS_NEAR_SQUARE)
-        found = []
+        result = []
         for columns, ordinary, apart in self._factor.apart:
             for k in columns:
                 ordinary, apart = ordinary * graph.apply("max", lengths[k], least[k]), apart * scales[k]
-            found.append(graph.apply("lt", ordinary * limit, apart))
-        return found
+            result.append(graph.apply("lt", ordinary * limit, apart))
+        return result
 
     # -- blocks ---------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
@@ -176,18 +176,18 @@ class MotionLoops(LoopBlocks):
 
     def _moved(self, conditions: list[Expr]) -> list[Expr]:
         v = self.terms.symbols(self.terms.v)
-        given, _ = self._particular([-x for x in self.scaled(self.terms.constraint_rate)])
+        raw, _ = self._particular([-x for x in self.scaled(self.terms.constraint_rate)])
         y = [v[k] for k in self.terms.preferred]
-        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
+        missed = [a - b - c for a, b, c in zip(v, raw, times(self._motions, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
-        return [a + b for a, b in zip(given, times(self._motions, y), strict=True)]
+        return [a + b for a, b in zip(raw, times(self._motions, y), strict=True)]
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms = self.terms
         here = substitute([*terms.bias, *terms.gamma], moved)
         gamma = self.scaled(here[terms.n_v :])
-        given, _ = self._particular([-x for x in gamma])
-        a, checks = embedded_accelerations(terms, self._motions, given, here[: terms.n_v], self._legs)
+        raw, _ = self._particular([-x for x in gamma])
+        a, checks = embedded_accelerations(terms, self._motions, raw, here[: terms.n_v], self._legs)
         conditions += self._follows()
         if self._in_a_row:  # else columns tell already that no change point is near
             columns = self.all_of(self._across(CROSSINGS_NEAR_SQUARE))
@@ -212,5 +212,5 @@ def motion_loops(loops: LoopBlocks | None, longest: int) -> MotionLoops | None:
     shorter = MotionLoops(loops.terms)
     if not shorter.possible or shorter.estimate > LONGER * longest:
         return None
-    found, ordinary = (one.operations + count(one.closing()).total for one in (shorter, loops))
-    return shorter if found < SAVED * ordinary else None
+    result, ordinary = (one.operations + count(one.closing()).total for one in (shorter, loops))
+    return shorter if result < SAVED * ordinary else None

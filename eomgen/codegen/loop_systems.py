@@ -57,17 +57,17 @@ def total_magnitude(values: Sequence[Expr]) -> Expr:
 
 def summands(x: Expr) -> list[Expr]:
     """The terms of a sum of sums, each once."""
-    found: list[Expr] = []
+    result: list[Expr] = []
     waiting, seen = [x], {x}
     while waiting:
         y = waiting.pop()
         operation, *ids = y.node
         operands = [] if operation not in ("add", "sub", "neg") else [Expr(x.graph, i) for i in ids]
         if not operands:
-            found.append(y)
+            result.append(y)
         waiting += [y for y in operands if y not in seen]
         seen.update(operands)
-    return found
+    return result
 
 
 def estimate(jacobian: Sequence[Sequence[Expr]], n_dof: int) -> int:
@@ -276,7 +276,7 @@ class LoopBlocks(ABC):
         for square, group in zip(self.row_squares, self.groups, strict=True):
             members.setdefault(group, []).append(square)
         unit = graph.constant(1.0) / (self.unit * self.unit)
-        found = {}
+        result = {}
         for group, own in members.items():
             if group == ALL:
                 size = largest(self.row_squares)
@@ -286,8 +286,8 @@ class LoopBlocks(ABC):
                     if group == UNIT
                     else graph.apply("max", largest(own), unit * (CROSSINGS_SMALL * CROSSINGS_SMALL))
                 )
-            found[group] = size * CROSSINGS_NEAR_SQUARE
-        return found
+            result[group] = size * CROSSINGS_NEAR_SQUARE
+        return result
 
     def long_rows(self, part: float = 1.0) -> Expr:
         """Whether as many rows as their rank are not short beside their group, or shorter by a part of that square.
@@ -396,11 +396,11 @@ class EmbeddedLoops(LoopBlocks):
         ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
         first: list[Expr] = []
-        found: list[list[Expr]] = [[] for _ in terms.preferred]
+        result: list[list[Expr]] = [[] for _ in terms.preferred]
         if dependent and (blocks is None or any(len(b.rows) > 2 for b in blocks)):
-            first, *found = self._least_squares(left, right, conditions)
+            first, *result = self._least_squares(left, right, conditions)
         elif blocks is not None:  # else rows that hold nothing: parameters alone decide whether they are closed
-            first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
+            first, *result = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
         x = [graph.zero] * terms.n_v
         for i, value in zip(dependent, first, strict=True):
             x[i] = value
@@ -408,7 +408,7 @@ class EmbeddedLoops(LoopBlocks):
         sizes: dict[Expr, list[Expr]] = {}  # by the most that is allowed
         for j, k in enumerate(terms.preferred):
             B[k][j] = graph.one
-            for i, value in zip(dependent, found[j], strict=True):
+            for i, value in zip(dependent, result[j], strict=True):
                 if not value.is_zero:
                     B[i][j] = value
                     sizes.setdefault(SPREAD * self.s[i] / self.s[k], []).append(graph.apply("abs", value))
@@ -454,12 +454,12 @@ class EmbeddedLoops(LoopBlocks):
             if not (pivot - E[i][i]).is_zero:
                 conditions.append(graph.apply("lt", E[i][i] * max(self.lost, ROUNDED), pivot))
                 self._angles[E[i][i], pivot] = None
-        found = []
+        result = []
         for b in right:
             x = factor.solve(times(columns, b))
             rest = [p - q for p, q in zip(b, times(rows, x), strict=True)]
-            found.append([p + q for p, q in zip(x, factor.solve(times(columns, rest)), strict=True)])
-        return found
+            result.append([p + q for p, q in zip(x, factor.solve(times(columns, rest)), strict=True)])
+        return result
 
 
 class BodyLoops(LoopBlocks):

@@ -55,9 +55,9 @@ def keep_rules(requirements: Sequence[Requirement], names: Sequence[str]) -> dic
     ranges: list[list[Any]] = []
     rules: list[list[Any]] = []
     for path, rule, numbers, data, local in requirements:
-        kind, *given = numbers[0].node
-        if rule == RANGE and kind == "sym" and given[0] in names:
-            ranges.append([names.index(given[0]), path, *data])
+        kind, *raw = numbers[0].node
+        if rule == RANGE and kind == "sym" and raw[0] in names:
+            ranges.append([names.index(raw[0]), path, *data])
             continue
         places = {name: ("p", k) for k, name in enumerate(names)} | {name: ("x", k) for k, name in enumerate(local)}
         used = sorted(names.index(name) for name in symbols_of(numbers) - {*local})
@@ -75,34 +75,34 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     model, which no tape can play, with the places of their parameters.
     """
     m = kinematics.mechanism
-    given = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
+    raw = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
     values = {p.name: p.value for p in m.parameters}
-    found: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in given}
-    if bad := [(key, name) for key, of in found.items() for name, x in of.items() if not isfinite(x)]:
+    result: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in raw}
+    if bad := [(key, name) for key, of in result.items() for name, x in of.items() if not isfinite(x)]:
         what = "is no number at the declared parameters"
         raise ModelError(
             [m.problem(f"{key.partition('_')[0]}.{name}", what, TO_BE_FINITE, "EG-NOT-FINITE") for key, name in bad]
         )
     places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
-    late = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in given.items()}
-    fixed = {n: x for terms in late.values() for n, x in terms.items() if not _is_of_operations(x)}
-    late = {key: {n: x for n, x in terms.items() if n not in fixed} for key, terms in late.items()}
+    unbound = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in raw.items()}
+    fixed = {n: x for terms in unbound.values() for n, x in terms.items() if not _is_of_operations(x)}
+    unbound = {key: {n: x for n, x in terms.items() if n not in fixed} for key, terms in unbound.items()}
     if fixed:
-        found["start_fixed"] = {n: sorted(places[name][1] for name in symbols_of([x])) for n, x in fixed.items()}
-    if not any(late.values()):
-        return found
+        result["start_fixed"] = {n: sorted(places[name][1] for name in symbols_of([x])) for n, x in fixed.items()}
+    if not any(unbound.values()):
+        return result
     known = [kinematics.graph.symbol(name) for name in places]
     slopes = [
         (name, k, slope)
-        for name, x in late["initial"].items()
+        for name, x in unbound["initial"].items()
         for k, slope in enumerate(gradient(x, known))
         if not slope.is_zero
     ]
     terms = {
-        key: [list(of), list(record_tape(list(of.values()), places.__getitem__))] for key, of in late.items() if of
+        key: [list(of), list(record_tape(list(of.values()), places.__getitem__))] for key, of in unbound.items() if of
     }
     tape = record_tape([slope for *_, slope in slopes], places.__getitem__)
-    return found | {"start_terms": terms, "start_slopes": [[[name, k] for name, k, _ in slopes], list(tape)]}
+    return result | {"start_terms": terms, "start_slopes": [[[name, k] for name, k, _ in slopes], list(tape)]}
 
 
 def _is_of_operations(x: Expr) -> bool:
@@ -155,7 +155,7 @@ def find_translations(kinematics: Kinematics) -> list[list[Any]]:
 
     Of each its name, the place here of the next of them towards the ground, or -1, the body, and the velocities.
     """
-    found: list[list[Any]] = []
+    result: list[list[Any]] = []
     outer = {GROUND: -1}  #: by body, the outermost of them so far
     labels = zip(kinematics.velocity_labels, kinematics.velocity_kinds, strict=True)
     lengths = {name: i for i, (name, kind) in enumerate(labels) if kind == "length"}
@@ -165,9 +165,9 @@ def find_translations(kinematics: Kinematics) -> list[list[Any]]:
         outer[branch.body] = outer[branch.parent]
         if slides:
             places = [lengths[name] for name in spec.coordinates if name in lengths]
-            outer[branch.body] = len(found)
-            found.append([spec.name, outer[branch.parent], branch.body, places])
-    return found
+            outer[branch.body] = len(result)
+            result.append([spec.name, outer[branch.parent], branch.body, places])
+    return result
 
 
 def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> dict[str, Any]:
@@ -282,20 +282,20 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
 
 def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
     """Inputs over time as tapes, by name, and their derivatives by t, x and p that do not vanish."""
-    given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
-    if not given:
+    raw = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
+    if not raw:
         return {}
     states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
     places = {name: ("x", k) for k, name in enumerate(states)}
     places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
     known = [kinematics.graph.symbol(name) for name in ("t", *states, *kinematics.parameter_names)]
-    found = dict(zip(given, resolved(list(given.values()), kinematics, equations), strict=True))
+    result = dict(zip(raw, resolved(list(raw.values()), kinematics, equations), strict=True))
     slopes: dict[str, Any] = {}
-    for name, x in found.items():
+    for name, x in result.items():
         kept = {k: slope for k, slope in enumerate(gradient(x, known)) if not slope.is_zero}
         slopes[name] = [list(kept), list(record_tape(list(kept.values()), places.__getitem__))]
     return {
-        "signals": {name: list(record_tape([x], places.__getitem__)) for name, x in found.items()},
+        "signals": {name: list(record_tape([x], places.__getitem__)) for name, x in result.items()},
         "signal_slopes": slopes,
     }
 
@@ -311,13 +311,13 @@ def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
     for name in kinematics.input_names:
         stem, order = split_rate(name)
         orders.setdefault(stem, []).append((name, order))
-    found: dict[str, list[tuple[str, int]]] = {}
+    result: dict[str, list[tuple[str, int]]] = {}
     for stem, of in orders.items():
         of.sort(key=lambda pair: pair[1])
         (first, lowest), rest = (of[0], of[1:]) if of[0][1] == 0 or stem in known else ((stem, 0), of)
         if rest:
-            found[first] = [(name, order - lowest) for name, order in rest]
-    return found
+            result[first] = [(name, order - lowest) for name, order in rest]
+    return result
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:
@@ -335,14 +335,14 @@ def _system(equations: TreeEquations) -> dict[str, Any] | None:
 
 def _euler_angles(kinematics: Kinematics) -> list[list[Any]]:
     """Tree joints in Euler angles: name, middle angle's place in q, and where it is singular: cos or sin = 0."""
-    found: list[list[Any]] = []
+    result: list[list[Any]] = []
     for branch in kinematics.topology.branches:
         spec = kinematics.mechanism.joints[branch.joint]
         sequence = getattr(spec.joint, "sequence", None)
         if sequence is not None and not spec.joint.quaternion_slots:
             vanishing = "sin" if sequence[0] == sequence[2] else "cos"
-            found.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
-    return found
+            result.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
+    return result
 
 
 def _longest_step(kinematics: Kinematics) -> dict[str, float]:

@@ -46,7 +46,7 @@ ANALYSES = ("sensitivities", "kinematic_analysis", "motion_range", "impact", "si
             "equilibrium", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces",
             "consistent")  # fmt: skip
 #: What packages in Python carry of eomgen, unchanged.
-CARRIED = ("errors.py", "module.py", "base", "runtime", "analysis")
+CONTENTS = ("errors.py", "module.py", "base", "runtime", "analysis")
 #: Of these the folders that not every package has, whole or not at all -> when: by its model, its target, --analyses.
 OPTIONAL: dict[str, Callable[[ModelInfo, str, bool], bool]] = {
     "analysis/": lambda info, target, analyses: analyses,
@@ -62,13 +62,13 @@ def emit_package(
     program: Program,
     target: str,
     precision: str = "double",
-    asked: Mapping[str, Any] | None = None,
+    options: Mapping[str, Any] | None = None,
     analyses: bool = False,
 ) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
     ``c``: sources, header, Makefile, README.md.  ``cython``: a Python package whose root is the folder itself, with
-    pyproject.toml; installs with pip, needs NumPy alone.  ``asked`` are further options of the generation, for the
+    pyproject.toml; installs with pip, needs NumPy alone.  ``options`` are further options of the generation, for the
     provenance.  Raises UsageError (an unknown target or precision, ``float`` for another target than ``c``, analyses
     for one that is not Python).
     """
@@ -79,7 +79,7 @@ def emit_package(
         raise no_choice(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
     if precision != "double" and not row.precisions:
         raise cannot(f"precision={precision!r} is for target c; packages of target {target} compute in double")
-    made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
+    made = {"target": target, "provenance": trace_provenance(program, target, options or {})}
     if row.module:
         made["printed"] = print_names(program.metadata)
     program = replace(program, metadata={**program.metadata, **made})
@@ -118,35 +118,35 @@ def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
     """What is generated in Python besides the core, and what is carried of eomgen."""
-    carried = carry(CARRIED, context["metadata"], context["analyses"])
+    included = include(CONTENTS, context["metadata"], context["analyses"])
     names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
-    own = context | {"folders": folders_of(carried), "compiled": True}
-    return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **carried}
+    own = context | {"folders": folders_of(included), "compiled": True}
+    return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **included}
 
 
-def carry(names: Iterable[str], metadata: Mapping[str, Any], analyses: bool = False) -> dict[str, str]:
+def include(names: Iterable[str], metadata: Mapping[str, Any], analyses: bool = False) -> dict[str, str]:
     """Files and whole folders of eomgen, as they are, by their place in a package; of :data:`OPTIONAL` what is used."""
     root, info = Path(__file__).parents[1], ModelInfo.of(metadata)
     left_out = tuple(folder for folder, used in OPTIONAL.items() if not used(info, metadata["target"], analyses))
     files = [
         file for name in names for file in ([root / name] if name.endswith(".py") else (root / name).rglob("*.py"))
     ]
-    carried = {file.relative_to(root).as_posix(): file for file in sorted(files)}
-    return {name: file.read_text(encoding="utf-8") for name, file in carried.items() if not name.startswith(left_out)}
+    included = {file.relative_to(root).as_posix(): file for file in sorted(files)}
+    return {name: file.read_text(encoding="utf-8") for name, file in included.items() if not name.startswith(left_out)}
 
 
-def folders_of(carried: Iterable[str]) -> list[str]:
+def folders_of(included: Iterable[str]) -> list[str]:
     """The packages within a package that its files lie in."""
-    return sorted({name.rpartition("/")[0].replace("/", ".") for name in carried if "/" in name})
+    return sorted({name.rpartition("/")[0].replace("/", ".") for name in included if "/" in name})
 
 
 def _forms(metadata: Mapping[str, Any]) -> tuple[str, ...]:
     """Other forms of the equations that the default module has."""
-    found = ["dae"]
+    collected = ["dae"]
     with suppress(UsageError):
         Layout(metadata).require_minimal_form()
-        found.insert(0, "minimal")
-    return (*found, *(["canonical"] if metadata.get("method") == "hamilton" else []))
+        collected.insert(0, "minimal")
+    return (*collected, *(["canonical"] if metadata.get("method") == "hamilton" else []))
 
 
 def _context(program: Program, analyses: bool) -> dict[str, Any]:

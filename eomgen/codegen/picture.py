@@ -48,7 +48,7 @@ class _Numbers:
         self.declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
         coordinates = [spec.joint.coordinates for spec in mechanism.joints]
         #: joints whose first coordinate is a length
-        self.sliding = {k for k, found in enumerate(coordinates) if found and found[0].kind == "length"}
+        self.sliding = {k for k, result in enumerate(coordinates) if result and result[0].kind == "length"}
         self.kept: list[Expr] = []
 
     def number(self, x: Expr) -> Any:
@@ -123,10 +123,10 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     switched = [s.constraint for s in mechanism.switched if s.constraint is not None]
     things += [(c.name, c.drawn(), {}) for c in (*mechanism.constraints, *switched)]
     elements = [
-        {"name": name, **found, **(push if len(found.get("stops", ())) > 1 else {})}
+        {"name": name, **result, **(push if len(result.get("stops", ())) > 1 else {})}
         for name, every, push in things
         for seen in every
-        if (found := _element(n, seen, owners)) is not None
+        if (result := _element(n, seen, owners)) is not None
     ]
     gravity = n.numbers(mechanism.gravity) if n.known(mechanism.gravity) else [0.0, 0.0, 0.0]
     data = {
@@ -160,7 +160,7 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
 
 def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
     look = spec.joint.look
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "name": spec.name,
         "type": spec.joint.type_name,
         "P": n.marker(spec.predecessor),
@@ -176,15 +176,15 @@ def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
         point = substitute(list(shape.point), running)
         curve = n.curve(point)
         if curve is not None:
-            found["guide"] = {"point": curve, "running": len(shape.parameters)}
-    return found
+            result["guide"] = {"point": curve, "running": len(shape.parameters)}
+    return result
 
 
 def _push(n: _Numbers, force: Force) -> dict[str, Any]:
     """The force along a way over its length and rate, where it depends on these and parameters alone."""
     law = force.push(*(n.graph.symbol(name) for name in RUNNING))
-    found = None if law is None else n.curve([law])
-    return {} if found is None else {"point": [*found, 0.0, 0.0]}
+    result = None if law is None else n.curve([law])
+    return {} if result is None else {"point": [*result, 0.0, 0.0]}
 
 
 def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, Any] | None:

@@ -235,12 +235,12 @@ class Program:
         """Blocks that compute exactly what an earlier one does -> the name of that one; never blocks of drivers."""
         needed = {name for d in self.drivers for name in d.blocks}
         first: dict[tuple[object, ...], str] = {}
-        found = {}
+        result = {}
         for b in self.blocks:
             key = (b.inputs, tuple(y.id for y in b.outputs), tuple(y.id for y in b.checks))
             if first.setdefault(key, b.name) != b.name and b.name not in needed:
-                found[b.name] = first[key]
-        return found
+                result[b.name] = first[key]
+        return result
 
     @property
     def composes_terms(self) -> bool:
@@ -260,6 +260,6 @@ class Program:
     @property
     def kernels(self) -> tuple[Block | KernelDriver, ...]:
         """The public functions, in the order of the metadata."""
-        found: dict[str, Block | KernelDriver] = {b.name: b for b in self.blocks if b.public}
-        found.update((d.name, d) for d in self.drivers)
-        return tuple(found[name] for name in self.metadata["kernels"])
+        result: dict[str, Block | KernelDriver] = {b.name: b for b in self.blocks if b.public}
+        result.update((d.name, d) for d in self.drivers)
+        return tuple(result[name] for name in self.metadata["kernels"])

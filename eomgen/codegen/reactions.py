@@ -47,12 +47,12 @@ def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) ->
 
 def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
     """What the named multipliers of a model stand for."""
-    given = kinematics.mechanism.given
-    if given is None or not given.multipliers:
+    raw = kinematics.mechanism.given
+    if raw is None or not raw.multipliers:
         return {}
     graph = kinematics.graph
     values = solve_multipliers(kinematics.constraints.jacobian, equations.inverse_dynamics)
-    names = {f"constraint_{k + 1}": name for k, name in enumerate(given.multipliers)}
+    names = {f"constraint_{k + 1}": name for k, name in enumerate(raw.multipliers)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
     }
@@ -70,19 +70,19 @@ _REMEDY = (
 def refuse_undetermined(
     kinematics: Kinematics,
     every: Mapping[str, Row6],
-    idle: Sequence[Expr],
+    unloaded: Sequence[Expr],
     values: Mapping[Expr, Expr],
     laws: Laws,
 ) -> None:
     """Refuse what depends on multipliers that no equation determines, unless they are 0 in the smallest reactions.
 
-    ``every`` are the wrenches of joints along the axes of S in terms of ``idle``, the multipliers of equations that
+    ``every`` are the wrenches of joints along the axes of S in terms of ``unloaded``, the multipliers of equations that
     vanish; ``values`` what the symbols of reactions and multipliers stand for, in terms of these too.
     Raises ModelError.
     """
-    if not _depends(list(values.values()), {}, idle):
+    if not _depends(list(values.values()), {}, unloaded):
         return
-    open_ = _open(kinematics, every, idle)
+    open_ = _open(kinematics, every, unloaded)
     if not open_:
         return
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
@@ -102,36 +102,36 @@ def refuse_undetermined(
         raise ModelError(problems)
 
 
-def _depends(found: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
+def _depends(result: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
     """Whether what is asked for depends on such multipliers."""
-    slopes = list(jacobian(substitute(list(found), dict(values)), list(on)).values())
+    slopes = list(jacobian(substitute(list(result), dict(values)), list(on)).values())
     return not all(vanishes(_with_every_choice(slopes), SYSTEMS_UNTOUCHED, pieces=True))
 
 
-def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr]) -> list[Expr]:
+def _open(kinematics: Kinematics, every: Mapping[str, Row6], unloaded: Sequence[Expr]) -> list[Expr]:
     """The multipliers that are not 0 in the smallest reactions, nor independent of such ones."""
     parts = list[list[Expr]]()
     for spec in kinematics.mechanism.joints:
         if spec.name in every:
             parts += [list(part) for part in force_and_moment(kinematics.motion, spec, every[spec.name])]
     flat = [x for part in parts for x in part]
-    slopes = jacobian(flat, list(idle))
-    base = substitute(flat, dict.fromkeys(idle, kinematics.graph.zero))
+    slopes = jacobian(flat, list(unloaded))
+    base = substitute(flat, dict.fromkeys(unloaded, kinematics.graph.zero))
     places = list(slopes)
     numbers = _probed([*base, *slopes.values()])
-    related = np.zeros((len(idle), len(idle)), dtype=bool)
-    moved = np.zeros(len(idle), dtype=bool)
+    related = np.zeros((len(unloaded), len(unloaded)), dtype=bool)
+    moved = np.zeros(len(unloaded), dtype=bool)
     for values in numbers:
-        S = np.zeros((len(flat), len(idle)))
+        S = np.zeros((len(flat), len(unloaded)))
         for (i, j), d in zip(places, values[len(flat) :], strict=True):
             S[i, j] = d
         for k in range(0, len(flat), 3):  # forces and moments apart: their scales differ
             some, wrench = S[k : k + 3], values[k : k + 3]
             related |= np.abs(some.T @ some) > SYSTEMS_UNTOUCHED
             moved |= np.abs(some.T @ wrench) > SYSTEMS_UNTOUCHED
-    for _ in idle:  # what is related to something open is open too
+    for _ in unloaded:  # what is related to something open is open too
         moved = moved | related @ moved
-    return [multiplier for multiplier, is_open in zip(idle, moved, strict=True) if is_open]
+    return [multiplier for multiplier, is_open in zip(unloaded, moved, strict=True) if is_open]
 
 
 def _probed(expressions: Sequence[Expr]) -> np.ndarray:
@@ -284,7 +284,7 @@ def _shared(
     slopes = jacobian(list(values.values()), list(multipliers))
     names = sorted(symbols_of(list(slopes.values())))
     evaluate = Evaluator(list(slopes.values()), names)
-    found, judged = set[str](), False
+    result, judged = set[str](), False
     for place in mobility.samples:
         J = functions.scaled_jacobian(np.array(place))
         known = dict(zip(kinematics.names, place, strict=True)) | functions.values
@@ -297,8 +297,8 @@ def _shared(
         judged = True
         open_ = S @ SparseRows(np.ascontiguousarray(J.T)).motions(mobility.rank).T
         moved = np.abs(open_).max(axis=1) > STRUCTURE * np.abs(S).max(axis=1)
-        found |= {symbol.node[1] for symbol, is_moved in zip(values, moved, strict=True) if is_moved}
-    return found if judged else every
+        result |= {symbol.node[1] for symbol, is_moved in zip(values, moved, strict=True) if is_moved}
+    return result if judged else every
 
 
 def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
@@ -316,8 +316,8 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
             raise ModelError([too_many_pieces(mechanism, terms.force.name)])
         laws |= dict.fromkeys(own)
         speaking |= {terms.force.name: own} if own else {}
-    asked = [graph.symbol(name) for name in mechanism.reaction_quantities]
-    seen = substitute(asked, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
+    requested = [graph.symbol(name) for name in mechanism.reaction_quantities]
+    seen = substitute(requested, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
     names = sorted(name for name in symbols_of([*laws, *seen]) if is_reaction(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
     rows, held = switched_rows(kinematics)
@@ -334,18 +334,18 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         measured = [*reactions, *(dot([*r.jacobian, r.rest], [*kinematics.a, graph.one]) for r in rows)]
         unknown = [*forces, *(row.multiplier for row in rows)]
         a, columns = _motion(linear, mobility, unknown, speaking)
-        found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
+        result = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
         if rows:
             by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
             after = AfterEvents(kinematics, rows, by_multipliers).velocities()
-        still, gain = solve_rows(found, rows, len(laws))
+        still, gain = solve_rows(result, rows, len(laws))
         gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
         values = _reactions(linear, mobility, names, (), speaking)[0]
     motion = copy(motion)
-    motion.carried = dict(zip(names, values, strict=False))
+    motion.known_reactions = dict(zip(names, values, strict=False))
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
     solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), velocities_after=after)
@@ -364,10 +364,10 @@ def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
 
 def _before_accelerations(mechanism: Mechanism) -> bool:
     """Whether expressions speak of reactions that are evaluated before accelerations are known."""
-    found = [x for event in mechanism.events for x in (event.expression, *(value for _, value in event.reset))]
+    result = [x for event in mechanism.events for x in (event.expression, *(value for _, value in event.reset))]
     for state in mechanism.states:
-        found += [state.rate, *([] if state.sampled is None else [state.sampled])]
-    return not mechanism.reaction_quantities.keys().isdisjoint(symbols_of(found))
+        result += [state.rate, *([] if state.sampled is None else [state.sampled])]
+    return not mechanism.reaction_quantities.keys().isdisjoint(symbols_of(result))
 
 
 def _loads(terms: ForceTerms) -> list[MarkerLoad | CoordinateLoad]:
@@ -378,13 +378,13 @@ def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematic
     """Other parts of the entries of the loads."""
     flat = [e for terms in kinematics.forces for load in _loads(terms) for e in entries_of(load)]
     values = iter(substitute(flat, mapping) if mapping else flat)
-    found = []
+    result = []
     for terms in kinematics.forces:
         new: dict[str, Any] = {
             part: tuple(with_entries(load, values) for load in getattr(terms, part)) for part in PARTS
         }
-        found.append(replace(terms, **new))
-    return replace(kinematics, forces=tuple(found))
+        result.append(replace(terms, **new))
+    return replace(kinematics, forces=tuple(result))
 
 
 # -- linear parts ---------------------------------------------------------------------------------------------------
@@ -433,14 +433,14 @@ def _motion(
     free = [factor.solve(column) for column in right]
     moved = [factor.solve(row) for row in C]
     schur = [[dot(row, y) for y in moved] for row in C]
-    found = []
+    result = []
     for k, a in enumerate(free):
         gap = [dot(row, a) + (g if k == 0 else 0.0) for row, g in zip(C, gamma, strict=True)]
         held = eliminate(schur, gap)
         for y, multiplier in zip(moved, held, strict=True):
             a = [x - multiplier * z for x, z in zip(a, y, strict=True)]
-        found.append([*a, *held])
-    return found[0], found[1:]
+        result.append([*a, *held])
+    return result[0], result[1:]
 
 
 def _reactions(
@@ -457,9 +457,9 @@ def _reactions(
     graph = kinematics.graph
     wrenches = JointWrenches(kinematics)
     rows = {label: graph.symbol(f"multiplier[{label}]") for label in kinematics.constraints.labels}
-    idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in rows}
-    every = joint_reactions(wrenches, rows | idle)
-    known = rows | idle | {row.label: row.multiplier for row in held}
+    unloaded = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in rows}
+    every = joint_reactions(wrenches, rows | unloaded)
+    known = rows | unloaded | {row.label: row.multiplier for row in held}
     where = [reaction_of(name) for name in names]
     reactions = []
     for name, place in zip(names, where, strict=True):
@@ -470,9 +470,9 @@ def _reactions(
             reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), laws)])
     stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
     refuse_redundant(kinematics, mobility, list(rows.values()), stands, laws)
-    if idle:
-        refuse_undetermined(kinematics, every, list(idle.values()), stands, laws)
-    free = [*idle.values(), *(rows[label] for label in mobility.redundant)]
+    if unloaded:
+        refuse_undetermined(kinematics, every, list(unloaded.values()), stands, laws)
+    free = [*unloaded.values(), *(rows[label] for label in mobility.redundant)]
     reactions = substitute(reactions, dict.fromkeys(free, graph.zero)) if free else reactions
     return reactions, [rows[kinematics.constraints.labels[i]] for i in mobility.independent_rows]
 

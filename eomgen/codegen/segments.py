@@ -37,10 +37,10 @@ class SegmentReader:
         known: Mapping[int, Place],
         results: Mapping[int, tuple[int, ...]],
         checked: Collection[int],
-        alone: Collection[int],
+        single: Collection[int],
     ) -> None:
         self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
-        self.alone = alone
+        self.single = single
         self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
 
     def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
@@ -52,7 +52,7 @@ class SegmentReader:
     def letters(self, segment: Sequence[int]) -> list[Signature]:
         """What each statement of a segment is like: where it reads, and whether others need it, but not which."""
         nodes, known = self.nodes, self.known
-        found = []
+        result = []
         for i in segment:
             node = nodes[i]
             letter: list[object] = [node[0]]
@@ -60,8 +60,8 @@ class SegmentReader:
                 place = known.get(j)
                 letter.append("w" if place is None else place[0])
             letter += [len(self.results.get(i, ())), i in self.checked]
-            found.append(tuple(letter))
-        return found
+            result.append(tuple(letter))
+        return result
 
     def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
         nodes, known = self.nodes, self.known
@@ -70,9 +70,9 @@ class SegmentReader:
         signature: list[object] = []
         for i in segment:
             node = nodes[i]
-            signature.append((node[0], i) if i in self.alone else node[0])
+            signature.append((node[0], i) if i in self.single else node[0])
             for j in node[1:]:
-                if j in self.alone and j not in self.known:
+                if j in self.single and j not in self.known:
                     continue  # a list
                 at = local.get(j)
                 if at is None:
@@ -108,19 +108,19 @@ def find_repeats(letters: Sequence[Hashable], longest: int, worth: int = WORTH) 
         waiting += [_offer(start, period, end) for start, end in _stretches(text, period, worth)]
     heapify(waiting)
     taken = np.zeros(len(text), dtype=bool)
-    found = []
+    result = []
     while waiting:
         _, period, start, end = heappop(waiting)
         free = _free_parts(taken, start, end)
         if free == [(start, end)]:
             count = (end - start) // period
-            found.append((start, period, count))
+            result.append((start, period, count))
             taken[start : start + count * period] = True
             continue
         for first, last in free:
             if _saved(first, period, last) >= worth:
                 heappush(waiting, _offer(first, period, last))
-    return sorted(found)
+    return sorted(result)
 
 
 def _saved(start: int, period: int, end: int) -> int:
@@ -162,15 +162,15 @@ def _alternating(reader: SegmentReader, segments: Sequence[Segment], longest: in
     done = 0
     for start, period, count in find_repeats([reader.read(segment)[0] for segment in segments], PERIOD, CALLS):
         groups = [segments[k : k + period] for k in range(start, start + count * period, period)]
-        if period == 1 or sum(map(len, groups[0])) > longest or any(s[0] in reader.alone for s in groups[0]):
+        if period == 1 or sum(map(len, groups[0])) > longest or any(s[0] in reader.single for s in groups[0]):
             continue
         result += segments[done:start]
         done = start + count * period
         joined = [sum(group, ()) for group in groups]
         kinds = Counter(reader.read(one)[0] for one in joined)
-        usual, often = kinds.most_common(1)[0]
+        commonest, often = kinds.most_common(1)[0]
         for group, one in zip(groups, joined, strict=True):
-            result += [one] if often >= FEW and reader.read(one)[0] == usual else group
+            result += [one] if often >= FEW and reader.read(one)[0] == commonest else group
     return [*result, *segments[done:]]
 
 
@@ -205,13 +205,13 @@ class Segments:
         return sum(len(kind.members[0]) for kind in self.kinds)
 
     @property
-    def carried_out(self) -> int:
+    def performed(self) -> int:
         """Statements that are carried out."""
         return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
 
 
-def find_segments(program: Program, block: Block, given: Mapping[int, Place]) -> Segments:
-    """The segments of a block and the kinds that they are of; symbols and hoisted values are ``given`` at places."""
+def find_segments(program: Program, block: Block, raw: Mapping[int, Place]) -> Segments:
+    """The segments of a block and the kinds that they are of; symbols and hoisted values are ``raw`` at places."""
     graph, nodes, skipped = program.graph, program.graph.nodes, program.made_before(block)
     longest = max(1, program.limits.statements // 2)
     places: dict[int, list[int]] = {}
@@ -222,21 +222,21 @@ def find_segments(program: Program, block: Block, given: Mapping[int, Place]) ->
     statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
     kept = {*places, *checked}
     turning = [i for i in statements if nodes[i][0] in CIRCULAR and i not in kept]
-    turning = [i for i in turning if given.get(nodes[i][1], ("", 0))[0] == "x"]
+    turning = [i for i in turning if raw.get(nodes[i][1], ("", 0))[0] == "x"]
     angles = sorted({nodes[i][1] for i in turning})
-    known: dict[int, Place] = dict(given)
+    known: dict[int, Place] = dict(raw)
     known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
     slot = {a: k for k, a in enumerate(angles)}
     known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
     lists = PairLists(graph, statements, 2 * len(angles))
     items = {i for i in statements if graph.calls and lists.call(i) is not None and not lists.is_list(i)}
     known.update((i, ("w", lists.place(i))) for i in items)
-    alone = {*lists.every, *(items & kept)}
+    single = {*lists.every, *(items & kept)}
     early = {*turning, *(items - kept)}
     left = [i for i in statements if i not in early]
     results = {i: tuple(at) for i, at in places.items()}
-    reader = SegmentReader(graph, known, results, checked, alone)
-    groups = _grouped(graph, _apart(parts(graph, left), alone), items - kept, alone)
+    reader = SegmentReader(graph, known, results, checked, single)
+    groups = _grouped(graph, _apart(parts(graph, left), single), items - kept, single)
     common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
     segments: list[tuple[int, ...]] = []
     for group, alike in zip(groups, common, strict=True):
@@ -251,18 +251,18 @@ def find_segments(program: Program, block: Block, given: Mapping[int, Place]) ->
     return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
 
 
-def _apart(every: Sequence[tuple[int, Sequence[int]]], alone: Collection[int]) -> list[tuple[int, tuple[int, ...]]]:
+def _apart(every: Sequence[tuple[int, Sequence[int]]], single: Collection[int]) -> list[tuple[int, tuple[int, ...]]]:
     """Segments cut so that some statements are segments of their own."""
-    found: list[tuple[int, tuple[int, ...]]] = []
+    result: list[tuple[int, tuple[int, ...]]] = []
     for number, part in every:
-        for by_itself, grouped in groupby(part, key=alone.__contains__):
+        for by_itself, grouped in groupby(part, key=single.__contains__):
             run = tuple(grouped)
-            found += [(0, (i,)) for i in run] if by_itself else [(number, run)]
-    return found
+            result += [(0, (i,)) for i in run] if by_itself else [(number, run)]
+    return result
 
 
 def _grouped(
-    graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]], items: Collection[int], alone: Collection[int]
+    graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]], items: Collection[int], single: Collection[int]
 ) -> list[list[tuple[int, ...]]]:
     """Segments of several passes over one body together, as far as what they read allows.
 
@@ -276,7 +276,7 @@ def _grouped(
     for number, segment in every:
         read = (nodes[j][1] if j in items else j for i in segment for j in nodes[i][1:])
         last = max((home.get(j, -1) for j in read), default=-1)
-        if last < 0 or not number or number in passes[last] or groups[last][0][0] in alone:
+        if last < 0 or not number or number in passes[last] or groups[last][0][0] in single:
             last = len(groups)
             groups.append([])
             passes.append(set())
@@ -296,7 +296,7 @@ def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[
 def _kept(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
     """Whether a segment stays as it is: one of several of its kind, or a list."""
     alike = _common(reader, segments)
-    return [segment[0] in reader.alone or common for segment, common in zip(segments, alike, strict=True)]
+    return [segment[0] in reader.single or common for segment, common in zip(segments, alike, strict=True)]
 
 
 def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool]) -> list[tuple[int, ...]]:

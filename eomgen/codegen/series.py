@@ -46,16 +46,16 @@ class Series:
 
 def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = False) -> set[int]:
     """The terms that roots are made of, with what their recurrences need; only those that change, if asked for."""
-    found: set[int] = set()
+    result: set[int] = set()
     open_ends = list(roots)
     while open_ends:
         i = open_ends.pop()
         term = terms[i]
-        if i not in found and (term.varies or not changing):
-            found.add(i)
+        if i not in result and (term.varies or not changing):
+            result.add(i)
             more = (term.divisor, *(k for _, k in term.numerators))
             open_ends += [*term.operands, *(k for k in more if k >= 0)]
-    return found
+    return result
 
 
 def make_series(program: Program) -> Series:
@@ -100,7 +100,7 @@ class _Terms:
 
     def series(self, block: Block) -> Series:
         """All that is needed, once every node has its term; reciprocals may have gone into quotients."""
-        rates, checks = ([self._of[y.id] for y in given] for given in (block.outputs, block.checks))
+        rates, checks = ([self._of[y.id] for y in raw] for raw in (block.outputs, block.checks))
         states = {i for i, term in enumerate(self._terms) if term.kind == "state"}
         live = sorted(states | behind(self._terms, [*rates, *checks]))
         place = {i: k for k, i in enumerate(live)}

@@ -82,12 +82,12 @@ def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dic
     declaration = re.compile(rf"^\s*(?:for \()?(?:const )?({types})\b([^;]*);", re.MULTILINE)
 
     def places(text: str) -> int:
-        found = 0
+        result = 0
         for kind, names in declaration.findall(text):
             each = places(structs[kind]) if kind in structs and not names.lstrip().startswith("*") else 1
             arrays = _ARRAY.findall(re.sub(r"=\s*\{[^{}]*\}|=[^,]*", "", names))
-            found += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
-        return found + sum(len(_OPERATOR.findall(expression)) for expression in _EXPRESSION.findall(text))
+            result += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
+        return result + sum(len(_OPERATOR.findall(expression)) for expression in _EXPRESSION.findall(text))
 
     own: dict[str, int] = {}
     calls: dict[str, set[str]] = {}

@@ -64,14 +64,14 @@ def alike_coordinates(program: Program) -> dict[str, str]:
     shapes: dict[int, tuple[object, ...]] = {}
     for k in range(len(program.parent) - 1, -1, -1):
         shapes[k] = tuple(shapes[c] for c in children[k])
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     slots = {k for start, _ in program.quaternion_slots for k in range(start, start + 4)}
 
     def pair(a: int, b: int) -> None:
-        found[program.velocities[a]] = program.velocities[b]
+        result[program.velocities[a]] = program.velocities[b]
         at, to = program.coordinate_of[a], program.coordinate_of[b]
         if at >= 0 and to >= 0 and not {at, to} & slots:
-            found[program.coordinates[at]] = program.coordinates[to]
+            result[program.coordinates[at]] = program.coordinates[to]
         for c, d in zip(children[a], children[b], strict=True):
             pair(c, d)
 
@@ -85,7 +85,7 @@ def alike_coordinates(program: Program) -> dict[str, str]:
             else:
                 pair(other, c)
         open_ends += free.values()
-    return found
+    return result
 
 
 def find_pairs(program: Program, sequence: Sequence[int], wanted: Collection[int]) -> Pairs | None:
@@ -216,14 +216,14 @@ class _Finder:
                 one = (1, 1 if nodes[a][0] == "add" else -1)
                 other = (1, 1 if nodes[b][0] == "add" else -1)
                 other = other[::-1] if changed else other
-                asked = [s * m * n for s, m, n in zip(signs, one, other, strict=True)]
+                signed = [s * m * n for s, m, n in zip(signs, one, other, strict=True)]
                 loose = [k for k in (0, 1) if numbers[k] or ours[k] in free]
-                if asked[0] != asked[1] and loose:
+                if signed[0] != signed[1] and loose:
                     k = loose[-1]
                     if not numbers[k]:
                         self._turn(ours[k])
-                    asked[k] = asked[1 - k]
-                self.sign[a] = asked[0] if ours[0] in self.second or ours[1] not in self.second else asked[1]
+                    signed[k] = signed[1 - k]
+                self.sign[a] = signed[0] if ours[0] in self.second or ours[1] not in self.second else signed[1]
                 signs = [self.sign[a] * m * n for m, n in zip(one, other, strict=True)]
             else:
                 for k, number in enumerate(numbers):
@@ -429,13 +429,13 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
 def conditions(graph: Graph, statements: Iterable[int], kept: Container[int], checks: Container[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
     nodes, relations = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
-    found = set()
+    result = set()
     for i in statements:
         node = nodes[i]
         if node[0] in relations and i not in kept and (i not in checks or node[0] == "lt"):
-            found.add(i)
-        found.difference_update(node[2:] if node[0] == "select" else node[1:])
-    return frozenset(found)
+            result.add(i)
+        result.difference_update(node[2:] if node[0] == "select" else node[1:])
+    return frozenset(result)
 
 
 def references(program: Program, block: Block) -> dict[int, str]:
@@ -466,15 +466,15 @@ def gather_angles(
 
     ``node`` is the operation of a statement, with what it reads.
     """
-    late: set[int] = set()
+    later: set[int] = set()
     arguments: dict[int, None] = {}
     for i in statements:
         operation, *operands = node(i)
         circular = operation in CIRCULAR
-        if circular and operands[0] not in late:
+        if circular and operands[0] not in later:
             arguments[operands[0]] = None
-        if circular or not late.isdisjoint(operands):
-            late.add(i)
+        if circular or not later.isdisjoint(operands):
+            later.add(i)
     if pairs is not None:
         arguments = _side_by_side(arguments, pairs)
     first = set(arguments)
@@ -485,11 +485,11 @@ def gather_angles(
 
 
 def _side_by_side(arguments: dict[int, None], pairs: Pairs) -> dict[int, None]:
-    found: dict[int, None] = {}
+    result: dict[int, None] = {}
     for operands in pairs.operands.values():
         if len(operands) == 1 and arguments.keys() >= {operands[0][0], operands[0][1]}:
-            found |= {operands[0][0]: None, operands[0][1]: None}
-    return found | arguments
+            result |= {operands[0][0]: None, operands[0][1]: None}
+    return result | arguments
 
 
 def print_angles(operands: Sequence[str]) -> list[str]:

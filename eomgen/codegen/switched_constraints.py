@@ -26,22 +26,22 @@ class LinearValues(NamedTuple):
     gain: Matrix
 
 
-def solve_rows(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> LinearValues:
+def solve_rows(result: LinearValues, rows: Sequence[SwitchedRow], count: int) -> LinearValues:
     """Values in terms of the forces of laws alone, the multipliers of the rows being solved for.
 
     The values end with the w of the rows, the forces with their multipliers; ``count`` is that of the laws.
     """
     if not rows:
-        return found
-    n = len(found.still) - len(rows)
-    inner = [row[count:] for row in found.gain[n:]]
+        return result
+    n = len(result.still) - len(rows)
+    inner = [row[count:] for row in result.gain[n:]]
     on = [row.on for row in rows]
     A = switched_matrix(inner, on)
-    right = [[-(s * w) for s, w in zip(on, found.still[n:], strict=True)]]
-    right += [[-(s * row[j]) for s, row in zip(on, found.gain[n:], strict=True)] for j in range(count)]
+    right = [[-(s * w) for s, w in zip(on, result.still[n:], strict=True)]]
+    right += [[-(s * row[j]) for s, row in zip(on, result.gain[n:], strict=True)] for j in range(count)]
     first, *columns = solve_switched(A, right)
-    still = [combined(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
-    gain = [[combined(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
+    still = [combined(N, row[count:], first) for N, row in zip(result.still[:n], result.gain, strict=False)]
+    gain = [[combined(row[j], row[count:], columns[j]) for j in range(count)] for row in result.gain[:n]]
     return LinearValues(still, gain)
 
 
@@ -51,16 +51,16 @@ def switched_matrix(inner: Matrix, on: Sequence[Expr]) -> Matrix:
     return [[on[i] * inner[i][j] * on[j] + ((on[i] - 1.0) if i == j else 0.0) for j in size] for i in size]
 
 
-def solve_switched(given: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[Expr]]:
+def solve_switched(raw: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[Expr]]:
     """Solutions for a negative semidefinite matrix; a row that follows from those before it gets 0.
 
     There its pivot is rounding of its own diagonal, and so is all that is left of the row.
     """
-    graph, n, A = given[0][0].graph, len(given), [list(row) for row in given]
+    graph, n, A = raw[0][0].graph, len(raw), [list(row) for row in raw]
     columns, pivots = [list(column) for column in right], list[Expr]()
     own = []
     for k in range(n):
-        least = SINGULAR * graph.apply("abs", given[k][k])
+        least = SINGULAR * graph.apply("abs", raw[k][k])
         own.append(graph.apply("lt", least, graph.apply("abs", A[k][k])))
         pivots.append(where(own[k], A[k][k], 1.0))
         for i in range(k + 1, n):
@@ -103,21 +103,21 @@ class AfterEvents:
         k = self.kinematics
         moving = {*k.names, *k.velocity_names}
         switched = [s.state for s in k.mechanism.switched]
-        found = dict[str, tuple[tuple[str, Expr], ...]]()
+        result = dict[str, tuple[tuple[str, Expr], ...]]()
         for event in k.mechanism.events:
-            given = dict(event.reset)
-            closes = any(given.get(state) == k.graph.one for state in switched)
-            if closes or not moving.isdisjoint(given):
-                found[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
-        return found
+            raw = dict(event.reset)
+            closes = any(raw.get(state) == k.graph.one for state in switched)
+            if closes or not moving.isdisjoint(raw):
+                result[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
+        return result
 
     def _after(self, event: Event, closes: bool) -> list[Expr]:
-        k, given = self.kinematics, dict(event.reset)
-        new = {k.graph.symbol(name): value for name, value in given.items()}
+        k, raw = self.kinematics, dict(event.reset)
+        new = {k.graph.symbol(name): value for name, value in raw.items()}
         v = given_v = substitute(list(k.v), new)
-        own = [self._closed(row, given, new) for row in self.rows]
+        own = [self._closed(row, raw, new) for row in self.rows]
         lasting = list[RowAfter]()
-        if not {*k.names, *k.velocity_names}.isdisjoint(given):
+        if not {*k.names, *k.velocity_names}.isdisjoint(raw):
             lasting = self._lasting(own, new)
             held = [one._replace(on=row.on) for one, row in zip(own, self.rows, strict=True)] if closes else own
             acting = [*(lasting if len(lasting) <= MOST else ()), *held]
@@ -140,16 +140,16 @@ class AfterEvents:
         (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
         return [combined(before, [c[j] for c in columns], impulses) for j, before in enumerate(v)]
 
-    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
+    def _closed(self, row: SwitchedRow, raw: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""
-        on = given.get(row.state, row.on)
+        on = raw.get(row.state, row.on)
         rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
         return RowAfter(on, J, rate, error, error - before, self._size(row.kind))
 
     def _lasting(self, own: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
         """The equations of the mechanism that are connected with closed ones, beside which they have to hold."""
-        c, found = self.kinematics.constraints, []
+        c, result = self.kinematics.constraints, []
         on = own[0].on
         for one in own[1:]:
             on = where(one.on, 1.0, on)
@@ -162,8 +162,8 @@ class AfterEvents:
                 continue
             value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
             now, speed, *slopes = substitute([value, rate, *J], new)
-            found.append(RowAfter(on, slopes, speed, now, now - value, self._size(kind)))
-        return found
+            result.append(RowAfter(on, slopes, speed, now, now - value, self._size(kind)))
+        return result
 
     def _shortest(self, one: RowAfter) -> list[Expr]:
         """Of an equation, the change of velocities in its direction, lengths in the length of the mechanism."""

@@ -291,12 +291,12 @@ def _constrained(
 ) -> TreeMotion:
     """The accelerations by articulated bodies and the rates of the states, which no constraint holds."""
     moving = [replace(row, entries={k: x for k, x in row.entries.items() if k < n}) for row in rows]
-    found = solve(moving, term, loaded=loaded, forces=None if forces is None else forces[:n])
+    result = solve(moving, term, loaded=loaded, forces=None if forces is None else forces[:n])
     graph = rates[0].graph
     unloaded = [graph.zero] * len(rates) if forces is None else forces[n:]
-    return found._replace(
-        accelerations=(*found.accelerations, *(rates if loaded else unloaded)),
-        pivots=(*found.pivots, *(graph.one,) * len(rates)),
+    return result._replace(
+        accelerations=(*result.accelerations, *(rates if loaded else unloaded)),
+        pivots=(*result.pivots, *(graph.one,) * len(rates)),
     )
 
 
@@ -307,13 +307,13 @@ def independent_places(kinematics: Kinematics, mobility: Mobility) -> tuple[int,
 
 def flag_forces(kinematics: Kinematics) -> list[tuple[str, Expr]]:
     """Names of the elements whose loads need not be finite, and flags of (t, q, v, u): 1 where they are, else 0."""
-    found = []
+    result = []
     for terms in kinematics.forces:
         size = _size(terms)
         if size is not None:
             finite = size.graph.apply("lt", size, LARGEST)  # false for what is not a number
-            found.append((terms.force.name, finite))
-    return found
+            result.append((terms.force.name, finite))
+    return result
 
 
 def _size(terms: ForceTerms) -> Expr | None:
@@ -335,7 +335,7 @@ def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
     """Event, state and its new value, of all resets."""
     names = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
     places = {name: k for k, name in enumerate(names)}
-    found: list[tuple[int, int, Expr]] = []
+    result: list[tuple[int, int, Expr]] = []
     for i, event in enumerate(kinematics.mechanism.events):
         for name, value in (dict(event.reset) | dict(kinematics.velocities_after.get(event.name, ()))).items():
             if name not in places:
@@ -344,13 +344,13 @@ def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
                     f"reset {', '.join(places)}",
                     code="EG-EVENT",
                 )
-            found.append((i, places[name], value))
-    return found
+            result.append((i, places[name], value))
+    return result
 
 
-def resolved(given: Sequence[Expr], kinematics: Kinematics, equations: TreeEquations) -> Row:
+def resolved(raw: Sequence[Expr], kinematics: Kinematics, equations: TreeEquations) -> Row:
     """Expressions in terms of the tree's q, v, a."""
-    expressions = kinematics.resolve(given)
+    expressions = kinematics.resolve(raw)
     graph = kinematics.graph
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,

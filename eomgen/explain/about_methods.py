@@ -293,19 +293,19 @@ def final(author: Author) -> Section:
     shown = author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
     pieces += shown
     known = set() if isinstance(shown[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
-    pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)
+    pieces += author.formulas(right, force[0] if one else force, named, ("force", None), explained=known)
     return Section("Equations of motion", tuple(pieces))
 
 
 def _prescribed(author: Author) -> list[Piece]:
     """What is left where no degree of freedom is: the forces of the constraints, those of drivers among them."""
-    told = "The motion is prescribed: no acceleration is unknown."
+    opening = "The motion is prescribed: no acceleration is unknown."
     named, system = author.equations.written("tree_system")
     if not any(x != 0 for x in (*system.mass_matrix, *system.force)):
-        return [Sentence(f"{told} Nothing has mass and no forces act, so that the constraints exert none.")]
+        return [Sentence(f"{opening} Nothing has mass and no forces act, so that the constraints exert none.")]
     pieces: list[Piece] = [
         Sentence(
-            f"{told} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
+            f"{opening} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
             "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
             "equation; that of a driver, with the opposite sign, is the force or torque with which it drives its "
             "coordinate."
@@ -313,4 +313,4 @@ def _prescribed(author: Author) -> list[Piece]:
     ]
     pieces += author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)
     known = {symbol for symbol, _ in needed(named, system.mass_matrix)}
-    return pieces + author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), told=known)
+    return pieces + author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), explained=known)

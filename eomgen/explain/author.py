@@ -61,7 +61,7 @@ class Author:
         self._formula = Formulas(order_of(equations), digits=ROUNDED)
         self.shown: list[Shown] = []
         self.formed: list[tuple[str, Sequence[Expr], Written]] = []
-        self._told: list[tuple[Any, Any]] = []
+        self._explained: list[tuple[Any, Any]] = []
 
     @cached_property
     def plane(self) -> int | None:
@@ -128,9 +128,9 @@ class Author:
         named: Sequence[tuple[Any, Any]] = (),
         key: tuple[str, str | None] = ("", None),
         symmetric: bool = False,
-        told: Collection[Any] = (),
+        explained: Collection[Any] = (),
     ) -> list[Piece]:
-        """Named parts, save those in ``told``, and the formula of an expression or matrix.
+        """Named parts, save those in ``explained``, and the formula of an expression or matrix.
 
         Large ones are folded or left out; of a symmetric matrix entry by entry, those above the diagonal are.
         """
@@ -144,26 +144,26 @@ class Author:
         self.names = self.names.with_names(str(symbol) for symbol, _ in named)
         entries = list(self._entries(left, value, symmetric))
         self.shown.append(Shown(*key, named, entries))
-        found: list[Piece] = [self.line(s, x) for s, x in named if s not in told]
+        result: list[Piece] = [self.line(s, x) for s, x in named if s not in explained]
         if not isinstance(value, sympy.MatrixBase) or (
             size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS
         ):
-            found.append(self.line(left, value))
+            result.append(self.line(left, value))
         else:
-            found += [self.line(*entry) for entry in entries]
+            result += [self.line(*entry) for entry in entries]
             rest = len(value) - len(entries)
             if rest:
                 same = ", or are above the diagonal of a symmetric matrix" if symmetric else ""
-                found.append(Sentence(f"The other {rest} entries of ${left}$ are 0{same}."))
-        if size > FOLD or len(found) > LINES:
-            return [Folded(f"${left}$: {size} terms and factors", tuple(found))]
-        return found
+                result.append(Sentence(f"The other {rest} entries of ${left}$ are 0{same}."))
+        if size > FOLD or len(result) > LINES:
+            return [Folded(f"${left}$: {size} terms and factors", tuple(result))]
+        return result
 
     def balance(self, left: Any, right: Any, named: Sequence[tuple[Any, Any]]) -> list[Piece]:
         """An equation between two expressions, with the named parts that it uses and that were not shown before."""
-        parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._told]
+        parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._explained]
         self.names = self.names.with_names(str(symbol) for symbol, _ in parts)
-        self._told += parts
+        self._explained += parts
         return [*(self.line(*pair) for pair in parts), self.line(left, right)]
 
     def line(self, *sides: Any) -> FormulaLine:

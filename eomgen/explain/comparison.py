@@ -141,7 +141,7 @@ def compare(author: Author, module: Any) -> Difference:
 
     What the state does not know, such as reactions, variations and momenta, gets numbers at random.
     """
-    found: dict[str, Comparison] = {}
+    result: dict[str, Comparison] = {}
     equations = author.equations
     shown = {(s.name, s.part) for s in author.shown if s.name} | {("mass_matrix", None), ("force", None)}
     each = {row.name for row in equations.rows() if row.by_name}
@@ -152,18 +152,18 @@ def compare(author: Author, module: Any) -> Difference:
         wanted = Wanted(module, case)
         for name, part in sorted(shown, key=str):
             if name in COMPARED and (moves or name not in OF_FREEDOMS):
-                _note(found, name, _number(equations, name, None, values), *COMPARED[name](wanted))
+                _note(result, name, _number(equations, name, None, values), *COMPARED[name](wanted))
             elif name == "poses" and part in module.body_names:
                 pose = wanted.of("poses")[module.body_names.index(part)]
-                _note(found, f"poses[{part}]", _number(equations, "poses", part, values), pose.ravel(), 1.0)
+                _note(result, f"poses[{part}]", _number(equations, "poses", part, values), pose.ravel(), 1.0)
         keys = {f"{name}[{part}]" if name in each else name: (name, part) for name, part in others}
         for what, key in keys.items():
             one = equations.as_formed(*key)
-            formed, given = one.formed()
-            _compare_formed(found, what, formed, given, (one.named, one.flat), values)
+            formed, raw = one.formed()
+            _compare_formed(result, what, formed, raw, (one.named, one.flat), values)
         for what, expressions, own in author.formed:
-            _compare_formed(found, what, expressions, (), own, values)
-    return Difference({name: one.finding().worst for name, one in found.items()}, STATES)
+            _compare_formed(result, what, expressions, (), own, values)
+    return Difference({name: one.finding().worst for name, one in result.items()}, STATES)
 
 
 class Wanted(NamedTuple):
@@ -215,24 +215,24 @@ def _number(equations: Any, name: str, part: str | None, values: Mapping[str, fl
 
 
 def _compare_formed(
-    found: dict[str, Comparison],
+    result: dict[str, Comparison],
     what: str,
     formed: Sequence[Expr],
-    given: Sequence[tuple[str, Expr]],
+    raw: Sequence[tuple[str, Expr]],
     written: tuple[Sequence[tuple[Any, Any]], Sequence[Any]],
     values: Mapping[str, float],
 ) -> None:
     """A formula in SymPy against the expressions of the derivation, evaluated on their graph."""
-    unknown = symbols_of([*formed, *(x for _, x in given)]).difference(values, (name for name, _ in given))
+    unknown = symbols_of([*formed, *(x for _, x in raw)]).difference(values, (name for name, _ in raw))
     random = np.random.default_rng(2)
     numbers = dict(values) | {name: float(random.uniform(-1, 1)) for name in sorted(unknown)}
     at = dict(numbers)
-    for name, x in given:
+    for name, x in raw:
         at[name] = float(of_graph([x], at)[0])
     wanted, terms = with_bounds(formed, at)
-    _note(found, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))
+    _note(result, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))
 
 
-def _note(found: dict[str, Comparison], name: str, shown: Any, wanted: Any, size: float) -> None:
+def _note(result: dict[str, Comparison], name: str, shown: Any, wanted: Any, size: float) -> None:
     largest = max(float(np.abs(wanted).max(initial=0.0)), size, SMALLEST)
-    found.setdefault(name, Comparison(name)).add(0, shown - wanted, largest, largest)
+    result.setdefault(name, Comparison(name)).add(0, shown - wanted, largest, largest)

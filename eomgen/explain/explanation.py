@@ -109,8 +109,8 @@ class Explanation:
             )
         with tempfile.TemporaryDirectory() as folder:
             self._save_tex(Path(folder) / "document.tex")
-            words = [program, "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "document.tex"]
-            done = subprocess.run(words, cwd=folder, capture_output=True, check=False, errors="replace", text=True)
+            command = [program, "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "document.tex"]
+            done = subprocess.run(command, cwd=folder, capture_output=True, check=False, errors="replace", text=True)
             made = Path(folder) / "document.pdf"
             if done.returncode or not made.is_file():
                 wrong = next((line for line in done.stdout.splitlines() if line.startswith("!")), "no reason given")
@@ -121,8 +121,8 @@ class Explanation:
         return self.html
 
     def __repr__(self) -> str:
-        told = "not compared" if self.difference is None else f"difference {self.difference:.1e}"
-        return f"<{self.title}: {len(self.sections)} sections, {told}>"
+        verdict = "not compared" if self.difference is None else f"difference {self.difference:.1e}"
+        return f"<{self.title}: {len(self.sections)} sections, {verdict}>"
 
 
 def _pictures(sections: Sequence[Section]) -> Any:
@@ -160,14 +160,14 @@ def explain(equations: Any, level: str = "full") -> Explanation:
             x, moved = moving_state(module, author.independent_velocities)
             state = state_numbers(module, x)
         numbers.append(about.calculation(author, state, reason, moved))
-    found = None if module is None else compare(author, module)
-    sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(found, reason)]
+    result = None if module is None else compare(author, module)
+    sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(result, reason)]
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
     if author.put_in:
         values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
         title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
     kept = [section for section in sections if section is not None]
-    return Explanation(title, kept, author.names, None if found is None else found.largest)
+    return Explanation(title, kept, author.names, None if result is None else result.largest)
 
 
 def _folded(section: Section | None) -> Section | None:

@@ -59,11 +59,14 @@ def mechanism(author: Author, module: Any | None) -> Section:
 
 def _joint(spec: JointSpec) -> str:
     """What a joint does, about and along its own axes as P has them."""
-    words = dict(zip("xyz", map(axis_word, spec.axes), strict=True))
-    names = {letter: word if word.strip("-") in words else rf"\mathbf{{n}}_{letter}" for letter, word in words.items()}
-    told = {x: word if names[x] == word else f"${names[x]}$ = {word}" for x, word in words.items()}
-    sentence = _AXIS.sub(lambda found: told[found[1]], spec.joint.sentence)
-    formula = _AXIS.sub(lambda found: f"{{{names[found[1]]}}}", spec.joint.formula)
+    axis_names = dict(zip("xyz", map(axis_word, spec.axes), strict=True))
+    names = {
+        letter: word if word.strip("-") in axis_names else rf"\mathbf{{n}}_{letter}"
+        for letter, word in axis_names.items()
+    }
+    axes_text = {x: word if names[x] == word else f"${names[x]}$ = {word}" for x, word in axis_names.items()}
+    sentence = _AXIS.sub(lambda result: axes_text[result[1]], spec.joint.sentence)
+    formula = _AXIS.sub(lambda result: f"{{{names[result[1]]}}}", spec.joint.formula)
     formula = _UNIT.sub(r"\1", formula)
     return f"A {spec.joint.type_name} joint: {sentence} ${formula}$"
 
@@ -116,8 +119,8 @@ def bodies(author: Author) -> Section | None:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
             pieces += formulas
-    given = [(p, "parameter") for p in m.parameters] + [(u, "input") for u in m.inputs]
-    if given:
+    raw = [(p, "parameter") for p in m.parameters] + [(u, "input") for u in m.inputs]
+    if raw:
         rows = tuple(
             (
                 f"${author.symbol(p.name)}$",
@@ -126,7 +129,7 @@ def bodies(author: Author) -> Section | None:
                 _plain(p.unit),
                 (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
             )
-            for p, kind in given
+            for p, kind in raw
         )
         table = Table(("symbol", "name", "value", "unit", "meaning"), rows)
         pieces.append(Folded(f"Values of {len(rows)} parameters", (table,)) if m.bodies and len(rows) > MANY else table)
@@ -308,20 +311,20 @@ def _dead_centres(author: Author) -> list[Piece]:
     names = ", ".join(f"${author.symbol(eqs.kinematics.velocity_names[k])}$" for k in dependent)
     if len(dependent) != len(eqs.constraint_names):
         return []
-    told = Sentence(
+    axes_text = Sentence(
         f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its "
         "determinant vanishes, the mechanism is at a dead centre: the independent velocities do not determine the "
         "others there, and other coordinates must be chosen as independent."
     )
     if len(dependent) > EXPANDED:
-        return [told]
+        return [axes_text]
 
     def choose(quantities: Any) -> list[Expr]:
         block = [[row[k] for k in dependent] for row in quantities.constraint_jacobian]
         return [_determinant(block)]
 
     named, (value,) = author.form("determinant of the dependent columns", choose, "d_")
-    return [told, *author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)]
+    return [axes_text, *author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)]
 
 
 def _determinant(rows: list[list[Expr]]) -> Expr:
@@ -358,7 +361,7 @@ def forces(author: Author) -> list[Section]:
         "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of the "
         "variations of the independent coordinates are its generalized forces."
     )
-    found = [Section("Forces and their virtual work", (Sentence(text),))]
+    result = [Section("Forces and their virtual work", (Sentence(text),))]
     elements = {force.name: force for force in m.forces}
     for name, column in parts.items():
         pieces = _law(author, elements[name]) if name in elements else _weight(author, name)
@@ -367,8 +370,8 @@ def forces(author: Author) -> list[Section]:
         else:
             left = author.of(r"\delta W", name)
             pieces += author.formulas(left, _work(author, column), named, ("generalized_forces", name))
-        found.append(Section(f"`{name}`", tuple(pieces), level=2))
-    return found
+        result.append(Section(f"`{name}`", tuple(pieces), level=2))
+    return result
 
 
 def states(author: Author) -> Section | None:
@@ -381,11 +384,11 @@ def states(author: Author) -> Section | None:
     text = "Besides coordinates and velocities the model has states with these first-order equations."
     pieces: list[Piece] = [Sentence(text), *_lines(author, "rates of first-order states", rates, "S_", "_dot")]
     if k.sampled:
-        told = (
+        axes_text = (
             "These states are sampled: they keep their values until the time t, where they become, one after the other,"
         )
         pieces = pieces if rates else []
-        pieces += [Sentence(told), *_lines(author, "new values of sampled states", k.sampled, "D_")]
+        pieces += [Sentence(axes_text), *_lines(author, "new values of sampled states", k.sampled, "D_")]
         counters = ", ".join(f"`{clock.counter}`" for clock in k.mechanism.clocks)
         pieces.append(Sentence(f"Each time {counters} grows by 1."))
     return Section("First-order states", tuple(pieces))
@@ -429,8 +432,8 @@ def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
     """What a constraint that closes and opens demands, and when."""
     assert switch.constraint is not None
     events = {event.name: event for event in author.mechanism.events}
-    told = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
-    pieces: list[Piece] = [Sentence(told)]
+    axes_text = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
+    pieces: list[Piece] = [Sentence(axes_text)]
     for key, what in (("closes", "It closes by a plastic impact"), ("opens", "It opens")):
         if (event := events.get(event_of(name, key))) is not None:
             (value,) = author.write("events", [event.expression]).expressions
@@ -495,17 +498,17 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     for shown in author.shown:
         try:
             known = known_values(shown.named, numbers)
-            found = []
+            result = []
             here = {str(symbol): float(value) for symbol, value in known.items() if isinstance(symbol, sympy.Symbol)}
             for symbol, expression in shown.named:
-                found.append(_line(author, author.symbol(str(symbol)), expression, shown.named, here, known, numbers))
+                result.append(_line(author, author.symbol(str(symbol)), expression, shown.named, here, known, numbers))
             entries = [entry for entry in shown.entries if entry[1].free_symbols]
-            found += [_line(author, left, x, shown.named, here, known, numbers) for left, x in entries]
+            result += [_line(author, left, x, shown.named, here, known, numbers) for left, x in entries]
         except (TypeError, ValueError):  # reactions, variations and momenta have no number of their own
             continue
-        room = max(0, MOST - len(lines))
-        left_out += max(0, len(found) - room)
-        lines += found[:room]
+        space = max(0, MOST - len(lines))
+        left_out += max(0, len(result) - space)
+        lines += result[:space]
     lines += _accelerations(author, state)
     if left_out:
         lines.append(Sentence(f"{left_out} further lines are left out; the formulas are evaluated all the same below."))
@@ -539,8 +542,8 @@ def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
     names = [n for n in map(acceleration_name, eqs.kinematics.velocity_names) if n in state]
     if not names:
         return []
-    told = Sentence("The equations of motion then give the accelerations")
-    return [told, *(author.line(author.symbol(name), state[name]) for name in names)]
+    axes_text = Sentence("The equations of motion then give the accelerations")
+    return [axes_text, *(author.line(author.symbol(name), state[name]) for name in names)]
 
 
 def counts(author: Author) -> Section:
@@ -554,19 +557,19 @@ def counts(author: Author) -> Section:
     return Section("Operations", (Sentence(text), Table(head, rows)))
 
 
-def difference(found: Difference | None, reason: str) -> Section:
+def difference(result: Difference | None, reason: str) -> Section:
     """How far the shown formulas are from the compiled module, folded where they agree."""
     title = "Formulas and compiled code"
-    if found is None:
+    if result is None:
         return Section(title, (Sentence(f"Not compared: {reason}"),))
-    if not found.each:
+    if not result.each:
         return Section(title, (Sentence("There is no formula here that the compiled module has too."),))
-    title += f": largest difference {found.largest:.1e}"
-    rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in found.each.items())
+    title += f": largest difference {result.largest:.1e}"
+    rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in result.each.items())
     text = (
-        f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and compared "
+        f"Each of these formulas was evaluated through SymPy at {result.states} random consistent states and compared "
         "with the module that is generated from the same equations or, where that has no such function, with the "
         f"expressions of the derivation. The largest difference, as a share of the largest entry or term, is "
-        f"{found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
+        f"{result.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
     )
     return Section(title, (Sentence(text), Table(("formula", "largest difference"), rows)), folded=True)

@@ -116,11 +116,11 @@ class Graph:
         return self._node(("const", value + 0.0))
 
     def _node(self, key: Node) -> int:
-        found = self._ids.get(key)
-        if found is None:
-            found = self._ids[key] = len(self.nodes)
+        result = self._ids.get(key)
+        if result is None:
+            result = self._ids[key] = len(self.nodes)
             self.nodes.append(key)
-        return found
+        return result
 
     def begin_pass(self) -> int:
         """The number of another pass over the bodies of a model."""
@@ -483,32 +483,32 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
                 if k not in seen:
                     seen.add(k)
                     stack.append(k)
-    found = sorted(seen)
+    result = sorted(seen)
     if key is not None:
         if len(graph.reached) >= KEPT:
             graph.reached.pop(next(iter(graph.reached)))
-        graph.reached[key] = list(found)
-    return found
+        graph.reached[key] = list(result)
+    return result
 
 
 def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
     """Ids in ascending order, cut where the graph has marks, each with the number of its pass; none is empty."""
-    found: list[tuple[int, Sequence[int]]] = []
+    result: list[tuple[int, Sequence[int]]] = []
     marks, start = graph.marks, 0
     while start < len(ids):
         following = bisect_right(marks, ids[start], key=itemgetter(0))
         number = marks[following - 1][1] if following else 0
         end = bisect_left(ids, marks[following][0], start) if following < len(marks) else len(ids)
-        found.append((number, ids[start:end]))
+        result.append((number, ids[start:end]))
         start = end
-    return found
+    return result
 
 
 def marked_again(graph: Graph, ids: Sequence[int], backwards: bool = False) -> Iterator[Sequence[int]]:
     """Ids in ascending order by parts, the last first if asked; what is made of each is a part of its own."""
     passes: dict[int, int] = {0: 0}
-    found = parts(graph, ids)
-    for number, part in reversed(found) if backwards else found:
+    result = parts(graph, ids)
+    for number, part in reversed(result) if backwards else result:
         if number not in passes:
             passes[number] = graph.begin_pass()
         graph.mark(passes[number])
@@ -590,9 +590,9 @@ class _Copies:
         kind: Any = type(x)
         if kind in SHARED:
             return x
-        found = self.memo.get(id(x))
-        if found is not None:
-            return found
+        result = self.memo.get(id(x))
+        if result is not None:
+            return result
         if kind is Expr:
             return Expr(self.of(x.graph), x.id)
         if kind is tuple:
@@ -614,17 +614,17 @@ class _Copies:
     def _each(self, parts: Any) -> list[Any]:
         """Expressions here, most of which are zero in large sparse matrices."""
         graph = twin = zero = None
-        found = []
+        result = []
         for x in parts:
             if type(x) is Expr:
                 if x.graph is not graph:
                     graph = x.graph
                     twin = self.of(graph)
                     zero = twin.zero
-                found.append(zero if x.id == zero.id else Expr(twin, x.id))  # type: ignore[union-attr, arg-type]
+                result.append(zero if x.id == zero.id else Expr(twin, x.id))  # type: ignore[union-attr, arg-type]
             else:
-                found.append(self.of(x))
-        return found
+                result.append(self.of(x))
+        return result
 
 
 def _is_record(kind: Any) -> bool:

@@ -37,17 +37,17 @@ class Roots:
 
     def look(self, g: Graph) -> None:
         """Take in the nodes that came since."""
-        found, poles = self.of, self._poles
-        bits_of, pole_of, nodes = found.get, poles.get, g.nodes
+        result, poles = self.of, self._poles
+        bits_of, pole_of, nodes = result.get, poles.get, g.nodes
         for i in range(self._seen, len(nodes)):
             node = nodes[i]
             operation = node[0]
             if operation in _SUMS:  # most nodes
-                if found:
+                if result:
                     first, second = node[1], node[2]
                     pole = (pole_of(first, 0) | pole_of(second, 0)) if poles else 0
                     if bits := (bits_of(first, 0) | bits_of(second, 0)) & ~pole:
-                        found[i] = bits
+                        result[i] = bits
                     if pole:
                         poles[i] = pole
                 continue
@@ -58,17 +58,17 @@ class Roots:
             if bits & ROOT:
                 self.own[i] = ROOT << len(self.own)
                 bits += self.own[i] - ROOT
-            if found:
+            if result:
                 for k in operands:
-                    bits |= found.get(k, 0)
+                    bits |= result.get(k, 0)
                     pole |= poles.get(k, 0)
-                if operation == "div" and operands[1] in found:
+                if operation == "div" and operands[1] in result:
                     pole |= self._factors(g, operands[1])
                 if operation == "absorb":  # made to be finite there
                     bits, pole = bits | poles.get(operands[1], 0), poles.get(operands[0], 0)
                 bits &= ~pole
             if bits:
-                found[i] = bits
+                result[i] = bits
             if pole:
                 poles[i] = pole
         self._seen = len(g.nodes)
@@ -85,12 +85,12 @@ class Roots:
 
     def of_varying(self, active: Container[int]) -> dict[int, int]:
         """The bits of all nodes without those of roots that do not vary."""
-        live, seen, found = self.varying(active), self._seen, self.of
+        live, seen, result = self.varying(active), self._seen, self.of
         if live and live != sum(self.own.values()):
             if self._kept[:2] != (live, seen):
-                self._kept = live, seen, {i: bits & (live | ROUGH | JUMPS) for i, bits in found.items()}
-            found = self._kept[2]
-        return found if live else {}
+                self._kept = live, seen, {i: bits & (live | ROUGH | JUMPS) for i, bits in result.items()}
+            result = self._kept[2]
+        return result if live else {}
 
     def vanishes(self, g: Graph, i: int, w: int) -> bool:
         """Whether node i is a root that may vanish, without that making w infinite."""
@@ -150,31 +150,31 @@ def square_under_root(g: Graph, i: int) -> bool:
 
 
 def multiply(
-    g: Graph, found: dict[int, int], live: int, product: int, w: int, slope: int, r: int, factor: int | None = None
+    g: Graph, result: dict[int, int], live: int, product: int, w: int, slope: int, r: int, factor: int | None = None
 ) -> int:
     """w r' in the derivative of a product, of the nodes w and r with the slope r', with the bits of roots that vary.
 
     ``factor`` is the node whose bits w has, by default itself.
     """
-    bits = found.get(r, 0) & (live | ROUGH | JUMPS)
-    may_vanish = bits & found.get(product, 0) & live
-    return g.make("absorb", w, slope) if may_vanish and _tames(found, factor or w, bits) else g.mul(w, slope)
+    bits = result.get(r, 0) & (live | ROUGH | JUMPS)
+    may_vanish = bits & result.get(product, 0) & live
+    return g.make("absorb", w, slope) if may_vanish and _tames(result, factor or w, bits) else g.mul(w, slope)
 
 
-def _tames(found: dict[int, int], w: int, bits: int) -> bool:
+def _tames(result: dict[int, int], w: int, bits: int) -> bool:
     """Whether the derivative of a product exists where its factor w vanishes, the other has these bits."""
-    own = found.get(w, 0)
+    own = result.get(w, 0)
     return not own & JUMPS and not (own & ROUGH and bits & (ROUGH | JUMPS))
 
 
-def hides(g: Graph, found: dict[int, int], i: int) -> bool:
+def hides(g: Graph, result: dict[int, int], i: int) -> bool:
     """Whether the adjoint of a root may vanish through this node although there is no derivative."""
     operation, *operands = g.nodes[i]
-    bits = [found.get(k, 0) for k in operands]
+    bits = [result.get(k, 0) for k in operands]
     if max(bits) < ROOT or operation in ("add", "sub", "neg"):
         return False
     if operation in ("mul", "div"):
-        return not all(_tames(found, k, b) for k, b in zip(operands[::-1], bits, strict=True) if b >= ROOT)
+        return not all(_tames(result, k, b) for k, b in zip(operands[::-1], bits, strict=True) if b >= ROOT)
     return any(b & (ROUGH | JUMPS) for b in bits if b >= ROOT)
 
 
@@ -243,11 +243,11 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
         if operation == "mul":
             a, b = node[1], node[2]
             da, db = tangent(a), tangent(b)
-            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (found := half_power_slope(g, a, b)):
-                dc = tangent(found[0])
+            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (result := half_power_slope(g, a, b)):
+                dc = tangent(result[0])
                 if dc is None:
                     continue
-                d = multiply(g, rooted, live, i, found[1], dc, found[0], found[0])
+                d = multiply(g, rooted, live, i, result[1], dc, result[0], result[0])
             elif da is None:
                 if db is None:
                     continue
@@ -353,10 +353,10 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
                     adjoints[k] = add(adjoints[k], w) if k in adjoints else w
         elif operation == "mul":
             a, b = node[1], node[2]
-            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (found := half_power_slope(g, a, b)):
-                c = found[0]
+            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (result := half_power_slope(g, a, b)):
+                c = result[0]
                 if c in active:
-                    d = mul(w, found[1])
+                    d = mul(w, result[1])
                     adjoints[c] = add(adjoints[c], d) if c in adjoints else d
                 continue
             if a in active:

@@ -126,8 +126,8 @@ class Evaluator:
                 data.append(function(data[a]) if b < 0 else function(data[a], data[b], *rest))
                 for s in self._dead.get(k, ()):
                     data[s] = None
-        found = (data[s] for s in self._outputs)  # of a sum over pairs a list
-        return [x if isinstance(x, list) or np.ndim(x) else float(x) for x in found]
+        result = (data[s] for s in self._outputs)  # of a sum over pairs a list
+        return [x if isinstance(x, list) or np.ndim(x) else float(x) for x in result]
 
 
 def evaluate(outputs: Sequence[Expr], values: Mapping[str, Value]) -> list[Value]:

@@ -42,10 +42,10 @@ def with_bounds(
     if graph is None:
         return np.empty(0), np.empty(0)
     nodes = _values_of_nodes(graph, outputs, values)
-    found, bounds = _bounds_at(graph, outputs, nodes, values, independent=False)
+    result, bounds = _bounds_at(graph, outputs, nodes, values, independent=False)
     if likely:
         bounds = np.minimum(bounds, CHANCE * _bounds_at(graph, outputs, nodes, values, independent=True)[1])
-    return found, bounds
+    return result, bounds
 
 
 def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str, Value]) -> dict[int, Value]:
@@ -57,7 +57,11 @@ def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str,
 
 
 def _bounds_at(
-    graph: Graph, outputs: Sequence[Expr], found: Mapping[int, Value], values: Mapping[str, Value], independent: bool
+    graph: Graph,
+    outputs: Sequence[Expr],
+    collected: Mapping[int, Value],
+    values: Mapping[str, Value],
+    independent: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
     """What :func:`with_bounds` gives, from the values of all nodes; of independent roundings squares add up.
 
@@ -66,7 +70,7 @@ def _bounds_at(
     nodes = graph.nodes
     bounds: dict[int, Value] = {}
     with np.errstate(all="ignore"):
-        for i, y in found.items():
+        for i, y in collected.items():
             operation, *operands = nodes[i]
             if operation == "sym":
                 bounds[i] = 0.0
@@ -82,7 +86,7 @@ def _bounds_at(
             bound = bound * bound if independent else bound
             if row is not None and row.rates:  # a table or a function in C knows its value
                 try:
-                    x = [found[k] for k in operands]
+                    x = [collected[k] for k in operands]
                     for rate, k in zip(row.rates, operands, strict=True):
                         e = bounds[k]
                         if e if type(e) is float else np.any(e):
@@ -94,7 +98,7 @@ def _bounds_at(
     shape = (len(outputs), *np.broadcast_shapes(*(np.shape(x) for x in values.values())))
     result = np.empty(shape), np.empty(shape)
     for k, y in enumerate(outputs):
-        result[0][k], result[1][k] = found[y.id], bounds[y.id]
+        result[0][k], result[1][k] = collected[y.id], bounds[y.id]
     return result
 
 
@@ -114,8 +118,8 @@ def vanishes(
         return []
     of = [frozenset[int]()] * len(outputs) if pieces else _roots(graph, outputs)
     plain = [k for k, roots in enumerate(of) if roots is not None]
-    found = _vanish([outputs[k] for k in plain], within, unknown)
-    passed = {k for k, zero in zip(plain, found, strict=True) if zero}
+    result = _vanish([outputs[k] for k in plain], within, unknown)
+    passed = {k for k, zero in zip(plain, result, strict=True) if zero}
     for roots in {own for k in passed if (own := of[k])}:
         alike = [k for k in sorted(passed) if of[k] == roots]
         signed = [outputs[k] for k in alike]
@@ -130,7 +134,7 @@ def vanishes(
 def _vanish(flat: Sequence[Expr], within: float | None, unknown: bool) -> list[bool]:
     """What :func:`vanishes` gives, with the signs that roots have alone."""
     left = dict.fromkeys(range(len(flat)), 0)  # points passed
-    found, values = set[int](), dict[str, float]()
+    result, values = set[int](), dict[str, float]()
     random = np.random.default_rng(11)
     for draw in range(DRAWS):
         if not left:
@@ -149,25 +153,25 @@ def _vanish(flat: Sequence[Expr], within: float | None, unknown: bool) -> list[b
             done = [
                 k for k, flat_there in zip(done, _are_flat([flat[k] for k in done], values), strict=True) if flat_there
             ]
-        found |= set(done)
-    return [k in found or (unknown and k in left) for k in range(len(flat))]
+        result |= set(done)
+    return [k in result or (unknown and k in left) for k in range(len(flat))]
 
 
 def dependence(
     outputs: Sequence[Expr],
     at: dict[str, np.ndarray],
     moved: Mapping[str, np.ndarray],
-    given: Sequence[tuple[str, Expr]] = (),
+    raw: Sequence[tuple[str, Expr]] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Values and bounds (n, k) at k points, and (n, names) whether each output stays the same as a symbol moves alone.
 
-    ``moved`` has other values of symbols at the first points; names ``given`` stand for expressions and join ``at``.
+    ``moved`` has other values of symbols at the first points; names ``raw`` stand for expressions and join ``at``.
     """
     k, m = (len(next(iter(values.values()), ())) for values in (at, moved))
     wide = {name: np.concatenate([x, np.tile(x[:m], len(moved))]) for name, x in at.items()}
     for j, (name, x) in enumerate(moved.items()):
         wide[name][k + m * j : k + m * (j + 1)] = x
-    for name, expression in given:
+    for name, expression in raw:
         wide[name] = with_bounds([expression], wide)[0][0]
         at[name] = wide[name][:k]
     values, bounds = with_bounds(outputs, wide)
@@ -189,10 +193,10 @@ def _are_flat(outputs: Sequence[Expr], values: Mapping[str, float]) -> list[bool
     """Whether the slopes by each symbol are rounding, also of the terms' own slopes, which folded constants hide."""
     names = [sorted(symbols_of([x])) for x in outputs]
     slopes = [gradient(x, [x.graph.symbol(name) for name in own]) for x, own in zip(outputs, names, strict=True)]
-    found, bounds = with_bounds([slope for own in slopes for slope in own], values, likely=True)
+    result, bounds = with_bounds([slope for own in slopes for slope in own], values, likely=True)
     terms = [_slopes_of_terms(x, own, values) for x, own in zip(outputs, names, strict=True)]
     strict, likely = (np.concatenate([own[k] for own in terms]) if terms else np.empty(0) for k in (0, 1))
-    zero = iter(is_rounding(found, np.maximum(bounds, np.minimum(strict, CHANCE * likely))))
+    zero = iter(is_rounding(result, np.maximum(bounds, np.minimum(strict, CHANCE * likely))))
     return [bool(np.all([next(zero) for _ in own])) for own in names]
 
 
@@ -202,17 +206,17 @@ def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float])
     And the root of the sum of their squares.
     """
     graph = x.graph
-    found, nodes = _values_of_nodes(graph, [x], values), graph.nodes
-    weights, squares = dict.fromkeys(found, 0.0), dict.fromkeys(found, 0.0)
+    result, nodes = _values_of_nodes(graph, [x], values), graph.nodes
+    weights, squares = dict.fromkeys(result, 0.0), dict.fromkeys(result, 0.0)
     weights[x.id] = squares[x.id] = 1.0
     with np.errstate(all="ignore"):
-        for i in reversed(found):
+        for i in reversed(result):
             operation, *operands = nodes[i]
-            weight, square, y, row = weights[i], squares[i], found[i], OPERATIONS.get(operation)
+            weight, square, y, row = weights[i], squares[i], result[i], OPERATIONS.get(operation)
             if not weight or isinstance(y, list) or row is None or not row.rates:
                 continue
             try:
-                at = [found[k] for k in operands]
+                at = [result[k] for k in operands]
                 for rate, k in zip(row.rates, operands, strict=True):
                     slope = 1.0 if rate is unit else float(rate(y, *at))
                     weights[k] += slope * weight
@@ -232,20 +236,20 @@ def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 def terms_of(x: Expr) -> Expr:
     """The sum of the magnitudes of the terms of a sum of products, as an expression; |x| where nothing is added."""
     graph = x.graph
-    found: dict[int, Expr] = {}
+    result: dict[int, Expr] = {}
     for i in reachable(graph, [x.id]):
         operation, *operands = graph.nodes[i]
         if operation in ("add", "sub"):
-            found[i] = found[operands[0]] + found[operands[1]]
+            result[i] = result[operands[0]] + result[operands[1]]
         elif operation in ("mul", "absorb"):
-            found[i] = found[operands[0]] * found[operands[1]]
+            result[i] = result[operands[0]] * result[operands[1]]
         elif operation == "div":
-            found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
+            result[i] = result[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
         elif operation == "neg":
-            found[i] = found[operands[0]]
+            result[i] = result[operands[0]]
         else:
-            found[i] = graph.apply("abs", Expr(graph, i))
-    return found[x.id]
+            result[i] = graph.apply("abs", Expr(graph, i))
+    return result[x.id]
 
 
 def _roots(graph: Graph, outputs: Sequence[Expr]) -> list[frozenset[int] | None]:
@@ -279,10 +283,10 @@ def rounded_rotation(m: Mat3) -> Mat3:
     rows = [list(rounded_vector(row, 1.0)) for row in m]
     graph = m[0][0].graph
     for i, row in enumerate(rows):
-        found = [j for j, x in enumerate(row) if not x.is_zero]
-        alone = len(found) == 1 and all(other[found[0]].is_zero for k, other in enumerate(rows) if k != i)
-        if alone and (value := row[found[0]].value) is not None:
-            row[found[0]] = graph.constant(math.copysign(1.0, value))
+        result = [j for j, x in enumerate(row) if not x.is_zero]
+        single = len(result) == 1 and all(other[result[0]].is_zero for k, other in enumerate(rows) if k != i)
+        if single and (value := row[result[0]].value) is not None:
+            row[result[0]] = graph.constant(math.copysign(1.0, value))
     return tuple((x, y, z) for x, y, z in rows)  # type: ignore[return-value]
 
 

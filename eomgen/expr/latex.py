@@ -180,11 +180,11 @@ class _Reader:
     def whole(self) -> Node:
         if self.text.endswith("\\") and not self.text.endswith("\\\\"):
             raise NotationError(f"{self.shown} ends in a backslash", "take it away")
-        found = self.row("", False, 0)
+        result = self.row("", False, 0)
         if self.place < len(self.tokens):
             raise NotationError(f"{self.shown} has a '}}' without its '{{'", "write as many { as }")
-        if _shows(found):
-            return found
+        if _shows(result):
+            return result
         raise NotationError(f"{self.shown} shows nothing", "write a letter, for example \\theta_1")
 
     def peek(self) -> str:
@@ -298,12 +298,12 @@ class _Reader:
             self.place += 1
         if self.peek() in ("", "}", "_", "^", "'"):
             raise NotationError(f"{self.shown} has {of} with nothing after it", f"write {of}{{...}}")
-        found = self.single(text_mode, depth)
-        if isinstance(found, Group) and len(found.parts) == 1:
-            found = found.parts[0]  # the braces belong to the command
-        if not _shows(found):
+        result = self.single(text_mode, depth)
+        if isinstance(result, Group) and len(result.parts) == 1:
+            result = result.parts[0]  # the braces belong to the command
+        if not _shows(result):
             raise NotationError(f"{self.shown} has {of}{{}} around nothing", "leave it out")
-        return found
+        return result
 
 
 def head_of(node: Node) -> Node | None:
@@ -316,10 +316,10 @@ def head_of(node: Node) -> Node | None:
         return node if _is_word(node.body) else head_of(node.body)
     if isinstance(node, Scripts):
         return head_of(node.base)
-    found = [head for head in map(head_of, node.parts) if head is not None]
-    if len(found) > 1 and isinstance(found[0], Sign) and found[0].latex in ("\\Delta", "\\delta", "\\partial"):
-        return found[1]  # a change of what comes after it
-    return found[0] if found else None
+    result = [head for head in map(head_of, node.parts) if head is not None]
+    if len(result) > 1 and isinstance(result[0], Sign) and result[0].latex in ("\\Delta", "\\delta", "\\partial"):
+        return result[1]  # a change of what comes after it
+    return result[0] if result else None
 
 
 def _shows(node: Node) -> bool:
@@ -392,17 +392,17 @@ def _text(node: Node) -> str:
         case Fraction():
             return f"{_grouped(node.above)}/{_grouped(node.below)}"
         case Scripts():
-            found = _text(node.base)
+            result = _text(node.base)
             if node.sub is not None:
                 first, *others = _text(node.sub).replace(" ", "").split(",")
                 digits = [part.isascii() and part.isdecimal() for part in (first, *others)]
                 low = digits[0] and (len(digits) == 1 or not all(digits))  # l_1_2 is not l_1, then 2
-                found += "_".join([first.translate(SUBSCRIPTS) if low else f"_{first}", *others])
+                result += "_".join([first.translate(SUBSCRIPTS) if low else f"_{first}", *others])
             if node.sup is not None:
                 sup = _text(node.sup)
                 plain = sup.isascii() and sup.lstrip("+-").isdecimal()
-                found += sup.translate(SUPERSCRIPTS) if plain else sup if sup in RAISED else f"^{sup}"
-            return found + "'" * node.primes
+                result += sup.translate(SUPERSCRIPTS) if plain else sup if sup in RAISED else f"^{sup}"
+            return result + "'" * node.primes
 
 
 def _grouped(node: Node) -> str:
@@ -427,13 +427,13 @@ def html_form(node: Node, upright: bool = False) -> str:
         case Fraction():
             return f"{html_form(node.above, upright)}/{html_form(node.below, upright)}"
         case Scripts():
-            found = html_form(node.base, upright)
+            result = html_form(node.base, upright)
             if node.sub is not None:
-                found += f"<sub>{html_form(node.sub, upright)}</sub>"
+                result += f"<sub>{html_form(node.sub, upright)}</sub>"
             if node.sup is not None or node.primes:
                 sup = PRIME * node.primes + ("" if node.sup is None else html_form(node.sup, upright))
-                found += f"<sup>{sup}</sup>"
-            return found
+                result += f"<sup>{sup}</sup>"
+            return result
 
 
 def _html_accent(node: Accent, upright: bool) -> str:
@@ -517,21 +517,21 @@ def mathtext_form(node: Node) -> str:
         case Fraction():
             return rf"\frac{{{mathtext_form(node.above)}}}{{{mathtext_form(node.below)}}}"
         case Scripts():
-            found = _group(node.base)
+            result = _group(node.base)
             if node.sub is not None:
-                found += f"_{{{mathtext_form(node.sub)}}}"
+                result += f"_{{{mathtext_form(node.sub)}}}"
             if node.sup is not None:
-                found += f"^{{{mathtext_form(node.sup)}}}"
-            return found + "'" * node.primes
+                result += f"^{{{mathtext_form(node.sup)}}}"
+            return result + "'" * node.primes
 
 
 def _side_by_side(parts: Iterable[str]) -> str:
     """Parts in a row; a command ends before a letter."""
-    found = ""
+    result = ""
     for part in parts:
-        apart = part[:1].isalpha() and _COMMAND.search(found)
-        found += f" {part}" if apart else part
-    return found
+        apart = part[:1].isalpha() and _COMMAND.search(result)
+        result += f" {part}" if apart else part
+    return result
 
 
 def _group(node: Node) -> str:

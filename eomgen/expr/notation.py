@@ -56,8 +56,8 @@ def rate_of(name: str, times: int = 1) -> str:
 
 def split_rate(name: str) -> tuple[str, int]:
     """``u_ddot`` -> (``u``, 2)."""
-    found = _RATE.match(name)
-    return (found[1], len(found[2])) if found else (name, 0)
+    result = _RATE.match(name)
+    return (result[1], len(result[2])) if result else (name, 0)
 
 
 def literal(name: str, style: str = "mathrm") -> str:
@@ -71,14 +71,14 @@ def latex_of(name: str) -> str:
 
     Names of instances come before their dot and stand at the end: ``leg.theta1`` -> ``\theta_{1,\mathrm{leg}}``.
     """
-    if found := _OF_MARKER.match(name):
-        head = _MOTIONS[found[1]] if found[1] else found[2]
-        return _with(head, [*([found[2]] if found[1] else []), literal(found[3])])
-    if found := _ENTRY.match(name):
-        head, subs = _head_and_subs(found[1])
-        return _with(head, [*subs, found[2]])
-    if found := _CALL.match(name):
-        return f"{_with(*_head_and_subs(found[1]))}({literal(found[2]) if found[2] else ''})"
+    if result := _OF_MARKER.match(name):
+        head = _MOTIONS[result[1]] if result[1] else result[2]
+        return _with(head, [*([result[2]] if result[1] else []), literal(result[3])])
+    if result := _ENTRY.match(name):
+        head, subs = _head_and_subs(result[1])
+        return _with(head, [*subs, result[2]])
+    if result := _CALL.match(name):
+        return f"{_with(*_head_and_subs(result[1]))}({literal(result[2]) if result[2] else ''})"
     path, _, own = name.rpartition(".")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", name, re.ASCII) or not own.strip("_"):
         return literal(name)
@@ -105,12 +105,12 @@ def _first(word: str) -> tuple[str, list[str]]:
     """The symbol of the first part of a name, and subscripts that it brings."""
     if (letter := _letter(word)) is not None:
         return letter, []
-    if found := _PART.match(word):
-        head, subs = _first(found[1])
-        last = found[2] + found[3]
+    if result := _PART.match(word):
+        head, subs = _first(result[1])
+        last = result[2] + result[3]
         return head, [*subs, last]
-    if found := _AXES.match(word):
-        return (r"\omega" if found[1] == "w" else found[1]), [found[2]]
+    if result := _AXES.match(word):
+        return (r"\omega" if result[1] == "w" else result[1]), [result[2]]
     if len(word) == 2 and not word.isupper() and word not in _WORDS and word[0] != "d":
         return word[0], [word[1]]  # mc, kp, Fn, rA
     for size in (1, 2):  # thetaA, omegaAB
@@ -131,8 +131,8 @@ def _sub(part: str) -> str:
         return part
     if (letter := _letter(part)) is not None:
         return letter
-    if (found := _PART.match(part)) and not found[3] and (letter := _letter(found[1])) is not None:
-        return f"{letter}{found[2]}"
+    if (result := _PART.match(part)) and not result[3] and (letter := _letter(result[1])) is not None:
+        return f"{letter}{result[2]}"
     return literal(part)
 
 
@@ -205,23 +205,23 @@ class Notation:
         more = [name for name in dict.fromkeys(names) if name not in self._sources]
         if not more:
             return self
-        twin = copy(self)
-        twin.names, twin._used = (*self.names, *more), set(self._used)
-        twin._sources, twin._texts = dict(self._sources), dict(self._texts)
-        twin._keep_apart(more)
-        return twin
+        renamed = copy(self)
+        renamed.names, renamed._used = (*self.names, *more), set(self._used)
+        renamed._sources, renamed._texts = dict(self._sources), dict(self._texts)
+        renamed._keep_apart(more)
+        return renamed
 
     def with_latex(self, latex: Mapping[str, str]) -> Notation:
         """The same with other LaTeX for some of its names, which no other name has."""
         if not latex:
             return self
-        twin = copy(self)
-        twin.given = {**self.given, **latex}
-        twin._sources = {**self._sources, **latex}
-        twin._used = self._used | {
+        renamed = copy(self)
+        renamed.given = {**self.given, **latex}
+        renamed._sources = {**self._sources, **latex}
+        renamed._used = self._used | {
             (form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")
         }
-        return twin
+        return renamed
 
     def is_free(self, latex: str, with_numbers: bool = False) -> bool:
         r"""Whether no name is printed as a letter, ``M``; nor, on request, as the letter with numbers, ``M_{12}``."""

@@ -83,9 +83,9 @@ class _Init:
             self.kind.__init__ = _compile_init(self.kind, self.fields)
         return vars(self.kind)["__init__"]
 
-    def fill(self, record: Any, *given: Any, **named: Any) -> None:
+    def fill(self, record: Any, *raw: Any, **named: Any) -> None:
         """Set the fields; whatever does not fit is left to the compiled function, which says so."""
-        held, values, rest = vars(record), iter(given), dict(named)
+        held, values, rest = vars(record), iter(raw), dict(named)
         for field in self.fields:
             name = field.name
             value = next(values, dataclasses.MISSING)
@@ -94,11 +94,11 @@ class _Init:
                 if value is dataclasses.MISSING:
                     make: Any = field.default_factory
                     if make is dataclasses.MISSING:
-                        return self.compiled()(record, *given, **named)  # type: ignore[no-any-return]
+                        return self.compiled()(record, *raw, **named)  # type: ignore[no-any-return]
                     value = make()
             held[name] = value
-        if rest or len(given) > len(self.fields):
-            return self.compiled()(record, *given, **named)  # type: ignore[no-any-return]
+        if rest or len(raw) > len(self.fields):
+            return self.compiled()(record, *raw, **named)  # type: ignore[no-any-return]
         if hasattr(record, "__post_init__"):
             record.__post_init__()
         return None
@@ -115,7 +115,7 @@ def _compile_init(kind: type, fields: tuple[dataclasses.Field[Any], ...]) -> Any
     if hasattr(kind, "__post_init__"):
         body["__post_init__"] = None
     body |= {"__doc__": kind.__doc__ or kind.__name__, "__module__": kind.__module__}
-    twin: Any = dataclasses.dataclass(frozen=True, repr=False, eq=False)(type(kind.__name__, (), body))
-    made = vars(twin)["__init__"]
+    standard: Any = dataclasses.dataclass(frozen=True, repr=False, eq=False)(type(kind.__name__, (), body))
+    made = vars(standard)["__init__"]
     made.__qualname__ = f"{kind.__qualname__}.__init__"
     return made

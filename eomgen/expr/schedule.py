@@ -52,19 +52,19 @@ def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
     if graph is None:
         return Operations()
     nodes = graph.nodes
-    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)) if i not in skipped)
-    for name in found.keys() & graph.calls.keys():
-        n, counted = found.pop(name), graph.calls[name][0].counted(name)
+    result = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)) if i not in skipped)
+    for name in result.keys() & graph.calls.keys():
+        n, counted = result.pop(name), graph.calls[name][0].counted(name)
         if counted:
-            found[counted] += n
+            result[counted] += n
     bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
-        multiplications=found["mul"] + found["absorb"],
-        additions=found["add"] + found["sub"],
-        divisions=found["div"],
-        negations=found["neg"],
-        functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
-        choices={k: found[k] for k in sorted(found.keys() & bends)},
+        multiplications=result["mul"] + result["absorb"],
+        additions=result["add"] + result["sub"],
+        divisions=result["div"],
+        negations=result["neg"],
+        functions={k: result[k] for k in sorted(result.keys() - bends - arithmetic - LEAVES)},
+        choices={k: result[k] for k in sorted(result.keys() & bends)},
     )
 
 
@@ -229,19 +229,19 @@ def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, i
     out: list[int] = []
     for expression in expressions:
         graph = expression.graph
-        found: dict[int, int] = {}
+        result: dict[int, int] = {}
         for i in reachable(graph, [expression.id]):
-            kind, *given = graph.nodes[i]
+            kind, *raw = graph.nodes[i]
             if kind == "const":
                 code.append(("const", len(numbers), 0, 0))
-                numbers.append(float(given[0]))
+                numbers.append(float(raw[0]))
             elif kind == "sym":
-                code.append((*place(given[0]), 0, 0))
+                code.append((*place(raw[0]), 0, 0))
             elif kind in OPERATIONS:
-                a, b, c = (*(found[k] for k in given), 0, 0)[:3]
+                a, b, c = (*(result[k] for k in raw), 0, 0)[:3]
                 code.append((kind, a, b, c))
             else:
                 raise cannot("functions of the model cannot be used in an input over time")
-            found[i] = len(code) - 1
-        out.append(found[expression.id])
+            result[i] = len(code) - 1
+        out.append(result[expression.id])
     return code, numbers, out

@@ -143,9 +143,9 @@ class _Walk:
         called = self._called(part)
         if called is not None:
             return called
-        found = self.resolve(part)
-        if found is not None:
-            meaning = self.graph.lift(found).id
+        result = self.resolve(part)
+        if result is not None:
+            meaning = self.graph.lift(result).id
             return (), lambda g, ids: meaning
         return self._rewritten(part)
 
@@ -329,13 +329,13 @@ BUILD: dict[Any, Build] = {
 
 def _builders() -> dict[Any, Build]:
     """How each class of SymPy that has a meaning is built."""
-    found = dict(BUILD)
+    result = dict(BUILD)
     codegen = sys.modules.get("sympy.codegen.cfunctions")
     for row in OPERATIONS.values():
         cls = getattr(sympy, row.sympy_class, None) or getattr(codegen, row.sympy_class, None)
         if cls is not None:
-            found[cls] = partial(_chain if row.many else _operation, row.name)
-    return found
+            result[cls] = partial(_chain if row.many else _operation, row.name)
+    return result
 
 
 # -- to SymPy ----------------------------------------------------------------------------------------------------------

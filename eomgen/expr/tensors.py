@@ -45,18 +45,18 @@ def reduced(
     before: Callable[[Matrix, Matrix, int], None] = lambda A, columns, k: None,
 ) -> tuple[Matrix, Matrix]:
     """A matrix with columns on its right, upper triangular; ``before`` may change both before it takes out k."""
-    A, found, n = [list(row) for row in matrix], [list(column) for column in columns], len(matrix)
+    A, result, n = [list(row) for row in matrix], [list(column) for column in columns], len(matrix)
     for k in range(n):
-        before(A, found, k)
+        before(A, result, k)
         for i in range(k + 1, n):
             if A[i][k].is_zero:
                 continue
             ratio = A[i][k] / A[k][k]
             for j in range(k + 1, n):
                 A[i][j] = A[i][j] - ratio * A[k][j]
-            for x in found:
+            for x in result:
                 x[i] = x[i] - ratio * x[k]
-    return A, found
+    return A, result
 
 
 def substituted_back(A: Matrix, x: list[Expr]) -> list[Expr]:
@@ -115,8 +115,8 @@ def _axis_of(rotation: Mat3) -> int | None:
     """The coordinate axis that a rotation turns about by an angle; None for other rotations and quarter turns."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        alone = all(rotation[k][m].is_zero and rotation[m][k].is_zero for m in (i, j))
-        if alone and rotation[k][k].value == 1.0:
+        about_axis = all(rotation[k][m].is_zero and rotation[m][k].is_zero for m in (i, j))
+        if about_axis and rotation[k][k].value == 1.0:
             c, s = rotation[i][i], rotation[j][i]
             if c.is_zero or s.is_zero or c != rotation[j][j] or rotation[i][j] != -s:
                 return None

@@ -118,12 +118,12 @@ def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
     c = kinematics.constraints
     if kinematics.general_rates or not c.values or not kinematics.topology.cut:
         return c.jacobian
-    found = {label: row for k in kinematics.topology.cut for label, row in twist_rows(kinematics, k).items()}
-    if not found:
+    result = {label: row for k in kinematics.topology.cut for label, row in twist_rows(kinematics, k).items()}
+    if not result:
         return c.jacobian
     zero = kinematics.graph.zero
     rows = tuple(
-        tuple(zero if x.is_zero else other for x, other in zip(row, found.get(label, row), strict=True))
+        tuple(zero if x.is_zero else other for x, other in zip(row, result.get(label, row), strict=True))
         for label, row in zip(c.labels, c.jacobian, strict=True)
     )
     new, old = (count([*c.values, *(x for row in some for x in row)]).total for some in (rows, c.jacobian))
@@ -183,12 +183,12 @@ def shortest_gamma(kinematics: Kinematics) -> tuple[Expr, ...]:
     c = kinematics.constraints
     if kinematics.general_rates or c.stabilised is not None or not c.values or not kinematics.topology.cut:
         return c.gamma
-    found = end_gammas(kinematics)
-    if not found:
+    result = end_gammas(kinematics)
+    if not result:
         return c.gamma
     still = [rate.is_zero for rate in c.time_derivative]
     values = tuple(
-        found[label] if label in found and fixed and not x.is_zero else x
+        result[label] if label in result and fixed and not x.is_zero else x
         for label, x, fixed in zip(c.labels, c.gamma, still, strict=True)
     )
     shared = [*c.values, *(x for omega, _ in kinematics.twists for x in omega)]
@@ -216,12 +216,12 @@ def _gamma(kinematics: Kinematics, rates: Sequence[JointRates], cut: int) -> dic
     pose = poses.relative(spec.predecessor, spec.successor)
     moved = _relative(graph, pose.rotation, pose.position, first, second)
     values = true | put_pose(R_rate, r_rate, *moved[:2]) | put_pose(R_second, r_second, *moved[2:])
-    found = dict(zip(labels, substitute(bent, values), strict=True))
-    if found.keys() >= set(COMMON):  # these are along axes that both chains share
+    result = dict(zip(labels, substitute(bent, values), strict=True))
+    if result.keys() >= set(COMMON):  # these are along axes that both chains share
         outer, inner = poses.pair(spec.predecessor, spec.successor)
         gap = vec.sub(vec.times(inner.rotation, second.acceleration), vec.times(outer.rotation, first.acceleration))
-        found.update(zip(COMMON, gap, strict=True))
-    return {f"{spec.name}.{label}": x for label, x in found.items()}
+        result.update(zip(COMMON, gap, strict=True))
+    return {f"{spec.name}.{label}": x for label, x in result.items()}
 
 
 def _end(kinematics: Kinematics, rates: Sequence[JointRates], marker: Marker, spec: JointSpec) -> EndMotion:

@@ -65,18 +65,18 @@ def row_groups(kinematics: Kinematics) -> tuple[int, ...]:
     c, coupled = kinematics.constraints, set(kinematics.coupled)
     declared = {*c.labels, *c.vanishing}
     gaps: dict[str, int] = {}
-    found = []
+    result = []
     for label, kind, written in zip(c.labels, c.kinds, c.written, strict=True):
         joint, _, component = label.rpartition(".")
         if written or label in coupled:
-            found.append(ALL)
+            result.append(ALL)
         elif kind != "length":
-            found.append(UNIT)
+            result.append(UNIT)
         elif component in COMPONENTS and all(f"{joint}.{other}" in declared for other in COMPONENTS):
-            found.append(gaps.setdefault(joint, 1 + len(gaps)))
+            result.append(gaps.setdefault(joint, 1 + len(gaps)))
         else:
-            found.append(ALL)
-    return tuple(found)
+            result.append(ALL)
+    return tuple(result)
 
 
 def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
@@ -93,10 +93,10 @@ def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
     for group, own in zip(groups, known, strict=True):
         if group > 0:
             of_gaps.setdefault(group, set()).update(own)
-    found = [of_gaps[group] if group > 0 else own for group, own in zip(groups, known, strict=True)]
-    if kinematics.general_rates or all(len(own) == n for own in found):
+    result = [of_gaps[group] if group > 0 else own for group, own in zip(groups, known, strict=True)]
+    if kinematics.general_rates or all(len(own) == n for own in result):
         return ()
-    return tuple(tuple(sorted(own)) for own in found)
+    return tuple(tuple(sorted(own)) for own in result)
 
 
 # -- row scales --------------------------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
 def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     graph, c = kinematics.graph, kinematics.constraints
     sizes = {"length": kinematics.length_scale, "angle": graph.one}
-    found = [sizes[kind] for kind in c.kinds]
+    result = [sizes[kind] for kind in c.kinds]
     zero = graph.zero.id
     measured: dict[int, list[Expr]] = {}  # gradients whose lengths are looked at, by row
     for i, row in enumerate(c.jacobian):
@@ -141,39 +141,39 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         written = c.written[i]
         if not gradient or (not written and c.kinds[i] != "length"):
             continue
-        if written and _is_plain([x / found[i] for x in gradient]):
+        if written and _is_plain([x / result[i] for x in gradient]):
             continue
         if written and not _moves(kinematics, row):
-            found[i] = _coefficient_size(gradient)
+            result[i] = _coefficient_size(gradient)
             continue
         measured[i] = gradient
     if not measured:
-        return tuple(found)
+        return tuple(result)
     places = _places(kinematics)
     gradients = [[kinematics.length_scale], *measured.values()]
-    (usual, *at_first), (_, *at_second) = (_lengths_at(gradients, _numbers(kinematics, place)) for place in places)
+    (smallest, *at_first), (_, *at_second) = (_lengths_at(gradients, _numbers(kinematics, place)) for place in places)
     for (i, gradient), first, second in zip(measured.items(), at_first, at_second, strict=True):
         written = c.written[i]
         largest = max(first.value, second.value)
         terms = max(first.terms, second.terms)
         if written and largest <= TINY_ROOT and terms > 0.0:
-            found[i] = graph.constant(terms)
+            result[i] = graph.constant(terms)
         elif written and largest <= TINY_ROOT:  # nothing at the declared values of its factors
-            found[i] = _length(substitute(gradient, places[1]))
-        elif written or TINY_ROOT < largest < SMALL_LOOP * usual.value:
+            result[i] = _length(substitute(gradient, places[1]))
+        elif written or TINY_ROOT < largest < SMALL_LOOP * smallest.value:
             place = places[first.value < BY_CHANCE * second.value]
-            found[i] = _length(substitute(gradient, place))
+            result[i] = _length(substitute(gradient, place))
     lengths = dict(zip(measured, at_first, strict=True))
     for rows in _gaps(kinematics, measured):
         total = sum(lengths[i].value ** 2 for i in rows)
-        if total <= (LARGE_LOOP * usual.value) ** 2:
+        if total <= (LARGE_LOOP * smallest.value) ** 2:
             continue
         columns = len({k for i in rows for k, x in enumerate(c.jacobian[i]) if not x.is_zero})
-        if total > columns * (LARGE_LOOP * usual.value) ** 2:
+        if total > columns * (LARGE_LOOP * smallest.value) ** 2:
             typical = _length(substitute([x for i in rows for x in measured[i]], places[0])) * (1.0 / columns**0.5)
             for i in rows:
-                found[i] = typical
-    return tuple(found)
+                result[i] = typical
+    return tuple(result)
 
 
 def _gaps(kinematics: Kinematics, measured: Mapping[int, object]) -> list[list[int]]:
@@ -217,8 +217,8 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     """The initial values, and a place beside them where nothing vanishes by chance."""
     graph, m = kinematics.graph, kinematics.mechanism
     inputs = {graph.symbol(u.name): graph.constant(u.value) for u in m.inputs}
-    given = {**m.guess, **m.initial}
-    known = dict(zip(given, substitute(list(given.values()), inputs), strict=True))
+    raw = {**m.guess, **m.initial}
+    known = dict(zip(raw, substitute(list(raw.values()), inputs), strict=True))
     unit = {"length": kinematics.length_scale, "angle": graph.one}
     first: dict[Expr, Expr] = {}
     second: dict[Expr, Expr] = {}
@@ -295,9 +295,9 @@ class ConstraintFunctions:
         evaluate = self._compile([*values, *(e for _, _, e in held)])
 
         def call(q: Array, t: float) -> tuple[Array, Array]:
-            found, matrix = evaluate(q, t), np.zeros(shape)
-            matrix[rows, columns] = found[k:]
-            return found[:k], matrix
+            result, matrix = evaluate(q, t), np.zeros(shape)
+            matrix[rows, columns] = result[k:]
+            return result[:k], matrix
 
         return call
 
@@ -327,29 +327,29 @@ class ConstraintFunctions:
 
     def close(
         self,
-        given: Mapping[str, float],
+        raw: Mapping[str, float],
         guess: Mapping[str, float],
         restarts: int = RESTARTS,
         system: ConstraintSystem | None = None,
     ) -> Assembly:
         """Assemble with the given values exact, near the guess; with the rows of another system if there is one."""
         system = self.system if system is None else system
-        given, guess = system.settle(given), system.settle(guess)
-        start = system.with_values(system.with_values(self.neutral, guess), given)
+        raw, guess = system.settle(raw), system.settle(guess)
+        start = system.with_values(system.with_values(self.neutral, guess), raw)
         rough = system.wanted(guess)
         if rough is not None:  # come near the guessed coordinates of cut joints first
-            start = close(system.closure(given)._replace(equations=rough), start)[0]
-        return system.close(self._hinted(start, {**given, **guess}, system.t), given, restarts)
+            start = close(system.closure(raw)._replace(equations=rough), start)[0]
+        return system.close(self._hinted(start, {**raw, **guess}, system.t), raw, restarts)
 
-    def close_nearest(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    def close_nearest(self, raw: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
         """Assemble with the given values exact, on the branch that is nearest to the guess."""
-        settled = self.system.settle(given), self.system.settle(guess)
+        settled = self.system.settle(raw), self.system.settle(guess)
         known = {**settled[0], **settled[1]}
         if guess:
-            found = close_nearest(self.system, self.neutral, *settled, lambda q: self._hinted(q, known, self.system.t))
-            if found is not None:
-                return found
-        return self.close(given, guess)
+            result = close_nearest(self.system, self.neutral, *settled, lambda q: self._hinted(q, known, self.system.t))
+            if result is not None:
+                return result
+        return self.close(raw, guess)
 
     def _hinted(self, q: Array, known: Mapping[str, float], t: float) -> Array:
         """A position with the coordinates of contact points that nobody knows where they may be."""

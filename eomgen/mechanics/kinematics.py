@@ -131,12 +131,12 @@ class Kinematics:
     @cached_property
     def sampled(self) -> tuple[tuple[str, Expr], ...]:
         """Of each clock ``t``, the time of its next sample, then its states with their new values."""
-        given = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
-        found: list[tuple[str, Expr]] = []
+        raw = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
+        result: list[tuple[str, Expr]] = []
         for own in self.mechanism.clocks:
-            found.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
-            found += ((name, given[name]) for name in own.states)
-        return tuple(zip((name for name, _ in found), self.resolve([x for _, x in found]), strict=True))
+            result.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
+            result += ((name, raw[name]) for name in own.states)
+        return tuple(zip((name for name, _ in result), self.resolve([x for _, x in result]), strict=True))
 
     @property
     def euler_parameters(self) -> tuple[tuple[str, ...], ...]:
@@ -253,12 +253,12 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
 
 def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker, Marker, int]]:
     """Angular velocities that cut joints in Euler parameters would have as velocities."""
-    found = {}
+    result = {}
     for spec in (mechanism.joints[k] for k in topology.cut):
         for slot in spec.joint.quaternion_slots:
             for axis, name in enumerate(spec.velocities[slot.velocity : slot.velocity + 3]):
-                found[name] = (spec.predecessor, spec.successor, axis)
-    return found
+                result[name] = (spec.predecessor, spec.successor, axis)
+    return result
 
 
 def _loop_coordinates(
@@ -307,7 +307,7 @@ def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[Coordi
 
 def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrapping: Sequence[str]) -> None:
     """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it."""
-    found: list[tuple[str, str, str]] = []  # place, message, remedy
+    result: list[tuple[str, str, str]] = []  # place, message, remedy
     between = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
     until = "turn the markers (rpy) until z is the axis of the joint between them, or"
 
@@ -315,17 +315,17 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
         remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
         for name in names:
             message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
-            found.append((place, message, remedy))
+            result.append((place, message, remedy))
 
     for force in mechanism.forces:
         place, used = f"forces.{force.name}", _names_in(force)
         path = getattr(force, "path", None)
         if isinstance(path, Turn) and not path.is_exact(motion):
-            found.append((place, between, f"{until} give joint="))
+            result.append((place, between, f"{until} give joint="))
         for name in sorted(used & mechanism.quantities.keys()):
             if motion.may_wrap(mechanism.quantities[name]):
                 message = f"the z axes of the two markers of {name} do not stay in line, so the angle is not defined"
-                found.append((place, message, f"{until} use a coordinate"))
+                result.append((place, message, f"{until} use a coordinate"))
         if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)
         find_wrapping(place, [name for name in wrapping if name in used])
@@ -333,9 +333,9 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
         place = f"constraints.{constraint.name}"
         if not constraint.is_defined(motion):
             remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
-            found.append((place, between, remedy))
+            result.append((place, between, remedy))
         find_wrapping(place, sorted(set(wrapping) & _names_in(constraint)))
-    problems = [*find_undefined(mechanism, motion), *(mechanism.problem(*one, "EG-UNDEFINED") for one in found)]
+    problems = [*find_undefined(mechanism, motion), *(mechanism.problem(*one, "EG-UNDEFINED") for one in result)]
     if problems:
         raise ModelError(problems)
 

@@ -147,18 +147,18 @@ class AxisTurns:
     @cached_property
     def _others(self) -> dict[int, list[Marker]]:
         """The markers of joints on each body."""
-        found: dict[int, list[Marker]] = {}
+        result: dict[int, list[Marker]] = {}
         for spec in self.mechanism.joints:
             for marker in (spec.predecessor, spec.successor):
-                found.setdefault(marker.body, []).append(marker)
-        return found
+                result.setdefault(marker.body, []).append(marker)
+        return result
 
     @cached_property
     def _children(self) -> dict[int, list[Branch]]:
-        found: dict[int, list[Branch]] = {}
+        result: dict[int, list[Branch]] = {}
         for branch in self.topology.branches:
-            found.setdefault(branch.parent, []).append(branch)
-        return found
+            result.setdefault(branch.parent, []).append(branch)
+        return result
 
 
 def about_z(rotation: Mat3) -> bool:
@@ -178,11 +178,11 @@ def _growth(start: Vec3, end: Vec3) -> list[tuple[np.ndarray, float]]:
     random = np.random.default_rng(7)
     both = (*start, *end)
     old, new = random_point(both, random), random_point(both, random)
-    found = []
+    result = []
     for name in old:
         a, b = np.reshape(np.subtract(evaluate(both, old | {name: new[name]}), evaluate(both, old)), (2, 3))
-        found.append((b - a, float(np.abs(a).max() + np.abs(b).max())))
-    return found
+        result.append((b - a, float(np.abs(a).max() + np.abs(b).max())))
+    return result
 
 
 def _cost(angle: float, H: np.ndarray, seen: _Seen) -> float:
@@ -249,9 +249,9 @@ class Resolved:
         """As they are."""
         return cls(tuple(links), tuple(twists), rates, applied, (None,) * len(links))
 
-    def inertias(self, given: Sequence[SpatialInertia]) -> list[SpatialInertia]:
+    def inertias(self, raw: Sequence[SpatialInertia]) -> list[SpatialInertia]:
         """Inertias in link axes -> in these axes."""
-        return [i if axes is None else i.turned(axes) for i, axes in zip(given, self.axes, strict=True)]
+        return [i if axes is None else i.turned(axes) for i, axes in zip(raw, self.axes, strict=True)]
 
     def with_columns(self, links: Sequence[Link]) -> Resolved:
         """The same with other columns, of these links."""
@@ -423,8 +423,8 @@ def regroup(graph: Graph, links: tuple[Link, ...]) -> list[SpatialInertia]:
             continue
         inertias[k] = _less(inertias[k], part)
         if link.parent != GROUND:
-            carried = part.turned(link.turn) if link.columns else part.turned(link.joint_rotation).turned(link.turn)
-            inertias[link.parent] = inertias[link.parent].plus(carried.shifted(link.position))
+            turned_part = part.turned(link.turn) if link.columns else part.turned(link.joint_rotation).turned(link.turn)
+            inertias[link.parent] = inertias[link.parent].plus(turned_part.shifted(link.position))
     return inertias
 
 

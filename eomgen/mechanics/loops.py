@@ -255,14 +255,14 @@ class _Written(NamedTuple):
 def refuse_unusable(mechanism: Mechanism, motion: MarkerMotion, rows: Sequence[Row]) -> None:
     """Refuse equations that hold what has no rate here, or that are not linear in velocities."""
     by_name = {row.label.partition(".")[0]: row for row in rows}
-    asked = mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()
+    requested = mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()
     problems: list[Problem] = []
     for equation in mechanism.constraints:
         if isinstance(equation, Equation):
             row, named = by_name[equation.name], symbols_of([equation.expression])
-            own = _Written(equation, row, named, symbols_of([row.expression]), sorted(named & asked))
-            if found := _of_states(mechanism, own) or (own.elements and _of_laws(mechanism, motion, own)):
-                problems.append(mechanism.problem(f"constraints.{equation.name}.equation", *found))
+            own = _Written(equation, row, named, symbols_of([row.expression]), sorted(named & requested))
+            if result := _of_states(mechanism, own) or (own.elements and _of_laws(mechanism, motion, own)):
+                problems.append(mechanism.problem(f"constraints.{equation.name}.equation", *result))
     if problems:
         raise ModelError(problems)
 
@@ -293,10 +293,10 @@ def _of_laws(mechanism: Mechanism, motion: MarkerMotion, own: _Written) -> tuple
         return f"the rate of the input {moving[0]!r} {whose} is needed here and not known", remedy, "EG-REFERENCE"
     known = inputs | {p.name for p in mechanism.parameters} | {s.name for s in mechanism.states}
     known |= {str(x.node[1]) for x in (*state.q, *state.v, state.t)}
-    late = sorted(own.used - known)
-    if late:
+    unknown = sorted(own.used - known)
+    if unknown:
         remedy = f"{ALLOWED}, not accelerations and reactions"
-        return f"{late[0]!r} {whose} cannot be used here", remedy, "EG-REFERENCE"
+        return f"{unknown[0]!r} {whose} cannot be used here", remedy, "EG-REFERENCE"
     velocities = [v for v in state.v if v.node[1] in own.used]
     if not symbols_of(gradient(own.row.expression, velocities)).isdisjoint({str(v.node[1]) for v in velocities}):
         message = f"the equation is not linear in the velocities {whose}"

@@ -27,7 +27,7 @@ from .sparse_rows import SparseRows, choose_independent, independent_rows
 # -- constraints that hold nothing -------------------------------------------------------------------------------------
 
 
-IDLE = "holds nothing"  #: what is said of rows without slopes
+NO_SLOPES = "holds nothing"  #: what is said of rows without slopes
 TRIES = 12  #: directions in which a row is evaluated
 
 
@@ -77,7 +77,7 @@ def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
     )
 
 
-def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
+def refuse_rows_without_slopes(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
     """Refuse constraints of which no slope is found at any position, where they are all there is.
 
     Such are a relation whose factors cancel, and one that nothing proves to be an identity.  Rows of joints whose
@@ -92,10 +92,10 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
             continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
         if (written and slopes) or not all(vanishes(substitute(slopes, known))):
             used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
-            what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
+            what = f"{label} {NO_SLOPES} at all positions that were tried: its slopes are 0"
             remedy = "remove it"
             if used:
-                what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
+                what = f"{label} {NO_SLOPES} with the declared {', '.join(used)}: its factors are 0 or cancel"
                 remedy = "declare values with which it acts (they determine the degrees of freedom), or remove it"
             problems.append(
                 kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy, "EG-REDUNDANT")
@@ -119,12 +119,12 @@ def rate_candidates(rows: SparseRows, chosen: Sequence[int]) -> dict[int, float]
     m, n = rows.J.shape
     if not m or not chosen or n > LARGEST or (n - len(chosen)) * len(chosen) > LARGEST:
         return {}
-    found = dict.fromkeys(chosen, rows.conditioning(chosen))
+    result = dict.fromkeys(chosen, rows.conditioning(chosen))
     for k in range(n):
-        if k not in found:
+        if k not in result:
             swaps = ([k if i == old else i for i in chosen] for old in chosen)
-            found[k] = max(map(rows.conditioning, swaps))
-    ordered = sorted(found.items(), key=lambda item: -round(item[1], 6))
+            result[k] = max(map(rows.conditioning, swaps))
+    ordered = sorted(result.items(), key=lambda item: -round(item[1], 6))
     return {k: value for k, value in ordered if value > CHOSEN}
 
 
@@ -141,22 +141,22 @@ def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
     """Row -> name of its driver."""
     labels = functions.kinematics.constraints.labels
     names = {c.name for c in functions.kinematics.mechanism.constraints if isinstance(c, Driver)}
-    found = {i: label.partition(".")[0] for i, label in enumerate(labels)}
-    return {i: name for i, name in found.items() if name in names}
+    result = {i: label.partition(".")[0] for i, label in enumerate(labels)}
+    return {i: name for i, name in result.items() if name in names}
 
 
-def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+def close_driven(functions: ConstraintFunctions, raw: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
     """Assemble at t = 0; where that fails for the drivers, or more of them than freedoms contradict, say so."""
     drivers = driver_rows(functions)
     try:
-        found = functions.close_nearest(given, guess)
+        result = functions.close_nearest(raw, guess)
     except AssemblyError as error:
         if not drivers:
             raise
-        raise _explain(functions, drivers, given, guess, error) from None
+        raise _explain(functions, drivers, raw, guess, error) from None
     if drivers:
-        _refuse_contradictions(functions, drivers, found.q)
-    return found
+        _refuse_contradictions(functions, drivers, result.q)
+    return result
 
 
 def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
@@ -205,14 +205,14 @@ def _needed(
 def _explain(
     functions: ConstraintFunctions,
     drivers: Mapping[int, str],
-    given: Mapping[str, float],
+    raw: Mapping[str, float],
     guess: Mapping[str, float],
     error: AssemblyError,
 ) -> AssemblyError | ModelError:
     """Why the mechanism cannot be assembled with its drivers."""
     free = functions.with_rows(_others(functions, list(drivers)))
     try:
-        q = functions.close(given, guess, system=free).q
+        q = functions.close(raw, guess, system=free).q
     except AssemblyError as loops:
         return loops  # not for the drivers' sake
     with np.errstate(all="ignore"):
@@ -228,14 +228,14 @@ def _explain(
     kept, spare = _needed(functions, drivers, q)
     if spare:
         try:
-            q = functions.close(given, guess, system=functions.with_rows(kept)).q
+            q = functions.close(raw, guess, system=functions.with_rows(kept)).q
         except AssemblyError:
             pass
         else:
             return _contradiction(functions, drivers, spare, q, 0.0)
-    if given:
+    if raw:
         try:
-            functions.close({}, {**guess, **given})
+            functions.close({}, {**guess, **raw})
         except AssemblyError:
             pass
         else:
@@ -245,12 +245,12 @@ def _explain(
     gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
     rows = [functions.kinematics.constraints.labels[i] for i in drivers]
     text = str(error).partition("; check")[0]
-    words = (
+    phrases = (
         f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
         f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
         "reach, or a guess nearer to them"
     )
-    return AssemblyError(words, [*rows, *error.rows], code="EG-CONTRADICTION")
+    return AssemblyError(phrases, [*rows, *error.rows], code="EG-CONTRADICTION")
 
 
 def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
@@ -357,9 +357,9 @@ def initial_values(
     kinematics: Kinematics, values: Mapping[str, float | None], which: str = "initial"
 ) -> dict[str, float]:
     """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
-    given: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
-    numbers = Evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
-    return {name: float(x) for name, x in zip(given, numbers, strict=True)}
+    raw: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
+    numbers = Evaluator(list(raw.values()), tuple(values))(list(values.values())) if raw else []
+    return {name: float(x) for name, x in zip(raw, numbers, strict=True)}
 
 
 def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
@@ -384,23 +384,23 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     functions = ConstraintFunctions(kinematics, numbers)
     if missing:
         return replace(_find_mobility_assumed(functions, wanted), assumed=True, places=places)
-    given = initial_values(kinematics, numbers)
+    raw = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
-    positions = {n: x for n, x in given.items() if n in known}
-    found = close_driven(functions, positions, guess)
-    require_finite(functions, found.q)
-    later = follow_drivers(functions, found.q)
-    judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
-    _check_places(functions, found.q, places)
+    positions = {n: x for n, x in raw.items() if n in known}
+    result = close_driven(functions, positions, guess)
+    require_finite(functions, result.q)
+    later = follow_drivers(functions, result.q)
+    judged = _partition(functions, [result.q, *_probe(functions, result.q), *later], wanted)
+    _check_places(functions, result.q, places)
     rough = {name: value for name, value in guess.items() if name in known and name not in positions}
     return replace(
         judged,
         places=places,
-        residual=found.residual,
-        restarts=found.restarts,
-        guessed=differences(functions.system, found.q, rough),
-        guess_distance=found.distance if rough else 0.0,
+        residual=result.residual,
+        restarts=result.restarts,
+        guessed=differences(functions.system, result.q, rough),
+        guess_distance=result.distance if rough else 0.0,
     )
 
 
@@ -479,7 +479,7 @@ def _find_mobility_assumed(functions: ConstraintFunctions, wanted: Sequence[str]
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     """More assembled configurations, reached along the null space from q."""
-    found, scales = [], functions.system.scales
+    result, scales = [], functions.system.scales
     random = np.random.default_rng(1)
     if not functions.h:
         return [scales.move(q, random.uniform(0.2, 0.9, len(scales.q))) for _ in range(PROBES)]
@@ -495,8 +495,8 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
             closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
         except AssemblyError:
             continue
-        found.append(closed)
-    return found
+        result.append(closed)
+    return result
 
 
 def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], wanted: Sequence[str]) -> Mobility:
@@ -511,7 +511,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     r = max(ranks)
     refuse_squares(functions, q)
     if functions.m and not r:
-        refuse_idle_rows(kinematics, functions.values)
+        refuse_rows_without_slopes(kinematics, functions.values)
     n_dof = n - r
     if len(wanted) > n_dof and kinematics.general_rates and set(wanted) <= set(kinematics.names):
         wanted = ()  # coordinates, of which there may be more than velocities
@@ -556,8 +556,8 @@ def _position_ranks(
 ) -> list[int]:
     """Ranks of the constraints of positions; those known already of the same matrices are not found again."""
     known = {rows.J.tobytes(): rows.rank for rows in judged}
-    found = map(functions.place_jacobian, configurations)
-    return [known[key] if (key := J.tobytes()) in known else SparseRows(J).rank for J in found]
+    result = map(functions.place_jacobian, configurations)
+    return [known[key] if (key := J.tobytes()) in known else SparseRows(J).rank for J in result]
 
 
 def _choose(kinematics: Kinematics, judged: Sequence[SparseRows], r: int, wanted: Sequence[str]) -> tuple[int, ...]:

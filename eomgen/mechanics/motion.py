@@ -55,10 +55,10 @@ def part_of_reaction(motion: Placed, spec: JointSpec, quantity: ReactionQuantity
         return beyond_zero(vec.dot(force, force), sqrt)
     if quantity.part == "normal":  # across the z axis of the joint
         return beyond_zero(force[0] * force[0] + force[1] * force[1], sqrt)
-    found = vec.times(motion.rotation(spec.successor), moment if quantity.part.startswith("m") else force)
+    result = vec.times(motion.rotation(spec.successor), moment if quantity.part.startswith("m") else force)
     if quantity.axes is not None:
-        found = vec.transpose_times(motion.rotation(quantity.axes), found)
-    return found["xyz".index(quantity.part[-1])]
+        result = vec.transpose_times(motion.rotation(quantity.axes), result)
+    return result["xyz".index(quantity.part[-1])]
 
 
 def force_and_moment(motion: Placed, spec: JointSpec, wrench: Sequence[Expr]) -> tuple[Vec3, Vec3]:
@@ -78,12 +78,12 @@ def force_and_moment(motion: Placed, spec: JointSpec, wrench: Sequence[Expr]) ->
 
 def _spanned(graph: Graph, directions: Sequence[Vec3], work: Sequence[Expr]) -> Vec3:
     """The shortest vector that does the given work along directions."""
-    found = vec.zero(graph)
+    result = vec.zero(graph)
     if directions:
         gram = [[vec.dot(a, b) for b in directions] for a in directions]
         for factor, direction in zip(eliminate(gram, work), directions, strict=True):
-            found = vec.add(found, vec.scale(factor, direction))
-    return found
+            result = vec.add(result, vec.scale(factor, direction))
+    return result
 
 
 # -- loads of force elements on bodies ---------------------------------------------------------------------------------
@@ -105,10 +105,10 @@ def part_exerted(view: View, force: Force, quantity: WrenchQuantity) -> Expr | s
         return f"exerts nothing on {quantity.on.label.partition('.')[0]}"
     if quantity.part == "size":
         return beyond_zero(vec.dot(total, total), sqrt)
-    found = moment if quantity.part.startswith("m") else total
+    result = moment if quantity.part.startswith("m") else total
     if quantity.axes is not None:
-        found = vec.transpose_times(view.rotation(quantity.axes), found)
-    return found["xyz".index(quantity.part[-1])]
+        result = vec.transpose_times(view.rotation(quantity.axes), result)
+    return result["xyz".index(quantity.part[-1])]
 
 
 # -- entries of loads --------------------------------------------------------------------------------------------------
@@ -235,8 +235,8 @@ class Momentum:
                 columns[link.first + c] = vec.scale(self._share, vec.times(rotation, push))
             if link.parent != GROUND:
                 masses[link.parent] = masses[link.parent] + masses[k]
-                carried = vec.add(link.up(moments[k]), vec.scale(masses[k], link.position))
-                moments[link.parent] = vec.add(moments[link.parent], carried)
+                moved = vec.add(link.up(moments[k]), vec.scale(masses[k], link.position))
+                moments[link.parent] = vec.add(moments[link.parent], moved)
         return tuple(tuple(column[i] for column in columns) for i in range(3))
 
 
@@ -264,7 +264,7 @@ class MarkerMotion:
         self.coordinates = coordinates
         self.state = state
         self.turning = turning or {}
-        self.carried: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
+        self.known_reactions: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
         self._state_rates: dict[str, tuple[Expr, ...]] = {}
         self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
 
@@ -306,11 +306,11 @@ class MarkerMotion:
             [x for m, link in zip(moving, links, strict=True) for x in (*self.velocity(m), *self.twists[link][0])],
             self.state.along,
         )
-        found: dict[int, list[Expr]] = {}
+        result: dict[int, list[Expr]] = {}
         for k, (marker, link) in enumerate(zip(moving, links, strict=True)):
             x, y, z = rates[6 * k + 3 : 6 * k + 6]
-            found[id(marker)] = [*rates[6 * k : 6 * k + 3], *vec.times(self.poses.link(link).rotation, (x, y, z))]
-        return [x for marker in markers for x in found.get(id(marker), [self.graph.zero] * 6)]
+            result[id(marker)] = [*rates[6 * k : 6 * k + 3], *vec.times(self.poses.link(link).rotation, (x, y, z))]
+        return [x for marker in markers for x in result.get(id(marker), [self.graph.zero] * 6)]
 
     def turning_of(self, marker: Marker, own_axes: bool, rate: bool) -> Vec3:
         """Angular velocity (rad/s) of the marker's body or, with ``rate``, its angular acceleration (rad/s^2).
@@ -333,9 +333,9 @@ class MarkerMotion:
         It is where the relative rotation is about that axis at every configuration.
         """
         rotation = self.poses.relative(start, end).rotation
-        found = self.poses.turns(rotation, self.state.q)
-        if found is not None:
-            angle, terms = found
+        result = self.poses.turns(rotation, self.state.q)
+        if result is not None:
+            angle, terms = result
             rate = self.graph.zero
             for j, factor in terms:
                 rate = rate + factor * self.state.rates[j]
@@ -393,25 +393,25 @@ class MarkerMotion:
             if name in used:
                 mapping[self.graph.symbol(name)] = self._quantity(quantity)
         for name in mechanism.reaction_quantities.keys() & used:
-            found = self._carried(mechanism, mechanism.reaction_quantities[name])
-            if found != self.graph.symbol(name):
-                mapping[self.graph.symbol(name)] = found
-        for name in self.carried.keys() & used:
-            mapping[self.graph.symbol(name)] = self.carried[name]
+            result = self._joint_wrench(mechanism, mechanism.reaction_quantities[name])
+            if result != self.graph.symbol(name):
+                mapping[self.graph.symbol(name)] = result
+        for name in self.known_reactions.keys() & used:
+            mapping[self.graph.symbol(name)] = self.known_reactions[name]
         for name in (mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()) & used:
             mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
 
-    def _carried(self, mechanism: Mechanism, quantity: ReactionQuantity) -> Expr:
+    def _joint_wrench(self, mechanism: Mechanism, quantity: ReactionQuantity) -> Expr:
         """A part of a reaction in symbols of the joint's wrench, or a multiplier; their values once they are known."""
         if quantity.part:
             spec = next(spec for spec in mechanism.joints if spec.name == quantity.of)
-            found = part_of_reaction(self, spec, quantity)
-            mapping = self.derived_symbols(mechanism, symbols_of([found]))
+            result = part_of_reaction(self, spec, quantity)
+            mapping = self.derived_symbols(mechanism, symbols_of([result]))
         else:
-            found, mapping = self.graph.symbol(f"multiplier({quantity.of})"), {}
-        known = mapping | {self.graph.symbol(name): value for name, value in self.carried.items()}
-        return substitute([found], known)[0]
+            result, mapping = self.graph.symbol(f"multiplier({quantity.of})"), {}
+        known = mapping | {self.graph.symbol(name): value for name, value in self.known_reactions.items()}
+        return substitute([result], known)[0]
 
     def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
         """What a force element does, in terms of the tree; refused if it depends on itself."""
@@ -425,35 +425,35 @@ class MarkerMotion:
             )
         force = next(force for force in mechanism.forces if force.name == element)
         if exerted is not None:
-            found = self._exerted(mechanism, force, exerted)
+            result = self._exerted(mechanism, force, exerted)
         elif quantity.startswith(STATE_RATE):
             if element not in self._state_rates:  # of all at once: one sum over pairs gives many
                 self._state_rates[element] = force.state_rates(self)
-            found = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
+            result = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
         elif quantity == "power" or (measured := force.measured(self)) is None:
-            found = force.power(self)
+            result = force.power(self)
         else:
-            found = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
+            result = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
         self._open.append(name)
-        mapping = self.derived_symbols(mechanism, symbols_of([found]))
+        mapping = self.derived_symbols(mechanism, symbols_of([result]))
         self._open.pop()
-        return substitute([found], mapping)[0] if mapping else found
+        return substitute([result], mapping)[0] if mapping else result
 
     def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
-        found = part_exerted(self, force, quantity)
+        result = part_exerted(self, force, quantity)
         if force.is_rigid:
-            told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
+            message = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
             remedy = (
                 "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
                 "or give a normal law with a stiffness"
             )
-            raise ModelError([mechanism.problem(quantity.path, told, remedy, "EG-UNSUPPORTED")])
-        if isinstance(found, str):
+            raise ModelError([mechanism.problem(quantity.path, message, remedy, "EG-UNSUPPORTED")])
+        if isinstance(result, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"
             raise ModelError(
-                [mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy, "EG-UNSUPPORTED")]
+                [mechanism.problem(quantity.path, f"the element {force.name!r} {result}", remedy, "EG-UNSUPPORTED")]
             )
-        return found
+        return result
 
     def _quantity(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""
@@ -465,12 +465,12 @@ class MarkerMotion:
             # it wraps only where the motion is not plane
             angle, rate, _ = self.turn(quantity.origin or self._ground, quantity.marker)
             return rate if quantity.level else angle
-        found = self._vector(quantity.level, quantity.marker)
+        result = self._vector(quantity.level, quantity.marker)
         if quantity.origin is not None:
-            found = vec.sub(found, self._vector(quantity.level, quantity.origin))
+            result = vec.sub(result, self._vector(quantity.level, quantity.origin))
         if quantity.axes is not None:
-            found = vec.transpose_times(self.rotation(quantity.axes), found)
-        return found[quantity.axis]
+            result = vec.transpose_times(self.rotation(quantity.axes), result)
+        return result[quantity.axis]
 
     def may_wrap(self, quantity: Quantity) -> bool:
         """Whether it is an angle between axes that do not stay in line, which is not defined everywhere."""

@@ -57,30 +57,30 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     functions = ConstraintFunctions(kinematics, numbers)
     system, here = functions.system, np.array(mobility.q_reference)
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
-    given = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
+    raw = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
     kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
     guessed = [name for name in mechanism.guess if name in known and kinds.get(name) != "parameter"]
     held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
     at = dict(zip(kinematics.names, mobility.q_reference, strict=True))
     held |= {name: at[name] for name in mobility.independent if name in at}
-    equations, names = system.closure(system.settle({**held, **given})), [n for n in single if n in known]
+    equations, names = system.closure(system.settle({**held, **raw})), [n for n in single if n in known]
     values, _ = system.measure(names, here)
     sizes, angles = _sizes(functions, names)
-    found: list[Array] = []
-    told: list[dict[str, float]] = []
+    result: list[Array] = []
+    notes: list[dict[str, float]] = []
     for start in islice(starts(here, equations.free, system.scales, TRIES), TRIES // 2 + 1, None):  # those far away
         q, residual = close(equations, start)
         if not closed(residual) or not system.aligned(q):
             continue
         turned = system.measure(names, q)[0] - values
         gaps = np.where(angles, np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi, turned)
-        if largest(gaps / sizes) > BESIDE and all(largest((gaps - other) / sizes) > BESIDE for other in found):
+        if largest(gaps / sizes) > BESIDE and all(largest((gaps - other) / sizes) > BESIDE for other in result):
             k = int((np.abs(gaps / sizes) > BESIDE).argmax())
-            found.append(gaps)
-            told.append({names[k]: float(values[k] + gaps[k])})
-        if len(found) == MANY:
+            result.append(gaps)
+            notes.append({names[k]: float(values[k] + gaps[k])})
+        if len(result) == MANY:
             break
-    return told
+    return notes
 
 
 def _sizes(functions: ConstraintFunctions, names: list[str]) -> tuple[Array, Array]:
@@ -164,12 +164,12 @@ def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     numbers = {p.name: p.value for p in m.parameters} | {u.name: u.value for u in m.inputs}
     if mobility.assumed:
         return []
-    given = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
+    raw = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
     names = (*kinematics.names, *kinematics.loop_coordinates.names)
     kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))
     return [
         angle_in_degrees(name, x)
-        for name, x in given.items()
+        for name, x in raw.items()
         if kinds.get(name) in ("angle", "turn") and abs(x) > MOST_ANGLE
     ]
 
@@ -178,16 +178,16 @@ def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Coordinates that start beyond a declared limit of their joint."""
     m, at = kinematics.mechanism, dict(zip(kinematics.names, mobility.q_reference, strict=True))
     declared = [pair for j in m.joints for pair in zip(j.coordinates, j.limits, strict=False)]
-    found = []
+    result = []
     for name, limits in declared if m.limits_told and not mobility.assumed else ():
         for key, limit in limits:
             beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
             if beyond > SLACK * (1.0 + abs(limit)):
-                found.append(
+                result.append(
                     f"{name} starts at {at[name]:.6g}, beyond its {key} limit {limit:g}: joint limits are not "
                     "enforced; give another initial value, or add a force of type stop"
                 )
-    return found
+    return result
 
 
 def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
@@ -205,14 +205,14 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
 
 def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]:
     """Names of drivers whose value takes one of several branches, and by which functions."""
-    found = []
+    result = []
     for constraint in kinematics.mechanism.constraints:
         if isinstance(constraint, Driver):
             graph = constraint.value.graph
             operations = {graph.nodes[i][0] for i in reachable(graph, [constraint.value.id])}
             corners = [row.word for row in OPERATIONS.values() if row.kind == CHOICE and row.name in operations]
-            found += [(constraint.name, corners)] if corners else []
-    return found
+            result += [(constraint.name, corners)] if corners else []
+    return result
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
@@ -390,11 +390,11 @@ class MechanismReport:
         """On which branch the loops are closed."""
         if self.guessed:
             name, (guess, value) = next(iter(self.guessed.items()))
-            found = f"{name} = {value:.6g}, guessed {guess:.6g}"
+            result = f"{name} = {value:.6g}, guessed {guess:.6g}"
             if self.guess_distance > BESIDE:
-                return f"on the branch nearest to the guess, which is rough, off by {self.guess_distance:.2g}: {found}"
+                return f"on the branch nearest to the guess, which is rough, off by {self.guess_distance:.2g}: {result}"
             exact = self.guess_distance <= MEASURED
-            return "at the guess" if exact else f"on the branch nearest to the guess ({found})"
+            return "at the guess" if exact else f"on the branch nearest to the guess ({result})"
         if self.assembly_restarts:
             tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
             return f"after {tries}: one of several ways to close the loops; give a guess to choose one"
@@ -497,20 +497,20 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
 def _touched(kinematics: Kinematics, element: object) -> list[int]:
     """Bodies that a constraint element holds: those of its markers, and those that its coordinates move."""
     m = kinematics.mechanism
-    found: set[int] = set()
+    result: set[int] = set()
     moves = {n: (j.predecessor.body, j.successor.body) for j in m.joints for n in (*j.coordinates, *j.velocities)}
 
     for part in parts_of(element):
         if isinstance(part, Marker):
-            found.add(part.body)
+            result.add(part.body)
             continue
         for name in symbols_of([part]):
             if name in moves:
-                found.update(moves[name][1:])
+                result.update(moves[name][1:])
             elif name in m.quantities:
                 seen = m.quantities[name]
-                found.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
-    return sorted(found)
+                result.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
+    return sorted(result)
 
 
 def plane_axis(kinematics: Kinematics) -> int | None:

@@ -96,7 +96,7 @@ class Chain:
 
     def motions(self, n: int) -> Array:
         """Orthonormal directions (n - r, n) along which no row changes."""
-        found, open_ = np.zeros((n, self.size - self.rank)), np.empty((0, 0))
+        result, open_ = np.zeros((n, self.size - self.rank)), np.empty((0, 0))
         for turn, sizes, _, rest, new in reversed(self.steps):
             width = open_.shape[1] + len(rest) - len(open_)
             ahead = np.zeros((len(rest), width))
@@ -104,9 +104,9 @@ class Chain:
             ahead[len(open_) :, open_.shape[1] :] = np.eye(len(rest) - len(open_))
             open_ = turn[:, len(sizes) :] @ (rest @ ahead)
             here = len(turn) - len(new)
-            found[new, :width], open_ = open_[here:], open_[:here]
-        found[self.start, : open_.shape[1]] = open_
-        return found.T
+            result[new, :width], open_ = open_[here:], open_[:here]
+        result[self.start, : open_.shape[1]] = open_
+        return result.T
 
 
 class Decomposed:
@@ -120,9 +120,9 @@ class Decomposed:
 
     def motions(self, n: int) -> Array:
         """As of Chain."""
-        found = np.zeros((len(self.columns) - self.rank, n))
-        found[:, self.columns] = self._turned[self.rank :]
-        return found
+        result = np.zeros((len(self.columns) - self.rank, n))
+        result[:, self.columns] = self._turned[self.rank :]
+        return result
 
 
 def _svd(A: Array) -> tuple[Array, Array, Array]:
@@ -150,7 +150,7 @@ class SparseRows:
         )
 
     @cached_property
-    def _told(self) -> list[Chain | Decomposed]:
+    def _entries(self) -> list[Chain | Decomposed]:
         """Of each part its rank; none where some singular value may be on either side of the tolerance."""
         if self.J.size <= SMALL:
             return []
@@ -159,30 +159,30 @@ class SparseRows:
         most = float(np.sqrt(size.sum(axis=0).max(initial=0.0) * size.sum(axis=1).max(initial=0.0)))
         some = float(np.sqrt((self.J * self.J).sum(axis=1).max(initial=0.0)))
         most, least = (max(self.tolerance * x, UNMOVED) for x in (most, some))
-        told: list[Chain | Decomposed] = []
+        entries: list[Chain | Decomposed] = []
         for levels in self._parts:
             with np.errstate(all="ignore"):
                 chain = Chain(self.J, levels, least)
                 kept = chain.inverse_square * (CLEAR * most) ** 2 < 1.0
             if kept and chain.dropped * CLEAR**2 < least**2:
-                told.append(chain)
+                entries.append(chain)
                 continue
             part = Decomposed(self.J, levels, most)
             if ((part.sizes > least) & (part.sizes <= most)).any():
                 return []
-            told.append(part)
-        return told
+            entries.append(part)
+        return entries
 
     @cached_property
     def rank(self) -> int:
         """As :func:`~eomgen.base.ranks.rank` counts it."""
-        return sum(part.rank for part in self._told) if self._told else rank(self.J, self.tolerance).rank
+        return sum(part.rank for part in self._entries) if self._entries else rank(self.J, self.tolerance).rank
 
     def motions(self, rank: int) -> Array:
         """Orthonormal directions (n - rank, n) along which the rows change least: not at all, if it is their rank."""
-        if not self._told or rank != self.rank:
+        if not self._entries or rank != self.rank:
             return algebra.svd(self.J)[2][rank:]
-        return np.vstack([part.motions(self.J.shape[1]) for part in self._told])
+        return np.vstack([part.motions(self.J.shape[1]) for part in self._entries])
 
     @cached_property
     def _places(self) -> list[tuple[Indices, Indices]]:
@@ -255,8 +255,8 @@ def _eliminate(rows: SparseRows, rank: int, order: Sequence[int]) -> tuple[int, 
     front, by elimination in the motions that the rows allow.
     """
     if len(order) - rank < rank:
-        found = _pivots(rows.motions(rank), len(order) - rank, list(order))
-        return tuple(c for c in order if c in found)
+        result = _pivots(rows.motions(rank), len(order) - rank, list(order))
+        return tuple(c for c in order if c in result)
     dependent = _pivots(rows.J, rank, list(reversed(order)))
     return tuple(c for c in order if c not in dependent)
 
@@ -331,7 +331,7 @@ def diagonal_blocks(rows: Sequence[Mapping[int, object]]) -> list[DiagonalBlock]
     index: dict[int, int] = {}
     low: dict[int, int] = {}
     stack: list[int] = []
-    found: list[DiagonalBlock] = []
+    result: list[DiagonalBlock] = []
     for root in range(len(rows)):
         if root in index:
             continue
@@ -356,5 +356,5 @@ def diagonal_blocks(rows: Sequence[Mapping[int, object]]) -> list[DiagonalBlock]
                 cut = stack.index(i)
                 members = sorted(stack[cut:])
                 del stack[cut:]
-                found.append(DiagonalBlock(tuple(members), tuple(sorted(column_of[j] for j in members))))
-    return found
+                result.append(DiagonalBlock(tuple(members), tuple(sorted(column_of[j] for j in members))))
+    return result

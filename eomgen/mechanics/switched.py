@@ -66,24 +66,34 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
     mechanism = replace(kinematics.mechanism, constraints=(switch.constraint,))
     coupled = couple(mechanism, motion).rows
     refuse_unusable(mechanism, motion, coupled)
-    found = differentiate_constraints(graph, coupled, [], motion.state, kinematics.length_scale)
-    refuse_rows_of_time(mechanism, found, for_a_time=True)
-    apart = replace(kinematics, mechanism=mechanism, constraints=found, coupled=found.labels)
+    result = differentiate_constraints(graph, coupled, [], motion.state, kinematics.length_scale)
+    refuse_rows_of_time(mechanism, result, for_a_time=True)
+    apart = replace(kinematics, mechanism=mechanism, constraints=result, coupled=result.labels)
     on_bodies = JointWrenches(apart).element_rows()
     rate = kinematics.resolve([switch.stabilisation])[0]
     rows, along = [], dict[str, Expr]()
     markers: list[MarkerLoad] = []
-    for i, label in enumerate(found.labels):
+    for i, label in enumerate(result.labels):
         multiplier = graph.symbol(f"held[{label}]")
-        J, speed = found.jacobian[i], found.velocity[i]
-        if i < len(found.values):
-            rest = found.gamma[i] + 2.0 * rate * speed + rate * rate * found.values[i]
+        J, speed = result.jacobian[i], result.velocity[i]
+        if i < len(result.values):
+            rest = result.gamma[i] + 2.0 * rate * speed + rate * rate * result.values[i]
         else:
-            rest = found.gamma[i] + rate * speed
+            rest = result.gamma[i] + rate * speed
         row = [_while_closed(switch, x) for x in (*J, speed, rest)]
-        value = found.values[i] if i < len(found.values) else graph.zero
+        value = result.values[i] if i < len(result.values) else graph.zero
         errors = (where(switch.holds, value, 0.0), where(switch.holds, speed, 0.0))
-        own = (label, switch.state, switch.holds, tuple(row[:-2]), row[-2], row[-1], multiplier, errors, found.kinds[i])
+        own = (
+            label,
+            switch.state,
+            switch.holds,
+            tuple(row[:-2]),
+            row[-2],
+            row[-1],
+            multiplier,
+            errors,
+            result.kinds[i],
+        )
         rows.append(SwitchedRow(*own))
         for body, D in on_bodies[label].items():
             markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))

@@ -121,18 +121,18 @@ class _Depths:
         self.depth = {GROUND: 0}
         for b in branches:
             self.depth[b.body] = self.depth[b.parent] + 1
-        self.carried = dict.fromkeys(self.above, 1)  #: bodies that hang on each, itself included
+        self.outer_count = dict.fromkeys(self.above, 1)  #: bodies that hang on each, itself included
         for b in reversed(branches):
             if b.parent != GROUND:
-                self.carried[b.parent] += self.carried[b.body]
+                self.outer_count[b.parent] += self.outer_count[b.body]
 
     def _down_to(self, body: int, top: int) -> list[int]:
         """Bodies on the way from below ``top`` to ``body``."""
-        found = []
+        result = []
         while body != top:
-            found.append(body)
+            result.append(body)
             body = self.above[body].parent
-        return found[::-1]
+        return result[::-1]
 
     def changes(self, cut: int) -> dict[int, int]:
         """By each tree joint on the loop that joint ``cut`` closes: how much longer all is if it is cut instead."""
@@ -142,17 +142,17 @@ class _Depths:
             if self.depth[top] < self.depth[other]:
                 top, other = other, top
             top = self.above[top].parent
-        found: dict[int, int] = {}
+        result: dict[int, int] = {}
         for here, there in ((a, b), (b, a)):
             side, far = self._down_to(here, top), self.depth[there]
-            alone = [self.carried[x] for x in side]
+            single = [self.outer_count[x] for x in side]
             for k in range(len(side) - 1):
-                alone[k] -= self.carried[side[k + 1]]
+                single[k] -= self.outer_count[side[k + 1]]
             change = 0
             for k in reversed(range(len(side))):  # what is below the joint of this body hangs on the other side then
-                change += alone[k] * (far + len(side) - k - self.depth[side[k]])
-                found[self.above[side[k]].joint] = change
-        return found
+                change += single[k] * (far + len(side) - k - self.depth[side[k]])
+                result[self.above[side[k]].joint] = change
+        return result
 
 
 def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[Branch]) -> None:
@@ -178,9 +178,9 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
     rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
-    given = rates.intersection(mechanism.initial)
-    given |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
-    rank = [_rank(spec, independent, given) for spec in joints]
+    raw = rates.intersection(mechanism.initial)
+    raw |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
+    rank = [_rank(spec, independent, raw) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
     tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)
@@ -273,10 +273,10 @@ class MotionSymbols:
 def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
     """The coordinates and velocities of the tree, in its order."""
     if mechanism.given is not None:
-        given, n = mechanism.given, len(mechanism.given.velocities)
-        rates = () if given.rates == tuple(map(mechanism.graph.symbol, given.velocities)) else given.rates
-        angles, turns = ("angle",) * len(given.coordinates), ("angle",) * n
-        return StateLayout(given.coordinates, angles, given.velocities, turns, tuple(range(-1, n - 1)), given=rates)
+        raw, n = mechanism.given, len(mechanism.given.velocities)
+        rates = () if raw.rates == tuple(map(mechanism.graph.symbol, raw.velocities)) else raw.rates
+        angles, turns = ("angle",) * len(raw.coordinates), ("angle",) * n
+        return StateLayout(raw.coordinates, angles, raw.velocities, turns, tuple(range(-1, n - 1)), given=rates)
     names_list: list[str] = []
     kinds_list: list[str] = []
     velocity_names: list[str] = []
@@ -357,8 +357,8 @@ def _radius_of_gyration(mechanism: Mechanism, size: Expr) -> float:
     if not entries or any(p.value is None for p in mechanism.parameters):
         return 0.0
     numbers = Evaluator([size, *entries], [p.name for p in mechanism.parameters])
-    declared, *found = numbers([p.value for p in mechanism.parameters])
-    mass, inertia = sum(found[::4]), sum(found) - sum(found[::4])
+    declared, *result = numbers([p.value for p in mechanism.parameters])
+    mass, inertia = sum(result[::4]), sum(result) - sum(result[::4])
     radius = float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0
     return radius if declared < HAIR * radius or all(x.node[0] == "const" for x in entries) else 0.0
 

@@ -88,11 +88,11 @@ def virtual_power(kinematics: Kinematics, loads: Iterable[MarkerLoad | Coordinat
 
 def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
     """Inertias of drives on coordinates of the tree, by the index of the velocity."""
-    found: dict[int, Expr] = {}
+    result: dict[int, Expr] = {}
     for spec in kinematics.mechanism.joints:
         if spec.armature is not None and spec.coordinates[0] in kinematics.velocity_labels:
-            found[kinematics.velocity_labels.index(spec.coordinates[0])] = spec.armature
-    return found
+            result[kinematics.velocity_labels.index(spec.coordinates[0])] = spec.armature
+    return result
 
 
 def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
@@ -248,8 +248,8 @@ class JointWrenches:
         """A wrench on S about S, and its opposite on P, about the origins of the two bodies."""
         point = self.kinematics.poses.marker(spec.successor).position
         first, second = spec.predecessor.body, spec.successor.body
-        found = {body: self._at_body(body, point, gradient) for body in (second, first) if body != GROUND}
-        return {body: tuple(-x for x in six) if body == first else six for body, six in found.items()}
+        result = {body: self._at_body(body, point, gradient) for body in (second, first) if body != GROUND}
+        return {body: tuple(-x for x in six) if body == first else six for body, six in result.items()}
 
     # -- the kernels ----------------------------------------------------------------------------------------------
     @cached_property
@@ -322,14 +322,14 @@ class JointWrenches:
         every = [s for six in symbols for s in six]
         entries = jacobian([row.expression for row in rows], every)
         at_rest = dict.fromkeys(every, graph.zero)
-        found: dict[str, dict[int, Row6]] = {}
+        result: dict[str, dict[int, Row6]] = {}
         for k, row in enumerate(rows):
-            found[row.label] = {}
+            result[row.label] = {}
             for b in range(len(symbols)):
                 six = [entries.get((k, 6 * b + j), graph.zero) for j in range(6)]
                 if not all(x.is_zero for x in six):
-                    found[row.label][b] = tuple(substitute(six, at_rest))
-        return found
+                    result[row.label][b] = tuple(substitute(six, at_rest))
+        return result
 
     def _pushed_twists(self, moves: list[tuple[Vec3, Vec3]]) -> list[Twist]:
         """Twists of the links with a velocity added to each body alone."""
@@ -420,12 +420,12 @@ def joint_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) ->
     for label, multiplier in multipliers.items():
         for body, row in wrenches.on_bodies.get(label, {}).items():
             total[body] = [x + multiplier * d for x, d in zip(total[body], row, strict=True)]
-    found: dict[str, Row6] = {}
+    result: dict[str, Row6] = {}
     for branch in reversed(kinematics.topology.branches):
         spec = wrenches.specs[branch.joint]
         here, at = total[branch.body], wrenches.origins[branch.body]
         moved = _about(here, at, poses.marker(spec.successor).position)
-        found[spec.name] = tuple(-x for x in moved) if branch.reversed else moved
+        result[spec.name] = tuple(-x for x in moved) if branch.reversed else moved
         if branch.parent != GROUND:
             base = total[branch.parent]
             lifted = _about(here, at, wrenches.origins[branch.parent])
@@ -435,11 +435,11 @@ def joint_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) ->
         for label, gradient in joint.rows:
             if label in multipliers:
                 loaded = [x - multipliers[label] * d for x, d in zip(loaded, gradient, strict=True)]
-        found[joint.spec.name] = tuple(loaded)
+        result[joint.spec.name] = tuple(loaded)
     turned: dict[str, Row6] = {}
     for spec in wrenches.specs:
-        if spec.name in found:
-            axes, wrench = poses.marker(spec.successor).rotation, found[spec.name]
+        if spec.name in result:
+            axes, wrench = poses.marker(spec.successor).rotation, result[spec.name]
             force = vec.transpose_times(axes, (wrench[0], wrench[1], wrench[2]))
             turned[spec.name] = (*force, *vec.transpose_times(axes, (wrench[3], wrench[4], wrench[5])))
     return turned
@@ -538,20 +538,20 @@ def _inertia(body: Body) -> list[Expr]:
 
 def near_pairs(kinematics: Kinematics) -> list[Expr]:
     """The list of each contact, one after the other."""
-    found = [x for force in kinematics.mechanism.forces for x in force.near(kinematics.motion)]
-    return kinematics.resolve(found)
+    result = [x for force in kinematics.mechanism.forces for x in force.near(kinematics.motion)]
+    return kinematics.resolve(result)
 
 
 def motion_axes(kinematics: Kinematics) -> list[Expr]:
     """Per velocity the angular velocity that it causes (3), and the velocity (3) of the point at the origin."""
-    found = [kinematics.graph.zero] * (6 * len(kinematics.v))
+    result = [kinematics.graph.zero] * (6 * len(kinematics.v))
     for k, link in enumerate(kinematics.links):
         place = kinematics.poses.link(k)
         for n, (angular, linear) in enumerate(link.columns, link.first):
             turning = vec.times(place.rotation, angular)
             moving = vec.add(vec.times(place.rotation, linear), vec.cross(place.position, turning))
-            found[6 * n : 6 * n + 6] = [*turning, *moving]
-    return kinematics.resolve(found)
+            result[6 * n : 6 * n + 6] = [*turning, *moving]
+    return kinematics.resolve(result)
 
 
 def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
@@ -592,7 +592,7 @@ def _by_motion(kinematics: Kinematics, forces: Sequence[Force]) -> dict[str, lis
     """Velocities and states on which what is near depends, by contact."""
     moving = (*kinematics.velocity_names, *kinematics.state_names)
     used = {force.name: symbols_of(kinematics.resolve(list(force.near(kinematics.motion)))) for force in forces}
-    return {name: found for name, of in used.items() if (found := [one for one in moving if one in of])}
+    return {name: result for name, of in used.items() if (result := [one for one in moving if one in of])}
 
 
 def _name(kinematics: Kinematics, body: int) -> str:

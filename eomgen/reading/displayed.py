@@ -131,7 +131,7 @@ class ReadingView(Displayed):
     def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
         self.source: Displayed = source.source if isinstance(source, ReadingView) else source
         self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbol, self._put_in = symbols, tuple(given for given in values if given)
+        self._symbol, self._put_in = symbols, tuple(raw for raw in values if raw)
 
     def fresh(self) -> Derived:
         return self.source.fresh()
@@ -155,17 +155,17 @@ class ReadingView(Displayed):
             return self.source.explain(level)  # type: ignore[attr-defined]
         k = self.kinematics
         known = {*k.parameter_names, *k.input_names}
-        moving = sorted({name for given in self._put_in for name in given}.difference(known))
+        moving = sorted({name for raw in self._put_in for name in raw}.difference(known))
         strange = sorted({*self.names_substituted}.difference(known))
         if moving:
             raise UnavailableError(
-                f"explain has no view with {self._told}: the steps of a solution differentiate by {', '.join(moving)}; "
+                f"explain has no view with {self._view}: the steps of a solution differentiate by {', '.join(moving)}; "
                 "put in values of parameters and inputs alone, and give those of coordinates and velocities by "
                 "model.initial, which the calculation line by line begins with"
             )
         if strange:
             raise UnavailableError(
-                f"explain has no view with {self._told}: the model has no parameter or input {', '.join(strange)}, so "
+                f"explain has no view with {self._view}: the model has no parameter or input {', '.join(strange)}, so "
                 "that the compiled module cannot be compared with it; put in numbers or parameters of the model"
             )
         return self.source.explained(self.in_plain_symbols(), level)  # type: ignore[attr-defined]

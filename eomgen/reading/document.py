@@ -25,18 +25,18 @@ _PARTS = re.compile(r"(\$[^$]+\$|`[^`]+`)")
 
 def written(text: Text, math: Callable[[Formula], str], name: Callable[[str], str], plain: Callable[[str], str]) -> str:
     """A text whose formulas, names and other pieces are written so."""
-    found = ""
+    result = ""
     for piece in (text,) if isinstance(text, str) else text:
         for part in _PARTS.split(visible(piece)) if isinstance(piece, str) else (piece,):
             if not isinstance(part, str):
-                found += math(part)
+                result += math(part)
             elif part[:1] == "$" and len(part) > 2:
-                found += math(Letter(part[1:-1]))
+                result += math(Letter(part[1:-1]))
             elif part[:1] == "`" and len(part) > 2:
-                found += name(part[1:-1])
+                result += name(part[1:-1])
             elif part:
-                found += plain(part)
-    return found
+                result += plain(part)
+    return result
 
 
 class Sentence(NamedTuple):
@@ -69,7 +69,7 @@ class DrawnPicture(NamedTuple):
 
     png: bytes
     width: int
-    words: str
+    phrase: str
 
 
 class Folded(NamedTuple):
@@ -131,12 +131,12 @@ _TEX_SPECIAL = re.compile(r"[\\{}$&#%_^~<>]")
 
 def write_tex(title: str, sections: Sequence[Section], names: Notation, picture: str | None = PICTURE) -> str:
     """A LaTeX document; its pictures are the file ``picture`` beside it, left out where None."""
-    found = [_HEAD, rf"\title{{{_tex_text(title, names)}}}\date{{}}", r"\begin{document}", r"\maketitle"]
+    result = [_HEAD, rf"\title{{{_tex_text(title, names)}}}\date{{}}", r"\begin{document}", r"\maketitle"]
     for section in sections:
         command = "section" if section.level == 1 else "subsection"
-        found.append(rf"\{command}*{{{_tex_text(section.title, names)}}}")
-        found += [_tex_piece(piece, names, picture) for piece in section.pieces]
-    return "\n".join([*found, r"\end{document}", ""])
+        result.append(rf"\{command}*{{{_tex_text(section.title, names)}}}")
+        result += [_tex_piece(piece, names, picture) for piece in section.pieces]
+    return "\n".join([*result, r"\end{document}", ""])
 
 
 def tex_formula(formula: FormulaLine | Row, names: Notation) -> str:
@@ -157,7 +157,7 @@ def tex_formula(formula: FormulaLine | Row, names: Notation) -> str:
 
 def escaped(text: str) -> str:
     """Plain text with the signs of LaTeX taken as letters; characters beyond ASCII as question marks."""
-    plain = _TEX_SPECIAL.sub(lambda found: _ESCAPES[found[0]], text)
+    plain = _TEX_SPECIAL.sub(lambda result: _ESCAPES[result[0]], text)
     return plain.encode("ascii", "replace").decode()
 
 
@@ -301,7 +301,7 @@ def html(piece: Piece, names: Notation, look: Look) -> str:
             )
             return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
         case DrawnPicture():
-            return f"<p>{image_html(piece.png, 'png', piece.width, piece.words)}</p>"
+            return f"<p>{image_html(piece.png, 'png', piece.width, piece.phrase)}</p>"
         case Folded():
             inner = "\n".join(html(part, names, look) for part in piece.pieces)
             title = _html_text(piece.title, names, look)
@@ -336,11 +336,11 @@ _MARKDOWN_SPECIAL = re.compile(r"([\\*_#<>|\[\]$])")
 
 def write_markdown(title: str, sections: Sequence[Section], names: Notation) -> str:
     """A Markdown document; pictures are in it."""
-    found = [f"# {_markdown_text(title, names)}"]
+    result = [f"# {_markdown_text(title, names)}"]
     for section in sections:
-        found.append(f"{'#' * (section.level + 1)} {_markdown_text(section.title, names)}")
-        found += [_markdown_piece(piece, names) for piece in section.pieces]
-    return "\n\n".join(found) + "\n"
+        result.append(f"{'#' * (section.level + 1)} {_markdown_text(section.title, names)}")
+        result += [_markdown_piece(piece, names) for piece in section.pieces]
+    return "\n\n".join(result) + "\n"
 
 
 def _markdown_text(text: Text, names: Notation) -> str:
@@ -361,7 +361,7 @@ def _markdown_piece(piece: Piece, names: Notation) -> str:
             return "\n".join(f"| {' | '.join(one)} |" for one in cells)
         case DrawnPicture():
             data = b64encode(piece.png).decode()
-            return f"![{_markdown_text(piece.words, names)}](data:image/png;base64,{data})"
+            return f"![{_markdown_text(piece.phrase, names)}](data:image/png;base64,{data})"
         case Folded():
             inner = "\n\n".join(_markdown_piece(part, names) for part in piece.pieces)
             title = written(piece.title, lambda x: html_text(latex(x, names)), html_text, html_text)

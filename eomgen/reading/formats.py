@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import sympy
 from sympy.core.function import AppliedUndef
-from sympy.printing.c import reserved_words as c_words
+from sympy.printing.c import reserved_words as c_keywords
 from sympy.printing.mathematica import MCodePrinter
 
 from ..errors import UnavailableError
@@ -22,12 +22,14 @@ from ..toolchain.targets import FORMATS
 from .readable import Readable
 from .writers import COLUMNS, equations_text, latex_formulas
 
-_MATLAB_WORDS = "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
-_MATLAB_WORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
-_JULIA_WORDS = (
+_MATLAB_KEYWORDS = (
+    "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
+)
+_MATLAB_KEYWORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
+_JULIA_KEYWORDS = (
     "baremodule begin break catch const continue do else elseif end export false finally for function global "
 )
-_JULIA_WORDS += (
+_JULIA_KEYWORDS += (
     "if import let local macro module quote return struct true try using while pi im M f sin cos tan exp log"
 )
 
@@ -53,13 +55,15 @@ class Language(NamedTuple):
 
 LANGUAGES = {
     "sympy": Language(sympy.sstr, "#", frozenset([*keyword.kwlist, *dir(sympy), "sympy", "M", "f"])),
-    "matlab": Language(sympy.octave_code, "%", frozenset(_MATLAB_WORDS.split())),
-    "octave": Language(sympy.octave_code, "%", frozenset([*_MATLAB_WORDS.split(), "endfunction", "endif", "do"])),
-    "julia": Language(sympy.julia_code, "#", frozenset(_JULIA_WORDS.split())),
+    "matlab": Language(sympy.octave_code, "%", frozenset(_MATLAB_KEYWORDS.split())),
+    "octave": Language(sympy.octave_code, "%", frozenset([*_MATLAB_KEYWORDS.split(), "endfunction", "endif", "do"])),
+    "julia": Language(sympy.julia_code, "#", frozenset(_JULIA_KEYWORDS.split())),
     "mathematica": Language(
         _Mathematica().doprint, "", frozenset(["C", "D", "E", "I", "K", "N", "O", "Pi", "Sin", "Cos", "M", "f"])
     ),
-    "c": Language(sympy.ccode, "//", frozenset([*c_words, "M", "f", "double", "restrict", "inline", "y0", "y1", "jn"])),
+    "c": Language(
+        sympy.ccode, "//", frozenset([*c_keywords, "M", "f", "double", "restrict", "inline", "y0", "y1", "jn"])
+    ),
 }
 
 
@@ -165,9 +169,9 @@ class _Code:
 
     def _c(self) -> list[str]:
         n = self.mass.rows
-        given = "".join(f"double {name}, " for name in self.arguments)
+        raw = "".join(f"double {name}, " for name in self.arguments)
         more = f", double state_rates[{len(self.states)}]" if self.states else ""
-        head = f"void {self.function}({given}double M[{n}][{n}], double f[{n}]{more})"
+        head = f"void {self.function}({raw}double M[{n}][{n}], double f[{n}]{more})"
         body = self._body("  {} = {};", lambda at: "".join(f"[{k}]" for k in at), 0, named="  const double {} = {};")
         return ["#include <math.h>", head, "{", *body, "}"]
 
@@ -183,7 +187,7 @@ class _Code:
 
 def _renamed(names: Iterable[str], reserved: frozenset[str], form: str) -> dict[str, str]:
     """Names -> names that the language takes and no two of which are the same."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     listed = sorted(names)
     used = set(listed) - reserved
     for name in listed:
@@ -195,5 +199,5 @@ def _renamed(names: Iterable[str], reserved: frozenset[str], form: str) -> dict[
             while new in used or new in reserved:
                 new += "X" if form == "mathematica" else "_"
             used.add(new)
-        found[name] = new
-    return found
+        result[name] = new
+    return result

@@ -52,9 +52,9 @@ def momentum_names(kinematics: Kinematics) -> tuple[str, ...]:
 
 def multiplier_names(kinematics: Kinematics, count: int) -> tuple[str, ...]:
     """``lambda_1``, ...: what multipliers of constraint equations are called, unless given equations name them."""
-    given = kinematics.mechanism.given
-    if given is not None and count == len(given.multipliers):
-        return given.multipliers
+    raw = kinematics.mechanism.given
+    if raw is not None and count == len(raw.multipliers):
+        return raw.multipliers
     return _free(kinematics, MULTIPLIERS, lambda word: numbered(word, count))
 
 
@@ -74,16 +74,16 @@ def _axes(stem: str) -> list[str]:
     return [f"{stem}_{axis}" for axis in "xyz"]
 
 
-def _free(kinematics: Kinematics, words: Sequence[str], names: Callable[[str], list[str]]) -> tuple[str, ...]:
+def _free(kinematics: Kinematics, labels: Sequence[str], names: Callable[[str], list[str]]) -> tuple[str, ...]:
     """The names with the first word with which they are free."""
     notation = model_notation(kinematics)
     taken = {form for name in notation.names for form in (notation.latex(name), notation.text(name))}
-    word, *others = words
+    word, *others = labels
     while True:
-        found = names(word)
-        forms = {form for name in found for form in (notation.latex(name), notation.text(name))}
-        if taken.isdisjoint(forms) and set(found).isdisjoint(notation.names):
-            return tuple(found)
+        result = names(word)
+        forms = {form for name in result for form in (notation.latex(name), notation.text(name))}
+        if taken.isdisjoint(forms) and set(result).isdisjoint(notation.names):
+            return tuple(result)
         word, others = (others[0], others[1:]) if others else (f"{word}_", [])
 
 
@@ -107,16 +107,16 @@ def read_value(graph: Graph, name: str, value: Any) -> Expr:
         raise ill_typed(f"{name} must be a number, a text or a SymPy expression, not {quoted(value)}") from None
 
 
-def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
+def read_values(raw: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
     """Values by name; refused are unknown names, those given twice, and values that are no expressions.
 
     ``what`` is what the names are, in messages; ``plain`` makes ``left_hinge`` of ``left.hinge`` in an instance of a
     component.
     """
-    if not isinstance(given, Mapping):
-        raise ill_typed(f"values are given by name, as a mapping does, not {quoted(given)}")
+    if not isinstance(raw, Mapping):
+        raise ill_typed(f"values are given by name, as a mapping does, not {quoted(raw)}")
     values: dict[str, Any] = {}
-    for key, value in given.items():
+    for key, value in raw.items():
         name = name_of(key)
         name = plain(name) if isinstance(name, str) and name not in allowed else name
         if name not in allowed:
@@ -148,8 +148,8 @@ def put_in(expressions: Sequence[Expr], values: Mapping[str, Any]) -> list[Expr]
     quarter = graph.symbol(QUARTER)
     read = [read_value(graph, name, value) for name, value in values.items()]
     read = substitute(read, {x: k * quarter for x, k in _quarters(read)})
-    found = substitute(expressions, dict(zip(map(graph.symbol, values), read, strict=True)))
-    return substitute(_turned(found), {quarter: graph.constant(math.pi / 2)})
+    result = substitute(expressions, dict(zip(map(graph.symbol, values), read, strict=True)))
+    return substitute(_turned(result), {quarter: graph.constant(math.pi / 2)})
 
 
 def _quarters(expressions: Sequence[Expr]) -> list[tuple[Expr, float]]:
@@ -218,15 +218,15 @@ def hamiltonian(quantities: Quantities) -> Expr:
     total = graph.zero
     for x, rate in zip(moved, solve_symmetric(quantities.equations.mass_matrix, moved), strict=True):
         total = total + x * rate
-    found = 0.5 * total - at_rest + tree.potential_energy
+    result = 0.5 * total - at_rest + tree.potential_energy
     places = enumerate(quantities.mobility.q_reference)  # somewhere else: coordinates may be singular at the reference
     numbers = quantities.numbers | dict(zip(kinematics.names, (x + 0.3 + 0.1 * k for k, x in places), strict=True))
-    if not math.isfinite(float(evaluate([found], numbers | dict.fromkeys(momentum_names(kinematics), 1.0))[0])):
+    if not math.isfinite(float(evaluate([result], numbers | dict.fromkeys(momentum_names(kinematics), 1.0))[0])):
         raise UnavailableError(
             "the mass matrix of the spanning tree has no inverse, so that H is no function of the momenta; give every "
             "body a mass and an inertia"
         )
-    return found
+    return result
 
 
 def momentum_rates(quantities: Quantities) -> Row:
@@ -406,7 +406,7 @@ class BodiesApart:
 
     def _from_joints(self, body: int) -> list[Wrench]:
         """What the joints of the tree do to a body."""
-        found: list[Wrench] = []
+        result: list[Wrench] = []
         for k, (link, joint) in enumerate(zip(self.kinematics.links, self.joints, strict=True)):
             parent = self.kinematics.links[link.parent].body if link.parent != GROUND else GROUND
             if body not in (link.body, parent):
@@ -415,8 +415,8 @@ class BodiesApart:
             force, moment = self._unknown(joint)
             if body == parent:
                 force, moment = vec.neg(force), vec.neg(moment)
-            found.append(self._about_centre(body, point, force, moment))
-        return found
+            result.append(self._about_centre(body, point, force, moment))
+        return result
 
     def _multipliers(self) -> dict[str, Expr]:
         """The multiplier of each constraint equation that counts, by its label."""
@@ -432,7 +432,7 @@ class BodiesApart:
         for name, inertia in cut_drives(self.kinematics):  # takes a part of what drives the joint
             rotor = inertia * loop.accelerations[loop.names.index(name)]
             loads[name] = loads.get(name, self.graph.zero) - rotor
-        found: list[Wrench] = []
+        result: list[Wrench] = []
         for cut in JointWrenches(self.kinematics).cut:
             ends = (cut.spec.predecessor.body, cut.spec.successor.body)
             if body not in ends:
@@ -443,8 +443,8 @@ class BodiesApart:
             for factor, six in weighted:
                 factor = factor if body == ends[1] else -factor
                 force, moment = vec.scale(factor, (six[0], six[1], six[2])), vec.scale(factor, (six[3], six[4], six[5]))
-                found.append(self._about_centre(body, point, force, moment))
-        return found
+                result.append(self._about_centre(body, point, force, moment))
+        return result
 
     def along_joint(self, name: str) -> list[tuple[Expr, Expr]]:
         """Along each free direction of a joint of the tree: its component of the reaction, and what drives it.
@@ -458,15 +458,15 @@ class BodiesApart:
         force, moment = self._unknown(name)
         pulls = self._pulls()
         armature = self.kinematics.mechanism.joints[self.kinematics.topology.branches[k].joint].armature
-        found = []
+        result = []
         for c, (angular, linear) in enumerate(link.columns):
             turn, push = vec.times(rotation, angular), vec.times(rotation, linear)
             j = link.first + c
             drive = bodies.forces[j] - pulls[j]
             if armature is not None:
                 drive = drive - armature * self.kinematics.a[j]
-            found.append((vec.dot(turn, moment) + vec.dot(push, force), drive))
-        return found
+            result.append((vec.dot(turn, moment) + vec.dot(push, force), drive))
+        return result
 
     def _pulls(self) -> Row:
         """C_q^T lambda of the constraint elements."""

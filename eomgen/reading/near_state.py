@@ -40,7 +40,7 @@ def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
     if samples and not finite:
         names = ", ".join(mobility.independent)
         raise PartitionError(
-            f"linearize: the velocities of {names} do not determine the others {told(at)}: constraint_jacobian without "
+            f"linearize: the velocities of {names} do not determine the others {here(at)}: constraint_jacobian without "
             "their columns has no inverse there (a dead centre), so mass_matrix is not finite; linearize at another "
             "state, or derive with independent=[...] of another coordinate"
         )
@@ -49,7 +49,7 @@ def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
     motion = np.abs(_least(finite[0])[1])
     still = [name for name, x in zip(mobility.independent, motion, strict=True) if x > 0.1 * motion.max()]
     raise SingularMassMatrixError(
-        f"linearize: mass_matrix ({n}, {n}) has no inverse {told(at)}: moving {', '.join(still)} meets no inertia, so "
+        f"linearize: mass_matrix ({n}, {n}) has no inverse {here(at)}: moving {', '.join(still)} meets no inertia, so "
         "no acceleration follows; linearize at another state, or give the bodies behind the named coordinates mass or "
         "inertia"
     )
@@ -65,7 +65,7 @@ def require_finite(
             for j in range(len(row)):
                 if samples and not any(np.isfinite(sample[j]) for sample in samples):
                     raise NonFiniteError(
-                        f"linearize: {letter}[{i}, {j}] has no finite value {told(at)}; a force, a constraint or a "
+                        f"linearize: {letter}[{i}, {j}] has no finite value {here(at)}; a force, a constraint or a "
                         "rotation has no derivative there, such as a spring of length 0: linearize at another state"
                     )
 
@@ -90,7 +90,7 @@ def _samples(quantities: Quantities, expressions: Sequence[Expr]) -> Iterator[An
             yield np.array(evaluate(expressions, made_up | declared if first == 0.7 else made_up), dtype=float)
 
 
-def told(at: Mapping[str, Any]) -> str:
+def here(at: Mapping[str, Any]) -> str:
     """The state in words."""
     return f"at {', '.join(f'{name} = {value}' for name, value in at.items())}" if at else "at any state"
 
@@ -228,9 +228,9 @@ def _move(quantities: Quantities, column: Row) -> _Move:
     still = substitute(list(kinematics.rates), dict.fromkeys(kinematics.v, graph.zero))
     moved = substitute(list(kinematics.rates), dict(zip(kinematics.v, column, strict=True)))
     dq = {q: x - rest for q, x, rest in zip(kinematics.q, moved, still, strict=True) if x != rest}
-    found = quantities.transformation
+    result = quantities.transformation
     own = [kinematics.v[kinematics.velocity_labels.index(name)] for name in quantities.mobility.independent]
-    v = [dot(row, own) + b if own else b for row, b in zip(found.matrix, found.offset, strict=True)]
+    v = [dot(row, own) + b if own else b for row, b in zip(result.matrix, result.offset, strict=True)]
     return _Move(dq, tuple(jvp(v, dq)) if dq else (graph.zero,) * len(v))
 
 

@@ -65,7 +65,7 @@ class Letters(NamedTuple):
 
 
 #: The usual letters, and those that take their places.
-USUAL = Letters("M", r"\dot{v}", "f")
+STANDARD = Letters("M", r"\dot{v}", "f")
 OTHERS = Letters("AK", "aw", "br")
 
 
@@ -80,10 +80,10 @@ class PrintedEntry(NamedTuple):
 def order_of(equations: Readable) -> Order:
     """In what order the names of a model stand in formulas."""
     k, m = equations.kinematics, equations.kinematics.mechanism
-    masses = {name for body in m.bodies for name in _alone(body.mass)}
-    inertias = {name for body in m.bodies for row in body.inertia for x in row for name in _alone(x)}
+    masses = {name for body in m.bodies for name in _single_names(body.mass)}
+    inertias = {name for body in m.bodies for row in body.inertia for x in row for name in _single_names(x)}
     inertias |= {name for body in m.bodies if body.inertia_origin for row in body.inertia_origin for x in row
-                 for name in _alone(x)}  # fmt: skip
+                 for name in _single_names(x)}  # fmt: skip
     gravity = {name for x in m.gravity for name in _names(x)}
     kinds: dict[str, int] = {}
     for p in m.parameters:
@@ -100,7 +100,7 @@ def order_of(equations: Readable) -> Order:
     return Order(kinds | dict.fromkeys([*k.velocity_names, *equations.acceleration_names], RATE))
 
 
-def _alone(x: Expr) -> tuple[str, ...]:
+def _single_names(x: Expr) -> tuple[str, ...]:
     """The name that an expression is, if it is one."""
     names = _names(x)
     return tuple(names) if len(names) == 1 and x.graph.symbol(*names).id == x.id else ()
@@ -138,20 +138,23 @@ class PrintedEquations:
     @cached_property
     def letters(self) -> Letters:
         """The letters of M v' = f; others where names of the model are printed so."""
-        M, f = (self.names.letter(USUAL[k], *OTHERS[k], with_numbers=True) for k in (0, 2))
-        rates = (USUAL.accelerations,) if self.names.is_free("v") else ()
+        M, f = (self.names.letter(STANDARD[k], *OTHERS[k], with_numbers=True) for k in (0, 2))
+        rates = (STANDARD.accelerations,) if self.names.is_free("v") else ()
         return Letters(M, self.names.letter(*rates, *OTHERS.accelerations), f)
 
     @property
     def renamed_letters(self) -> list[tuple[str, str]]:
         """Letters that are not the usual ones, in LaTeX, and what they stand for."""
-        told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
-        return [(letter, what) for letter, usual, what in told if letter != usual]
+        by_letter = [
+            (self.letters.mass, STANDARD.mass, "the mass matrix"),
+            (self.letters.force, STANDARD.force, "the right side"),
+        ]
+        return [(letter, what) for letter, standard, what in by_letter if letter != standard]
 
     def list_renamed_letters(self) -> Iterator[Sentence]:
         """A sentence of them."""
-        if told := ", ".join(f"${letter}$ is {what}" for letter, what in self.renamed_letters):
-            yield Sentence(f"{told}; the usual letters are names of the model.")
+        if by_letter := ", ".join(f"${letter}$ is {what}" for letter, what in self.renamed_letters):
+            yield Sentence(f"{by_letter}; the usual letters are names of the model.")
 
     @cached_property
     def mass_matrix(self) -> list[list[Formula]]:
@@ -200,8 +203,8 @@ class PrintedEquations:
         """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
         return [
             Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
-            for given in self.equations.values_substituted()
-            for name, x in given
+            for raw in self.equations.values_substituted()
+            for name, x in raw
         ]
 
     @property
@@ -231,12 +234,12 @@ class PrintedEquations:
             yield Sentence(f"{STILL.capitalize()}.")
         else:
             yield from self._motion() if self.parts is None else self.parts.items()
-        for told, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
+        for by_letter, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
             if pairs:
-                yield Sentence(told)
+                yield Sentence(by_letter)
                 yield from map(FormulaLine, pairs)
-        if self.told:
-            yield Sentence(self.told)
+        if self.remark:
+            yield Sentence(self.remark)
 
     def _motion(self) -> Iterator[Piece]:
         """M v' = f written out where it fits on a page, else in letters, and their entries."""
@@ -288,15 +291,15 @@ class PrintedEquations:
         return any(x == Number("0") for row in self.mass_matrix for x in row)
 
     @property
-    def told(self) -> str:
+    def remark(self) -> str:
         """What is said when all formulas have been made, of digits that are not printed and of signs; often empty."""
-        found = []
+        result = []
         if self.formula.signs:
-            found.append("sgn(x) is short for x/|x|, which has no value at x = 0.")
+            result.append("sgn(x) is short for x/|x|, which has no value at x = 0.")
         if self.formula.rounded:
             kept = "eqs.tree_system has" if self.of_loops else "eqs.mass_matrix and eqs.force have"
-            found.append(f"Long numbers are rounded to {self.digits} digits; {kept} all of them.")
-        return " ".join(found)
+            result.append(f"Long numbers are rounded to {self.digits} digits; {kept} all of them.")
+        return " ".join(result)
 
     def text(self, formula: Formula) -> str:
         """A formula in text."""
@@ -344,11 +347,11 @@ class PrintedEquations:
         lacking = {*([BODIES] if mechanism.bare else ()), *([PARTS] if mechanism.written is not None else ())}
         rows = {row.name: row.offered for row in there.rows() if row.offered and row.offered not in lacking}
         loops = [name for name, offered in rows.items() if offered == LOOPS and self.equations.constraint_names]
-        found = ["q", "v", "parameters", *(name for name, offered in rows.items() if offered != LOOPS)]
-        found += ["operations", "report"] if mechanism.states else ["linearize", "operations", "report"]
-        found += [*loops, *(["states", "state_rates"] if mechanism.states else [])]
-        found += ["sampled", "sampled_values"] if mechanism.clocks else []
-        return tuple(name for name in found if hasattr(there, name))
+        result = ["q", "v", "parameters", *(name for name, offered in rows.items() if offered != LOOPS)]
+        result += ["operations", "report"] if mechanism.states else ["linearize", "operations", "report"]
+        result += [*loops, *(["states", "state_rates"] if mechanism.states else [])]
+        result += ["sampled", "sampled_values"] if mechanism.clocks else []
+        return tuple(name for name in result if hasattr(there, name))
 
 
 def plain(line: str) -> str:
@@ -469,12 +472,12 @@ class PrintedParts:
     @property
     def _branches(self) -> list[int]:
         """Of each velocity the first link of its branch of the tree."""
-        found: dict[int, int] = {}
+        result: dict[int, int] = {}
         root: list[int] = []
         for k, link in enumerate(self._kinematics.links):
             root.append(k if link.parent == GROUND else root[link.parent])
-            found |= {link.first + c: root[k] for c in range(len(link.columns))}
-        return [found[j] for j in range(len(self._kinematics.velocity_labels))]
+            result |= {link.first + c: root[k] for c in range(len(link.columns))}
+        return [result[j] for j in range(len(self._kinematics.velocity_labels))]
 
     def _blocks(self) -> Iterator[Piece]:
         """Large matrices in blocks, where many of these vanish."""
@@ -515,15 +518,15 @@ class PrintedParts:
     def _matrices(self) -> list[_Matrix]:
         eqs, letters = self.equations, self.printed.letters
         if not self.printed.of_loops:
-            given: list[tuple[str, Any]] = [(letters.mass, eqs.mass_matrix), (letters.force, eqs.force)]
+            raw: list[tuple[str, Any]] = [(letters.mass, eqs.mass_matrix), (letters.force, eqs.force)]
         else:
             system = eqs.tree_system
             choices = ("M_t", "A_t"), ("f_t", "b_t"), ("C", "J"), (r"\gamma", "c")
-            given = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
+            raw = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
         meanings = PartMeaning.INERTIA, PartMeaning.FORCE, PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE
         return [
             _Matrix(letter, [list(map(self.printed.formula, row)) for row in x.tolist()], meaning, x)
-            for (letter, x), meaning in zip(given, meanings, strict=False)
+            for (letter, x), meaning in zip(raw, meanings, strict=False)
         ]
 
     def _place(self, matrix: _Matrix, i: int, j: int) -> Letter:
@@ -569,11 +572,11 @@ class PrintedParts:
     def _first_places(matrix: _Matrix) -> dict[tuple[int, int], tuple[int, int]]:
         """Of each entry the place of the first one that is equal, by rows; entries of a column have their own."""
         first: dict[Any, tuple[int, int]] = {}
-        found = {}
+        result = {}
         for i, row in enumerate(matrix.entries):
             for j, x in enumerate(row):
-                found[i, j] = (i, j) if matrix.is_column else first.setdefault(x, (i, j))
-        return found
+                result[i, j] = (i, j) if matrix.is_column else first.setdefault(x, (i, j))
+        return result
 
     def _part(self, entry: Formula) -> str | None:
         """The named part that an entry is, perhaps subtracted."""
@@ -583,15 +586,15 @@ class PrintedParts:
     @cached_property
     def _entry_letters(self) -> dict[str, Letter]:
         """Named parts that are entries of the matrix for which alone they are, and the letters of these entries."""
-        found: dict[str, Letter] = {}
+        result: dict[str, Letter] = {}
         for matrix in self._matrices:
             for (i, j), place in self._first_places(matrix).items():
                 x = matrix.entries[i][j]
-                if not isinstance(x, Name) or place != (i, j) or x.name in found or not NUMBERED.fullmatch(x.name):
+                if not isinstance(x, Name) or place != (i, j) or x.name in result or not NUMBERED.fullmatch(x.name):
                     continue
                 if self._meaning.get(x.name) == matrix.meaning:
-                    found[x.name] = self._place(matrix, i, j)
-        return found
+                    result[x.name] = self._place(matrix, i, j)
+        return result
 
     # -- named parts --------------------------------------------------------------------------------------------------
     @cached_property

@@ -40,11 +40,11 @@ def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
     """
     if kinematics.mechanism.lagrangian is not None:
         return _of_lagrangian(kinematics)
-    found: dict[str, list[Expr]] = {}
+    result: dict[str, list[Expr]] = {}
     names = {terms.force.name for terms in kinematics.forces}
     if not all(x.is_zero for x in kinematics.mechanism.gravity):
         height = potential_energy(replace(kinematics, forces=()))
-        found[GRAVITY if GRAVITY not in names else f"{GRAVITY}_field"] = _downhill(kinematics, height)
+        result[GRAVITY if GRAVITY not in names else f"{GRAVITY}_field"] = _downhill(kinematics, height)
     for terms in kinematics.forces:
         force = virtual_power(kinematics, (*terms.marker_loads, *terms.coordinate_loads))
         if terms.potential is not None:
@@ -52,21 +52,21 @@ def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
             slope = _downhill(kinematics, terms.potential)
             other = [a + b for a, b in zip(slope, rest, strict=True)]
             force = min(other, force, key=lambda forces: count(forces).total)
-        found[terms.force.name] = force
-    return found
+        result[terms.force.name] = force
+    return result
 
 
 def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
-    bare, given = kinematics.mechanism.lagrangian, kinematics.mechanism.given
+    bare, raw = kinematics.mechanism.lagrangian, kinematics.mechanism.given
     assert bare is not None
-    assert given is not None
+    assert raw is not None
     drag = gradient(bare.dissipation, list(kinematics.v))
-    found = {
-        POTENTIAL: _downhill(kinematics, given.potential_energy),
+    result = {
+        POTENTIAL: _downhill(kinematics, raw.potential_energy),
         FORCES: list(bare.forces),
         DISSIPATION: [-d for d in drag],
     }
-    return {name: force for name, force in found.items() if not all(x.is_zero for x in force)}
+    return {name: force for name, force in result.items() if not all(x.is_zero for x in force)}
 
 
 def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
@@ -80,15 +80,15 @@ def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
 def without_forces(kinematics: Kinematics) -> Kinematics:
     """The same motion with no gravity and no force element; of a bare Lagrangian, the equations of L without V."""
     mechanism, graph = kinematics.mechanism, kinematics.graph
-    bare, given = mechanism.lagrangian, mechanism.given
-    if bare is not None and given is not None:
+    bare, raw = mechanism.lagrangian, mechanism.given
+    if bare is not None and raw is not None:
         still = tuple(graph.zero for _ in bare.forces)
-        moving = bare.expression + given.potential_energy
-        given = differentiate(
+        moving = bare.expression + raw.potential_energy
+        raw = differentiate(
             graph, replace(bare, expression=moving, forces=still, dissipation=graph.zero), kinematics.clock
         )
-    alone = replace(mechanism, gravity=vec.zero(graph), forces=(), given=given)
-    return replace(kinematics, mechanism=alone, forces=())
+    forced = replace(mechanism, gravity=vec.zero(graph), forces=(), given=raw)
+    return replace(kinematics, mechanism=forced, forces=())
 
 
 # -- entries of rotations ----------------------------------------------------------------------------------------------
@@ -128,9 +128,9 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
     taken = symbols_of(whole)
     graph = whole[0].graph
     named = {x: name for (name, _), x in zip(entries, values, strict=True) if len(x.node) > 2 and name not in taken}
-    found = substitute(whole, {x: graph.symbol(name) for x, name in named.items()})
-    used = symbols_of(found)
-    return found, [(name, x) for x, name in named.items() if name in used]
+    result = substitute(whole, {x: graph.symbol(name) for x, name in named.items()})
+    used = symbols_of(result)
+    return result, [(name, x) for x, name in named.items() if name in used]
 
 
 # -- expressions in SymPy ----------------------------------------------------------------------------------------------
@@ -160,12 +160,12 @@ def is_short(expressions: Sequence[Expr]) -> bool:
 def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
     """The named parts that a value uses, and those that these use."""
     wanted = set(value.free_symbols)
-    found = []
+    result = []
     for symbol, expression in reversed(list(named)):
         if symbol in wanted:
-            found.append((symbol, expression))
+            result.append((symbol, expression))
             wanted |= expression.free_symbols
-    return found[::-1]
+    return result[::-1]
 
 
 def with_derivatives(expression: Any) -> Any:
@@ -231,8 +231,8 @@ class Quantities:
     # -- energies ---------------------------------------------------------------------------------------------------
     def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
         """Refuse energies of given equations of which none of the keys was given."""
-        given = self.kinematics.mechanism.written
-        if given is not None and all(getattr(given, key).is_zero for key in keys):
+        raw = self.kinematics.mechanism.written
+        if raw is not None and all(getattr(raw, key).is_zero for key in keys):
             raise UnavailableError(
                 f"{what} is not known: the equations are given without {keys[0]}; give equations.{keys[0]}"
             )

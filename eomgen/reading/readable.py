@@ -33,7 +33,7 @@ from .methods import (
     read_value,
     read_values,
 )
-from .near_state import SymbolicLinearization, linearize, over_one_denominator, told
+from .near_state import SymbolicLinearization, here, linearize, over_one_denominator
 from .quantities import Quantities, SpatialMotion, Written, is_short, needed, require_bodies, with_derivatives
 from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
@@ -463,9 +463,9 @@ class Readable(ABC):
         names: list[str] = []
 
         def choose(quantities: Quantities) -> list[Expr]:
-            found = block_system(quantities)
-            names[:] = found.unknowns
-            return [*(x for row in found.matrix for x in row), *found.right]
+            result = block_system(quantities)
+            names[:] = result.unknowns
+            return [*(x for row in result.matrix for x in row), *result.right]
 
         written, n = self._write("block_system", choose, "K_"), len(names)
         parts = written[: n * n], list(self._symbols(names)), written[n * n :]
@@ -550,12 +550,12 @@ class Readable(ABC):
         states: list[tuple[str, ...]] = []
 
         def choose(quantities: Quantities) -> Sequence[Expr]:
-            found = linearize(quantities, values, equilibrium)
-            states.append(found.states)
-            return [x for matrix in (found.A, found.B) for row in matrix for x in row]
+            result = linearize(quantities, values, equilibrium)
+            states.append(result.states)
+            return [x for matrix in (result.A, result.B) for row in matrix for x in row]
 
         written = self._write("linearize", choose, "A_")
-        self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], told(values))
+        self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], here(values))
         if not self._named["linearize"]:
             written = [over_one_denominator(x) for x in written]
         (names,), inputs = states, self.kinematics.input_names
@@ -614,19 +614,19 @@ class Readable(ABC):
         """Without what gives quantities as they were formed, which are functions here."""
         return {name: value for name, value in vars(self).items() if name != "_all"}
 
-    def _write(self, name: str, choose: Choose, prefix: str = "", given: ChooseNames | None = None) -> list[Any]:
+    def _write(self, name: str, choose: Choose, prefix: str = "", raw: ChooseNames | None = None) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
-        formed, names = self._form(choose, given)
+        formed, names = self._form(choose, raw)
         prefix = prefix or f"{name.replace('.', '_')}_"
-        written = self.in_sympy(formed, prefix, names, of_motion=given is not None)
+        written = self.in_sympy(formed, prefix, names, of_motion=raw is not None)
         if self._put_in:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
-            self._require_finite(name, values, f"with {self._told}")
+            self._require_finite(name, values, f"with {self._view}")
         self._named[name] = written.intermediates
-        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
+        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, raw))
         return written.expressions
 
     def in_sympy(
@@ -645,19 +645,19 @@ class Readable(ABC):
 
         k = self.kinematics
         rates = frozenset((*k.velocity_names, *map(acceleration_name, k.velocity_names)))
-        expressions, given = joined_nodes(formed, names, k.euler_parameters)
-        sizes = [WHOLE] if not given and is_short(expressions) else []
-        form = simplify(expressions, given, rates, prefix, *sizes)
+        expressions, raw = joined_nodes(formed, names, k.euler_parameters)
+        sizes = [WHOLE] if not raw and is_short(expressions) else []
+        form = simplify(expressions, raw, rates, prefix, *sizes)
         if form is None:
             return Written([], [])
-        named, found = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
-        return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, found)))
+        named, result = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
+        return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, result)))
 
-    def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
+    def _form(self, choose: Choose, raw: ChooseNames | None) -> tuple[list[Expr], Names]:
         """Expressions of the quantities with values put in, and what names in them stand for."""
         quantities = Quantities(*self.fresh())
         expressions = list(choose(quantities))
-        names = list(given(quantities)) if given is not None else []
+        names = list(raw(quantities)) if raw is not None else []
         expressions += [x for _, x in names]
         for values in self._put_in:
             expressions = put_in(expressions, values)
@@ -678,14 +678,14 @@ class Readable(ABC):
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
-        found = copied(list(expressions)) if self._put_in else list(expressions)
+        result = copied(list(expressions)) if self._put_in else list(expressions)
         for values in self._put_in:
-            found = put_in(found, values)
-        return found
+            result = put_in(result, values)
+        return result
 
     def numbers_substituted(self) -> dict[str, float | None]:
         """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
-        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for given in self._put_in for name in given))
+        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for raw in self._put_in for name in raw))
         quantities: list[Any] = [*m.parameters, *m.inputs]
         declared = {x.name: x.value for x in quantities if x.value is not None}
         graph = Graph()
@@ -696,7 +696,7 @@ class Readable(ABC):
         }
 
     @property
-    def _told(self) -> str:
+    def _view(self) -> str:
         """Values that were put in, for messages."""
         return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._put_in)
 
@@ -714,10 +714,10 @@ class Readable(ABC):
         """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
         return Undotted(self.kinematics.mechanism.instances).coordinate(name)
 
-    def _read(self, given: Any, what: str = "symbol") -> dict[str, Any]:
+    def _read(self, raw: Any, what: str = "symbol") -> dict[str, Any]:
         """Values that a user puts in for names."""
         allowed = self.kinematics.parameter_names if what == "parameter" else self._known
-        return read_values(given, allowed, what, self._plain)
+        return read_values(raw, allowed, what, self._plain)
 
     def written(self, name: str, part: str | None = None) -> tuple[list[tuple[Any, Any]], Any]:
         """A quantity with its named parts.
@@ -787,12 +787,12 @@ class Readable(ABC):
     def names_substituted(self) -> tuple[str, ...]:
         """Names that the model does not have and that values put in have brought."""
         graph = Graph()
-        values = (read_value(graph, name, value) for given in self._put_in for name, value in given.items())
+        values = (read_value(graph, name, value) for raw in self._put_in for name, value in raw.items())
         return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
 
     def values_substituted(self) -> list[list[tuple[str, Any]]]:
         """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
-        return [[(name, self._as_given(value)) for name, value in given.items()] for given in self._put_in]
+        return [[(name, self._as_given(value)) for name, value in raw.items()] for raw in self._put_in]
 
     def _as_given(self, value: Any) -> Any:
         if isinstance(value, float | int):

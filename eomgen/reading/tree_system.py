@@ -67,30 +67,30 @@ def is_long(quantities: Quantities) -> bool:
         return False
     if count([*_flat(quantities.mass_matrix), *quantities.force]).total > SURELY:
         return True
-    whole, given = quantities.motion
-    return count([*whole, *(x for _, x in given)]).total > LONG
+    whole, raw = quantities.motion
+    return count([*whole, *(x for _, x in raw)]).total > LONG
 
 
 def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
     """The parts; on request with names in them, and at 0 of what they do not depend on, which makes them shorter."""
     flat = [*_flat(quantities.equations.mass_matrix), *(-h for h in quantities.equations.bias)]
     flat += [*_flat(quantities.constraint_jacobian), *quantities.gamma]
-    given: Named = []
+    raw: Named = []
     zeros: tuple[str, ...] = ()
     if short:
-        zeros = _idle(quantities, flat)
+        zeros = _zero_rows(quantities, flat)
         graph = quantities.graph
         put = {graph.symbol(name): graph.zero for name in zeros}
         names, values = zip(*_motion_names(quantities), strict=True)
-        flat, given = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
-    return TreeParts(flat, given, zeros)
+        flat, raw = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
+    return TreeParts(flat, raw, zeros)
 
 
 def _flat(rows: Rows) -> list[Expr]:
     return [x for row in rows for x in row]
 
 
-def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
+def _zero_rows(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
     """Coordinates on which M and f do not depend, such as the heading of a vehicle on a plane, tried at random.
 
     Nor may what decides between pieces, such as the place of a stop far away.  The parts have to be finite with 0 in
@@ -108,34 +108,34 @@ def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
         at[name] = x + random.uniform(-0.3, 0.3, POINTS)
         moved[name] = at[name] + random.uniform(0.1, 0.5, POINTS)
     same: np.ndarray = np.all(dependence(whole, at, moved)[2], axis=0)
-    idle = tuple(name for name, alike in zip(k.names, same, strict=True) if alike)
-    if not idle:
+    constant = tuple(name for name, alike in zip(k.names, same, strict=True) if alike)
+    if not constant:
         return ()
-    at |= dict.fromkeys(idle, np.zeros(POINTS))
-    return idle if np.isfinite(with_bounds(list(parts), at)[0]).all() else ()
+    at |= dict.fromkeys(constant, np.zeros(POINTS))
+    return constant if np.isfinite(with_bounds(list(parts), at)[0]).all() else ()
 
 
 def _deciding(expressions: Sequence[Expr]) -> list[Expr]:
     """The operands of operations that may be alike in a part of their domain: comparisons, max, contact, tables."""
     graph = expressions[0].graph
     analytic = operations_with(lambda row: row.analytic)
-    found: dict[int, None] = {}
+    result: dict[int, None] = {}
     for i in reachable(graph, (x.id for x in expressions)):
         operation, *operands = graph.nodes[i]
         if operation not in LEAVES and operation not in analytic:
-            found |= dict.fromkeys(operands)
-    return [Expr(graph, i) for i in found if graph.nodes[i][0] not in graph.calls]
+            result |= dict.fromkeys(operands)
+    return [Expr(graph, i) for i in result if graph.nodes[i][0] not in graph.calls]
 
 
 def _motion_names(quantities: Quantities) -> Named:
     """R_<body>_ij and omega_<body>_x, of the axes in which the joint of the tree holds the body."""
     k = quantities.kinematics
-    found: Named = []
+    result: Named = []
     for i, link in enumerate(k.links):
         rotation = k.poses.link(i).rotation
-        found += [(f"R_{link.name}_{r + 1}{c + 1}", rotation[r][c]) for r in range(3) for c in range(3)]
-        found += [(f"omega_{link.name}_{axis}", x) for axis, x in zip("xyz", k.twists[i][0], strict=True)]
-    return found
+        result += [(f"R_{link.name}_{r + 1}{c + 1}", rotation[r][c]) for r in range(3) for c in range(3)]
+        result += [(f"omega_{link.name}_{axis}", x) for axis, x in zip("xyz", k.twists[i][0], strict=True)]
+    return result
 
 
 def _with_names(flat: Sequence[Expr], motion: Named) -> tuple[list[Expr], Named]:
@@ -147,15 +147,15 @@ def _with_names(flat: Sequence[Expr], motion: Named) -> tuple[list[Expr], Named]
         if x not in named and not _is_plain(x) and name not in taken:
             named[x] = name
     symbols = {x: graph.symbol(name) for x, name in named.items()}
-    found = substitute(flat, symbols)
-    used = symbols_of(found)
-    given: Named = []
+    result = substitute(flat, symbols)
+    used = symbols_of(result)
+    raw: Named = []
     for value, name in reversed(named.items()):
         if name in used:
             inner = substitute([value], {x: symbol for x, symbol in symbols.items() if x != value})
             used |= symbols_of(inner)
-            given.append((name, inner[0]))
-    return found, given[::-1]
+            raw.append((name, inner[0]))
+    return result, raw[::-1]
 
 
 def _is_plain(x: Expr) -> bool:

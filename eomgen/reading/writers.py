@@ -45,27 +45,27 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     """
     printed = PrintedEquations(equations, digits)
     name = visible(equations.kinematics.mechanism.name, lines=False)
-    found = [f"equations of motion of {name}", f"  {printed.title}"]
-    found += [*_values(printed, columns), *_coordinates(printed, columns)]
+    result = [f"equations of motion of {name}", f"  {printed.title}"]
+    result += [*_values(printed, columns), *_coordinates(printed, columns)]
     if equations.mobility.n_dof == 0:
-        found.append(f"  {STILL}")
+        result.append(f"  {STILL}")
     else:
         shown = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
-        found += ["", *shown[:lines]]
+        result += ["", *shown[:lines]]
         if len(shown) > lines:
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
             rest = f"... and {len(shown) - lines} lines more: {where}"
-            found += [rest, "or in a shell: eomgen derive MODEL --format text"]
-        if told := printed.told:
-            found += ["", *fold(told, columns, "", "  ")]
+            result += [rest, "or in a shell: eomgen derive MODEL --format text"]
+        if remark := printed.remark:
+            result += ["", *fold(remark, columns, "", "  ")]
     if printed.states:
-        found += ["", "first-order states"]
-        found += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+        result += ["", "first-order states"]
+        result += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
     if printed.sampled:
-        found += ["", SAMPLED]
-        found += [x for a, f in printed.sampled for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
-    found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
-    return "\n".join(found)
+        result += ["", SAMPLED]
+        result += [x for a, f in printed.sampled for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+    result += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
+    return "\n".join(result)
 
 
 def _values(printed: PrintedEquations, columns: int) -> list[str]:
@@ -107,8 +107,8 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
     short = f"{mass} {rates[0]} = {right}" if printed.is_one_equation else f"{mass} {v} = {right}"
     listed = f"{short} with {v} = ({', '.join(rates)})"
     yield short if printed.is_one_equation or len(listed) > columns else listed
-    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.renamed_letters):
-        yield from fold(f"{told}; the usual letters are names of the model", columns, "  ", "  ")
+    if remark := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.renamed_letters):
+        yield from fold(f"{remark}; the usual letters are names of the model", columns, "  ", "  ")
     yield ""
     rows = [*_matrix(M, f"{mass} = ")]
     small = len(rates) > 1 and max(map(len, rows)) <= columns
@@ -198,12 +198,12 @@ def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:
 def _matrix(rows: Sequence[Sequence[str]], before: str = "") -> list[str]:
     sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
     middle = (len(rows) - 1) // 2
-    found = []
+    result = []
     for k, entries in enumerate(rows):
         left, right = _brackets(k, len(rows))
         cells = "  ".join(cell.center(size) for cell, size in zip(entries, sizes, strict=True))
-        found.append(f"{before if k == middle else ' ' * len(before)}{left}{cells}{right}")
-    return found
+        result.append(f"{before if k == middle else ' ' * len(before)}{left}{cells}{right}")
+    return result
 
 
 def _brackets(k: int, n: int) -> tuple[str, str]:
@@ -232,16 +232,16 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     yield plain(line.rstrip())
 
 
-def _fitting(shown: str, room: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
+def _fitting(shown: str, width: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
     """Parts between which a line may end, each cut no further than it has to be to fit."""
     if not ways:
-        yield from (shown[k : k + room] for k in range(0, len(shown), room))
+        yield from (shown[k : k + width] for k in range(0, len(shown), width))
         return
     for part in _parts(shown, *ways[0]):
-        if len(part) <= room:
+        if len(part) <= width:
             yield part
         else:
-            yield from _fitting(part, room, ways[1:])
+            yield from _fitting(part, width, ways[1:])
 
 
 def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:

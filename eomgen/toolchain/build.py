@@ -107,7 +107,7 @@ def _setting(compiler: CompilerInfo) -> dict[str, object]:
 
 def _lane_files(files: Iterable[str]) -> dict[str, int]:
     """The lane files among these, with their widths."""
-    return {file: int(found[1]) for file in files if (found := re.search(r"_lanes(\d+)\.c$", file))}
+    return {file: int(match[1]) for file in files if (match := re.search(r"_lanes(\d+)\.c$", file))}
 
 
 def _deferred(files: Iterable[str], name: str) -> list[str]:

@@ -45,10 +45,10 @@ def cache_directory() -> Path:
             return Path(chosen).expanduser().absolute()
         from platformdirs import user_cache_path
 
-        found = user_cache_path("eomgen", appauthor=False)
-        if str(found).startswith("~"):
+        result = user_cache_path("eomgen", appauthor=False)
+        if str(result).startswith("~"):
             raise RuntimeError("this user has no home directory")
-        return found.absolute()
+        return result.absolute()
     except (RuntimeError, OSError) as error:
         origin = f"EOMGEN_CACHE_DIR={chosen!r}: " if chosen else ""
         raise bad_cache(
@@ -188,11 +188,11 @@ class Cache:
 
     def entries(self) -> list[CacheEntry]:
         """Every readable entry, the most recently used first."""
-        found = []
+        result = []
         for directory in self._entries.iterdir() if self._entries.is_dir() else ():
             with suppress(OSError, ValueError, KeyError, TypeError, ToolchainError):
-                found.append(_describe(directory, files.read_manifest(directory)))
-        return sorted(found, key=lambda entry: entry.used, reverse=True)
+                result.append(_describe(directory, files.read_manifest(directory)))
+        return sorted(result, key=lambda entry: entry.used, reverse=True)
 
     def prune(self, older_than: float | None = None, max_size: int | None = None) -> list[CacheEntry]:
         """Remove and return what was not used for so many seconds, and the oldest until so many bytes are left."""
@@ -262,7 +262,7 @@ WRITERS = ("expr", "codegen", "toolchain", "base", "native")
 
 def digest_writers() -> str | None:
     """SHA-256 of the code and templates that sources and flags follow from; None if they changed since they ran."""
-    found, package = hashlib.sha256(), Path(__file__).parents[1]
+    result, package = hashlib.sha256(), Path(__file__).parents[1]
     folders = [*(str(package / name) for name in WRITERS), str(shipped("templates"))]
     while folders:  # os.walk, at half its time
         with os.scandir(folders.pop()) as listing:
@@ -274,5 +274,5 @@ def digest_writers() -> str | None:
                     state, text = os.fstat(file.fileno()), file.read()
                 if max(state.st_mtime, state.st_ctime) > _STARTED:
                     return None
-                found.update(f"{entry.name} {len(text)}\n".encode() + text)
-    return found.hexdigest()
+                result.update(f"{entry.name} {len(text)}\n".encode() + text)
+    return result.hexdigest()

@@ -380,12 +380,12 @@ class Options:
 
     def __post_init__(self) -> None:
         for name, allowed in (("optimize", (0, 1, 2, 3)), ("lanes", (0, 2, 4, 8))):
-            if (given := getattr(self, name)) is None:
+            if (raw := getattr(self, name)) is None:
                 continue
-            if as_count(given) not in allowed:
+            if as_count(raw) not in allowed:
                 *but, last = allowed
-                raise no_choice(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(given)}")
-            object.__setattr__(self, name, as_count(given))
+                raise no_choice(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(raw)}")
+            object.__setattr__(self, name, as_count(raw))
         if self.jobs is not None:
             object.__setattr__(self, "jobs", read_count("jobs, files compiled at a time,", self.jobs, 1))
         if not isinstance(self.compiler, str | None):

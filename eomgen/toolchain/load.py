@@ -43,8 +43,8 @@ def load_core(entry: CacheEntry) -> Any:
 
 def open_core(name: str, file: Path) -> Any:
     """Open the library of a model in the cache, under a name of its own."""
-    if (found := find_module(name)) is not None:
-        return found
+    if (result := find_module(name)) is not None:
+        return result
     native: Any = find_native()
     try:
         require_trusted(file)
@@ -97,16 +97,16 @@ def _require_features(manifest: Mapping[str, Any], file: Path) -> None:
 @cache
 def processor_features() -> frozenset[str]:
     """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
-    found = {platform.machine()}
+    result = {platform.machine()}
     with suppress(ImportError, AttributeError):
         features = import_module("numpy._core._multiarray_umath").__cpu_features__
-        found |= {name for name, there in features.items() if there}
+        result |= {name for name, there in features.items() if there}
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith(("flags", "Features")):
-                found |= set(line.partition(":")[2].split())
+                result |= set(line.partition(":")[2].split())
                 break
-    return frozenset(found)
+    return frozenset(result)
 
 
 def recipe_of(file: Path) -> str:
@@ -176,8 +176,8 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if not twins and (found := find_module(module_name)) is not None:
-        return found
+    if not twins and (result := find_module(module_name)) is not None:
+        return result
     try:
         kept = Cache(cache_directory())
         if (entry := kept.find(key)) is None:

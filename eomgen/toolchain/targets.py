@@ -64,15 +64,15 @@ class Target(NamedTuple):
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
-        found: Files = find_function(self.package)(program, context)
-        return found
+        result: Files = find_function(self.package)(program, context)
+        return result
 
 
 def find_function(name: str) -> Callable[..., Any]:
     """The function "file.function" within eomgen."""
     home, function = name.rsplit(".", 1)
-    found: Callable[..., Any] = getattr(import_module(f"..{home}", __package__), function)
-    return found
+    result: Callable[..., Any] = getattr(import_module(f"..{home}", __package__), function)
+    return result
 
 
 TARGETS: dict[str, Target] = {

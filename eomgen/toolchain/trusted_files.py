@@ -294,8 +294,8 @@ def read_manifest(directory: Path) -> dict[str, Any]:
             raise ValueError("the seal is broken")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"the manifest in {directory} is damaged: {error}") from None
-    found: dict[str, Any] = manifest
-    return found
+    result: dict[str, Any] = manifest
+    return result
 
 
 def read_entry(directory: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -308,11 +308,11 @@ def read_entry(directory: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
     files: dict[str, str] = manifest["files"]
     for folder in {PurePosixPath(name).parent for name in files}:
         require_trusted(directory / folder)
-    found = {name: read_trusted(directory / name) for name in files}
-    for name, data in found.items():
+    result = {name: read_trusted(directory / name) for name in files}
+    for name, data in result.items():
         if digest(data) != files[name]:
             raise ValueError(f"{directory / name} is damaged")
-    return manifest, found
+    return manifest, result
 
 
 def _seal(manifest: Mapping[str, Any]) -> str:
@@ -333,14 +333,14 @@ class _Text(importlib.abc.SourceLoader):
         return self.data
 
 
-def load_source(name: str, path: str, data: bytes, given: Mapping[str, Any] | None = None) -> ModuleType:
-    """Make a module from its text; ``path`` is what ``__file__`` says, ``given`` what it knows before it runs."""
+def load_source(name: str, path: str, data: bytes, raw: Mapping[str, Any] | None = None) -> ModuleType:
+    """Make a module from its text; ``path`` is what ``__file__`` says, ``raw`` what it knows before it runs."""
     loader = _Text(path, data)
     spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
-    vars(module).update(given or {})
+    vars(module).update(raw or {})
     loader.exec_module(module)
-    if not given:  # given other things, it is another module
+    if not raw:  # given other things, it is another module
         LOADED[name] = getattr(module, "model", module)
     return module

@@ -68,9 +68,9 @@ def require_wheel(target: str) -> None:
     except metadata.PackageNotFoundError:
         version = ""
     if not version or int(version.partition(".")[0]) < SETUPTOOLS:
-        found = f"setuptools {version} is installed" if version else "it is not installed"
+        result = f"setuptools {version} is installed" if version else "it is not installed"
         raise MissingDependencyError(
-            f"a wheel needs setuptools {SETUPTOOLS} or later, and {found}: pip install 'eomgen[wheel]'"
+            f"a wheel needs setuptools {SETUPTOOLS} or later, and {result}: pip install 'eomgen[wheel]'"
         )
     _refuse_native()
     if util.find_spec("Cython") is None:
@@ -110,11 +110,11 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Buil
     require_wheel(target)
     find_python_headers()
     compiler = find_compiler()
-    words = [os.environ.get("CFLAGS") or OPTIMIZED, *machine_flags(Options(), compiler)]
+    flags = [os.environ.get("CFLAGS") or OPTIMIZED, *machine_flags(Options(), compiler)]
     variables = {
         "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH") or EPOCH,
         "CC": shlex.join(compiler.command),
-        "CFLAGS": " ".join(words),
+        "CFLAGS": " ".join(flags),
     }
     if sys.platform.startswith("linux") and "LDSHARED" not in os.environ:
         variables["LDSHARED"] = f"{variables['CC']} -shared -Wl,-Bsymbolic"
@@ -151,9 +151,9 @@ def _read(folder: Path) -> tuple[list[str], str]:
 def _refuse_native() -> None:
     """Refuse instructions of one processor: a wheel is installed on others, where they would end the program."""
     for name in FLAGS:
-        if found := [word for word in NATIVE if word in os.environ.get(name, "").split()]:
+        if result := [word for word in NATIVE if word in os.environ.get(name, "").split()]:
             raise at_odds(
-                f"the environment variable {name} has {found[0]}, which compiles for the processor of this computer "
+                f"the environment variable {name} has {result[0]}, which compiles for the processor of this computer "
                 "alone, and a wheel is for others too; leave it out (code for vectors of every width is in the wheel, "
                 "and the widest that the processor has is chosen when it runs)"
             )
@@ -172,8 +172,8 @@ def _audit(wheel: Path, directory: Path, epoch: str) -> tuple[Path, str]:
     command = ["env", tools, f"SOURCE_DATE_EPOCH={epoch}", sys.executable, "-P", "-m", "auditwheel", "repair"]
     command += ["--wheel-dir", str(directory), str(wheel)]
     said = run(command, wheel.parent, allowed(0))
-    found = sorted(directory.glob("*.whl")) if said.returncode == 0 else []
-    if not found:
+    result = sorted(directory.glob("*.whl")) if said.returncode == 0 else []
+    if not result:
         last = said.stdout.splitlines()[-1:] or ["no word why"]
         return wheel, f"{kept}: auditwheel says: {last[0].strip()}"
-    return found[0], ""
+    return result[0], ""

@@ -536,10 +536,10 @@ def check_reaction_laws(model: CheckedModel) -> list[Finding]:
     for k, truth in enumerate(model.truths):
         case = truth.case
         wrenches = reactions(model.module, case.t, case.x, p=case.p, u=case.u)
-        carried = dict(zip(model.layout.info.joint_names, wrenches, strict=True))
+        by_joint = dict(zip(model.layout.info.joint_names, wrenches, strict=True))
         loose = force_limit(model, k, truth, wrenches)
         acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
-        expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
+        expected, slopes = np.transpose([_law(truth, f, specs[f.joint], by_joint[f.joint]) for f in forces])
         limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(model.layout.bodies)
         result.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
     return [result.finding()]
@@ -558,15 +558,15 @@ def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndar
 def _value(truth: Truth, force: ReactionFriction, across: float, along: float) -> Number:
     kinematics, number = truth.system.kinematics, truth.mp.mpf
     names = [reaction_symbol(kinematics.graph, force.joint, k).node[1] for k in range(3)]
-    carried = dict(zip(names, (number(across), truth.zero, number(along)), strict=True))
-    outputs = truth.system.evaluate(f"law of {force.name}", lambda: [_open(kinematics, force)], truth.values | carried)
+    by_joint = dict(zip(names, (number(across), truth.zero, number(along)), strict=True))
+    outputs = truth.system.evaluate(f"law of {force.name}", lambda: [_open(kinematics, force)], truth.values | by_joint)
     return outputs[0]
 
 
 def _open(kinematics: Kinematics, force: ReactionFriction) -> Expr:
     """The force of an element in terms of the state and of the joint's reaction."""
     motion = copy(kinematics.motion)
-    motion.carried = {}
+    motion.known_reactions = {}
     law = force.along(*force.path.measure(motion))
     mapping = motion.derived_symbols(kinematics.mechanism, symbols_of([law]))
     return substitute([law], mapping)[0] if mapping else law

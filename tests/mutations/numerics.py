@@ -14,7 +14,7 @@ FAULTS = (
     ),
     Fault(
         "row-scale-of-written-rows", "_find_scales",
-        "written and _is_plain([x / found[i] for x in gradient])",
+        "written and _is_plain([x / result[i] for x in gradient])",
         "written",
         "a relation that a user multiplied by anything keeps the scale of its kind",
         "tests/mechanics/test_row_sizes.py::test_areas_of_any_unit_leave_the_freedoms[1e-12-numpy]",
@@ -48,7 +48,7 @@ FAULTS = (
     ),
     Fault(
         "rounding-terms", "terms_of",
-        "found[operands[0]] + found[operands[1]]",
+        "result[operands[0]] + result[operands[1]]",
         'graph.apply("abs", Expr(graph, i))',
         "the size of a sum's terms is taken from the sum",
         "tests/core/test_operations.py::test_a_coefficient_that_cancels_holds_nothing",

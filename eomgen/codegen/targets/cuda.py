@@ -22,7 +22,7 @@ from ..c import count_constants, emit_c
 from ..c_functions import used_calls
 from ..c_text import print_block
 from ..files import example_state, render
-from ..package import carry, folders_of
+from ..package import folders_of, include
 from ..pair_sums import refuse_sums
 from ..program import Block, KernelDriver, Program
 from ..statements import cut
@@ -37,7 +37,7 @@ _OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTI
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
 
 #: What a package carries of eomgen, unchanged.
-CARRIED = ("errors.py", "base", "runtime")
+CONTENTS = ("errors.py", "base", "runtime")
 
 
 def emit_device_text(program: Program) -> str:
@@ -172,15 +172,15 @@ def cuda_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     facts = describe_device(program)
     context = context | {"facts": facts, "timed": TIMED_ON_DEVICE}
     init = render("cuda/__init__.py.j2", context)
-    carried = carry(CARRIED, program.metadata)
-    context |= {"folders": folders_of(carried), "requirements": (*context["requirements"], *CUDA_REQUIREMENTS)}
+    included = include(CONTENTS, program.metadata)
+    context |= {"folders": folders_of(included), "requirements": (*context["requirements"], *CUDA_REQUIREMENTS)}
     return {
         "py.typed": "",
         "__init__.py": init,
         f"{program.name}.cu": emit_device_text(program),
         "pyproject.toml": render("python/pyproject.toml.j2", context),
         "README.md": render("cuda/README.md.j2", context),
-        **carried,
+        **included,
     }
 
 

@@ -92,13 +92,13 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
     metadata, units, docs = program.metadata, program.metadata["units"], program.metadata["docs"]
     x_names, taken = metadata["x_names"], set(metadata["x_names"])
     exact, bounds = find_exact(program), bounds_of(ModelInfo.of(metadata))
-    found: list[Variable] = []
+    result: list[Variable] = []
 
     def add(name: str, group: str, unit: str, doc: str, **more: object) -> None:
         while name in taken and group != "x":
             name += "_out" if group == "y" else "_"
         taken.add(name)
-        found.append(Variable(name, len(found), group, unit, doc, **more))  # type: ignore[arg-type]
+        result.append(Variable(name, len(result), group, unit, doc, **more))  # type: ignore[arg-type]
 
     for k, name in enumerate(x_names):
         add(name, "x", units.get(name, ""), docs.get(name, ""), start=float(start[k]), exact=exact[k])
@@ -117,7 +117,7 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
     add("time", "time", "s", "")
     for event in metadata.get("events", ()):
         add(f"event({event['name']})", "event", "", event["doc"])
-    return found
+    return result
 
 
 def find_exact(program: Program) -> list[bool]:
@@ -239,12 +239,12 @@ def _structure(variables: Sequence[Variable], two: bool) -> list[ElementTree.Ele
         "EventIndicator": [v for v in variables if v.group == "event"],
     }
     if not two:
-        return [_tag(tag, {"valueReference": str(v.reference)}) for tag, found in groups.items() for v in found]
+        return [_tag(tag, {"valueReference": str(v.reference)}) for tag, result in groups.items() for v in result]
     titles = zip(("Outputs", "Derivatives", "InitialUnknowns"), groups.values(), strict=False)
     return [
-        _tag(title, {}, *(_tag("Unknown", {"index": str(v.reference + 1)}) for v in found))
-        for title, found in titles
-        if found
+        _tag(title, {}, *(_tag("Unknown", {"index": str(v.reference + 1)}) for v in result))
+        for title, result in titles
+        if result
     ]
 
 

@@ -44,13 +44,13 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
 
 def twins(program: Program) -> dict[str, Twin]:
     """Python twins of the native functions a program calls, by the names that the NumPy module uses."""
-    found = {}
+    result = {}
     for f, _ in used_calls(program).values():
         if f.native is not None:
-            twin = f.require_evaluator()
-            assert isinstance(twin, Twin)
-            found[f"call_{f.name}"] = twin
-    return found
+            fallback = f.require_evaluator()
+            assert isinstance(fallback, Twin)
+            result[f"call_{f.name}"] = fallback
+    return result
 
 
 def emit_numpy(program: Program) -> SourceSet:
@@ -84,15 +84,15 @@ def _table(program: Program) -> dict[str, Any]:
         "n_const": len(program.parameters) + len(program.hoisted), "n_work": n_work,
         "closed_at": closed_at(program, areas),
     }  # fmt: skip
-    found = describe_equations(program, areas) if program.drivers else None
+    result = describe_equations(program, areas) if program.drivers else None
     system = program.system if "system" in program.block_names else None
-    equations = found and {
-        "numbers": [int(number) for numbers, _ in found["numbers"] for number in numbers.split(",")],
-        "tables": list(found["tables"].values()),
+    equations = result and {
+        "numbers": [int(number) for numbers, _ in result["numbers"] for number in numbers.split(",")],
+        "tables": list(result["tables"].values()),
         "quaternions": [tuple(slot) for slot in program.quaternion_slots],
         "places": [system.places, system.relaxed] if system else [[], []],
-        "areas": found["areas"],
-        "functions": [name.removesuffix("_block") if name != "NULL" else None for name in found["functions"]],
+        "areas": result["areas"],
+        "functions": [name.removesuffix("_block") if name != "NULL" else None for name in result["functions"]],
     }
     kernels = [(k.name, k.n_in, k.n_out) for k in program.kernels]
     return {"name": repr(program.name), "sizes": sizes, "kernels": kernels, "equations": equations}

@@ -128,7 +128,7 @@ def _context(program: Program, library: str) -> dict[str, Any]:
 
 def _public(program: Program, minimal: bool) -> list[Traced]:
     """The public functions, in the order of the table of kernels."""
-    found, drivers, sizes = [], {d.name for d in program.drivers}, program.sizes
+    collected, drivers, sizes = [], {d.name for d in program.drivers}, program.sizes
     for kernel in program.kernels:
         if kernel.name not in TRACED_KERNELS or kernel.name == "kinematics" or not kernel.n_out:
             continue
@@ -138,14 +138,16 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
         if kernel.name in drivers:
             function = OF_LOOPS[kernel.name] if program.has_loops else f"{kernel.name}_of_tree"
             function = "tree_mass_matrix" if kernel.name == "mass_matrix" else function
-        found.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
+        collected.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
     if minimal:
         n = 2 * sizes.n_dof - sizes.n_states
-        given = {"z": n, "q_guess": sizes.n_q}
+        raw = {"z": n, "q_guess": sizes.n_q}
         if n:
-            found.append(Traced("minimal_rhs", given, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal"))
-        found.append(Traced("full_state", given, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))
-    return found
+            collected.append(
+                Traced("minimal_rhs", raw, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal")
+            )
+        collected.append(Traced("full_state", raw, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))
+    return collected
 
 
 def _require_traceable(program: Program, library: str) -> None:
@@ -197,9 +199,9 @@ def functions(program: Program) -> ModuleType:
     library = program.metadata["target"]
     text = emit_traced(program, library)
     name = f"{program.name}_{library}_{sha256(text.encode()).hexdigest()[:16]}"
-    found: ModuleType | None = find_module(name)
-    if found is not None:
-        return found
+    collected: ModuleType | None = find_module(name)
+    if collected is not None:
+        return collected
     title, requirement = LIBRARIES[library]
     try:
         return load_source(name, f"<{name}>", text.encode())

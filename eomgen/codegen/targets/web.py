@@ -95,10 +95,10 @@ def refuse(program: Program) -> None:
     metadata, remedy = program.metadata, "simulate it, and show the run: traj.animate('run.html')"
     problems = [Problem(f"constraints.{name}", "it closes and opens by impacts, which a page does not compute", remedy,
                         code="EG-UNSUPPORTED") for name in metadata.get("switched", {})]  # fmt: skip
-    given = {place for _, place in metadata.get("resets", ())}
+    raw = {place for _, place in metadata.get("resets", ())}
     problems += [Problem(f"states.{clock['name']}", "it is sampled without a law, by a function in Python", remedy,
                          code="EG-UNSUPPORTED") for clock in metadata.get("clocks", ())
-                 if not given.intersection(clock.get("states", given))]  # fmt: skip
+                 if not raw.intersection(clock.get("states", raw))]  # fmt: skip
     if program.sizes.n_bodies > BODIES:
         problems.append(Problem("bodies", f"{program.sizes.n_bodies} are more than the {BODIES} that a page takes",
                                 remedy, code="EG-UNSUPPORTED"))  # fmt: skip
@@ -124,13 +124,13 @@ Arrow = tuple[str, bool, bool, Vec3, Vec3]  #: of what, whether a reaction, whet
 def _loads(kinematics: Kinematics) -> list[Arrow]:
     """What the force elements exert on bodies, ground axes."""
     graph, poses, motion = kinematics.graph, kinematics.poses, kinematics.motion
-    found: list[Arrow] = []
+    result: list[Arrow] = []
     for terms in kinematics.forces:
         for load in terms.marker_loads:
             if load.marker.body != GROUND:
                 at = poses.marker(load.marker).position
                 parts = enumerate((load.force, load.torque))
-                found += [(terms.force.name, False, k == 1, at, part) for k, part in parts]
+                result += [(terms.force.name, False, k == 1, at, part) for k, part in parts]
         for pushed in terms.coordinate_loads:
             spec = next((one for one in kinematics.mechanism.joints if one.coordinates == (pushed.coordinate,)), None)
             if spec is not None:
@@ -138,8 +138,8 @@ def _loads(kinematics: Kinematics) -> list[Arrow]:
                 angular, linear = spec.joint.subspace(graph, [value])[0]
                 turns = not all(part.is_zero for part in angular)
                 way = vec.scale(pushed.value, vec.times(marker.rotation, angular if turns else linear))
-                found.append((terms.force.name, False, turns, marker.position, way))
-    return found
+                result.append((terms.force.name, False, turns, marker.position, way))
+    return result
 
 
 def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Arrow]:
@@ -159,7 +159,7 @@ def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: Tr
     wrenches = JointWrenches(kinematics)
     labels = [constraints.labels[i] for i in mobility.independent_rows]
     every = joint_reactions(wrenches, dict(zip(labels, values, strict=True)))
-    found: list[Arrow] = []
+    result: list[Arrow] = []
     for spec, unknown in zip(wrenches.specs, open_, strict=True):
         if spec.name not in every:
             continue
@@ -167,8 +167,8 @@ def _reactions(module: Any, kinematics: Kinematics, mobility: Mobility, tree: Tr
         for k, part in enumerate(force_and_moment(kinematics.motion, spec, every[spec.name])):
             known = [graph.zero if lost else x for x, lost in
                      zip(vec.times(marker.rotation, part), unknown[3 * k : 3 * k + 3], strict=True)]  # fmt: skip
-            found.append((spec.name, True, k == 1, marker.position, (known[0], known[1], known[2])))
-    return found
+            result.append((spec.name, True, k == 1, marker.position, (known[0], known[1], known[2])))
+    return result
 
 
 def with_arrows(
@@ -176,9 +176,9 @@ def with_arrows(
 ) -> tuple[Kinematics, list[tuple[str, bool, bool]]]:
     """The model whose outputs end with the places and parts (6 numbers) of arrows, and what these are."""
     every: list[Arrow] = []
-    for found in (_loads(kinematics), _reactions(module, kinematics, mobility, tree)):
-        found = [one for one in found if not all(x.is_zero for x in one[4])]
-        every += found if len(found) <= ARROWS else []
+    for result in (_loads(kinematics), _reactions(module, kinematics, mobility, tree)):
+        result = [one for one in result if not all(x.is_zero for x in one[4])]
+        every += result if len(result) <= ARROWS else []
     numbers = [x for *_, at, way in every for x in (*at, *way)]
     outputs = [Output(f"arrow[{k}]", x) for k, x in enumerate(numbers)]
     mechanism = replace(kinematics.mechanism, outputs=(*kinematics.mechanism.outputs, *outputs))
@@ -244,9 +244,9 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
     signals = {layout.u.index(name): ["as declared", *_tape(tape)] for name, tape in layout.signals.items()
                if name in layout.u}  # fmt: skip
     try:
-        found = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []
+        result = module.branches()[:BRANCHES] if layout.n_c and layout.n_v <= 24 else []
     except EomgenError:
-        found = []
+        result = []
     settings, bounds = plan.settings, bounds_of(info)
     finite = {name: [float(np.clip(end, -1e300, 1e300)) for end in pair] for name, pair in bounds.items()}
     return {
@@ -255,7 +255,7 @@ def describe_model(module: BoundModel, method: str) -> dict[str, Any]:
         "uValues": [inputs[name] for name in layout.u], "x0": [float(x) for x in x0], "rows": layout.n_c,
         "slots": [list(pair) for pair in layout.quaternion_slots], "independent": independent, "independentQ": places,
         "sizes": [float(info.length_scale or 1.0) if layout.unit(name) == "m" else 1.0 for name in layout.q],
-        "ranges": ranges, "bounds": finite, "signals": signals, "branches": [[float(x) for x in q] for q in found],
+        "ranges": ranges, "bounds": finite, "signals": signals, "branches": [[float(x) for x in q] for q in result],
         "events": [list(row) for row in rows], "resets": [list(row) for row in info.resets], "end": float(plan.end),
         "rtol": float(settings["rtol"]), "atol": np.broadcast_to(settings["atol"], layout.n_x).tolist(),
         "maxStep": settings.get("max_step"), "firstStep": settings.get("first_step"),

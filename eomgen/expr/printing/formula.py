@@ -73,8 +73,8 @@ class Order:
             if any(self.of_name(str(s))[0] == RATE for s in base.free_symbols):
                 rates += times if base.is_Symbol else max(times, _degree(base, self._is_rate))
         keys.sort()
-        given = any(key[0] == INPUT for key in keys)
-        family = 0 if given else (2, 3, 1)[min(rates, 2)]
+        raw = any(key[0] == INPUT for key in keys)
+        family = 0 if raw else (2, 3, 1)[min(rates, 2)]
         heavy = not keys or keys[0][0] > INERTIAL_SUM
         function = bool(keys) and keys[-1][0] >= FUNCTION
         return (family, heavy, function, degree, _flat(keys))
@@ -88,9 +88,9 @@ class Order:
 
     def terms(self, terms: Iterable[Any]) -> list[Any]:
         """Terms in order; the first is not subtracted if one is added."""
-        found = sorted(terms, key=lambda x: (self.of_term(x), sympy.default_sort_key(x)))
-        added = next((k for k, term in enumerate(found) if not is_subtracted(term)), 0)
-        return [found[added], *found[:added], *found[added + 1 :]]
+        result = sorted(terms, key=lambda x: (self.of_term(x), sympy.default_sort_key(x)))
+        added = next((k for k, term in enumerate(result) if not is_subtracted(term)), 0)
+        return [result[added], *result[:added], *result[added + 1 :]]
 
 
 def is_subtracted(term: Any) -> bool:
@@ -121,13 +121,13 @@ def _natural(name: str) -> Key:
 
 def _flat(keys: Iterable[Any]) -> tuple[str, ...]:
     """Keys of different shapes as texts that can be compared."""
-    found: list[str] = []
+    result: list[str] = []
     for key in keys:
         if isinstance(key, tuple):
-            found += _flat(key)
+            result += _flat(key)
         else:
-            found.append(f"{key:06d}" if isinstance(key, int) else str(key))
-    return tuple(found)
+            result.append(f"{key:06d}" if isinstance(key, int) else str(key))
+    return tuple(result)
 
 
 # -- the tree ----------------------------------------------------------------------------------------------------------
@@ -265,10 +265,10 @@ class Formulas:
         """The tree of an expression or a matrix."""
         if isinstance(expression, sympy.MatrixBase):
             return Matrix(tuple(tuple(map(self, row)) for row in expression.tolist()))
-        found = self._made.get(expression)
-        if found is None:
-            found = self._made[expression] = self._formula(expression)
-        return found
+        result = self._made.get(expression)
+        if result is None:
+            result = self._made[expression] = self._formula(expression)
+        return result
 
     def _formula(self, x: Any) -> Formula:
         if x.is_Symbol:
@@ -330,9 +330,9 @@ class Formulas:
         for size in list(below):
             root = _root(size.base) if size.is_Pow and size.exp == sympy.Rational(1, 2) else None
             for x in () if root is None else (root, -root):
-                found = _without(above, x)
-                if found is not None:
-                    above = [*found, sympy.Function("sgn")(x)]
+                result = _without(above, x)
+                if result is not None:
+                    above = [*result, sympy.Function("sgn")(x)]
                     below.remove(size)
                     self.signs = True
                     break
@@ -368,12 +368,12 @@ class Formulas:
 
 def _root(base: Any) -> Any:
     """x of x^2, also of products and higher powers; None where it is no square of names and sums."""
-    found = []
+    result = []
     for factor in sympy.Mul.make_args(base):
         if not (factor.is_Pow and factor.exp.is_Integer and factor.exp % 2 == 0):
             return None
-        found.append(sympy.Pow(factor.base, factor.exp / 2))
-    return sympy.Mul(*found)
+        result.append(sympy.Pow(factor.base, factor.exp / 2))
+    return sympy.Mul(*result)
 
 
 def _without(factors: list[Any], x: Any) -> list[Any] | None:

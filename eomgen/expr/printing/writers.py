@@ -25,14 +25,14 @@ def bare_mathml(latex: str) -> str:
 
 
 def _pieces(latex: str) -> list[str]:
-    found, depth = [""], 0
+    result, depth = [""], 0
     for letter in latex:
         depth += (letter == "{") - (letter == "}")
         if letter == " " and depth == 0:
-            found.append("")
+            result.append("")
         else:
-            found[-1] += letter
-    return [piece for piece in found if piece]
+            result[-1] += letter
+    return [piece for piece in result if piece]
 
 
 def _piece(latex: str) -> str:
@@ -64,11 +64,11 @@ class FormulaWriter:
 
     def sum(self, formula: tree.Sum) -> str:
         """Terms with their signs."""
-        found = ""
+        result = ""
         for k, (subtracted, term) in enumerate(formula.terms):
             between = self.minus if subtracted else self.plus
-            found += (self.negative * subtracted if k == 0 else between) + self.factor(term)
-        return found
+            result += (self.negative * subtracted if k == 0 else between) + self.factor(term)
+        return result
 
     def relation(self, formula: tree.Relation) -> str:
         """Sides with their sign between them."""
@@ -119,10 +119,10 @@ class _LatexWriter(FormulaWriter):
         return part.latex
 
     def product(self, formula: tree.Product) -> str:
-        found = ""
+        result = ""
         for shown in map(self.factor, formula.factors):
-            found += (r" \cdot " if found and shown[0].isdigit() else " " if found else "") + shown
-        return found
+            result += (r" \cdot " if result and shown[0].isdigit() else " " if result else "") + shown
+        return result
 
     def quotient(self, formula: tree.Quotient) -> str:
         return rf"\frac{{{self.write(formula.above)}}}{{{self.write(formula.below)}}}"
@@ -301,11 +301,11 @@ class _MathMLWriter(FormulaWriter):
 
     def product(self, formula: tree.Product) -> str:
         """Factors side by side; a point before one that begins with a digit."""
-        found: list[str] = []
+        result: list[str] = []
         for shown in map(self.factor, formula.factors):
             begins = shown.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
-            found += [("<mo>·</mo>" if begins else _THIN) if found else "", shown]
-        return row(*found)
+            result += [("<mo>·</mo>" if begins else _THIN) if result else "", shown]
+        return row(*result)
 
     def quotient(self, formula: tree.Quotient) -> str:
         return f"<mfrac>{row(self.write(formula.above))}{row(self.write(formula.below))}</mfrac>"
@@ -417,17 +417,17 @@ def sums_in_lines(formula: tree.Formula, names: Notation) -> list[tree.Formula]:
 
     A product with a sum that is wider than a line is multiplied out in as few parts as fit.
     """
-    room = PAGE - LABEL
-    wide = isinstance(formula, tree.Product) and width(formula, names) > room
-    given = formula.terms if isinstance(formula, tree.Sum) else ((False, formula),) if wide else ()
-    terms = [(subtracted, part) for subtracted, term in given for part in _in_parts(term, names, room)]
+    space = PAGE - LABEL
+    wide = isinstance(formula, tree.Product) and width(formula, names) > space
+    raw = formula.terms if isinstance(formula, tree.Sum) else ((False, formula),) if wide else ()
+    terms = [(subtracted, part) for subtracted, term in raw for part in _in_parts(term, names, space)]
     if len(terms) < 2:
         return [formula]
     lines: list[list[tuple[bool, tree.Formula]]] = [[]]
     used = 0.0
     for subtracted, term in terms:
         size = width(term, names) + SIGN
-        if used and used + size > room:
+        if used and used + size > space:
             lines.append([])
             used = 0.0
         lines[-1].append((subtracted, term))
@@ -444,28 +444,28 @@ def latex_lines(formula: tree.Formula, names: Notation) -> list[str]:
 def mathml_lines(formula: tree.Formula, names: Notation) -> list[str]:
     """The same in MathML; the sign with which a further line begins is spaced as it is between terms."""
     first, *others = sums_in_lines(formula, names)
-    found = [mathml(first, names)]
+    result = [mathml(first, names)]
     for line in others:
         subtracted = isinstance(line, tree.Sum) and line.terms[0][0]
         shown = mathml(line, names)
         sign = MINUS_SIGN if subtracted else "+"
-        found.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
-    return found
+        result.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
+    return result
 
 
-def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.Formula]:
+def _in_parts(term: tree.Formula, names: Notation, space: float) -> list[tree.Formula]:
     """A product whose widest sum is cut where it is too wide: of a (b + c + d) a (b + c) and a d."""
-    if not isinstance(term, tree.Product) or width(term, names) + SIGN <= room:
+    if not isinstance(term, tree.Product) or width(term, names) + SIGN <= space:
         return [term]
     sums = [x for x in term.factors if isinstance(x, tree.Sum)]
     if not sums:
         return [term]
     widest = max(sums, key=lambda x: width(x, names))
     others = width(term, names) - width(widest, names)
-    if others > room / 2:  # to cut one sum would write the others again and again
+    if others > space / 2:  # to cut one sum would write the others again and again
         return [term]
     sizes = [width(x, names) + SIGN for _, x in widest.terms]
-    each = sum(sizes) / math.ceil(sum(sizes) / (room - others))  # in parts of about the same width
+    each = sum(sizes) / math.ceil(sum(sizes) / (space - others))  # in parts of about the same width
     groups: list[list[tuple[bool, tree.Formula]]] = [[]]
     used = 0.0
     for part, size in zip(widest.terms, sizes, strict=True):

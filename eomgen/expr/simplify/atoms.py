@@ -66,11 +66,11 @@ class Atoms:
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
         atom = Atom(kind, what)
-        found = self._ids.get(atom)
-        if found is None:
-            found = self._ids[atom] = len(self.table)
+        result = self._ids.get(atom)
+        if result is None:
+            result = self._ids[atom] = len(self.table)
             self.table.append(atom)
-        return found
+        return result
 
     def inside(self, atom: int) -> set[int]:
         """The atoms that an atom is made of, all of smaller numbers."""
@@ -82,14 +82,14 @@ class Atoms:
 
     def all_in(self, poly: Poly) -> set[int]:
         """The atoms that stand in a polynomial, at any depth."""
-        found: set[int] = set()
+        result: set[int] = set()
         left = [a for monomial in poly for a, _ in monomial]
         while left:
             atom = left.pop()
-            if atom not in found:
-                found.add(atom)
+            if atom not in result:
+                result.add(atom)
                 left += self.inside(atom)
-        return found
+        return result
 
     def factors(self, poly: Poly, within: Collection[str] = SUMS) -> Iterator[tuple[int, Fraction | int]]:
         """The atoms of a sum of products with their exponents, and those of the kinds of factors ``within``."""
@@ -142,15 +142,15 @@ def number(value: float) -> tuple[Number, bool]:
     rounding of a few operations of it, such as 8.7 for 0.1 * 87.0; else the double itself.
     """
     near = Fraction(value).limit_denominator(SMALL)
-    room = ROUNDED_BY * math.ulp(value)
-    if abs(near.numerator) < 10**12 and abs(near.numerator / near.denominator - value) <= room:
+    tolerance = ROUNDED_BY * math.ulp(value)
+    if abs(near.numerator) < 10**12 and abs(near.numerator / near.denominator - value) <= tolerance:
         return ratio(near, 1), False
     for digits in range(1, DIGITS + 1):
         text = f"{value:.{digits}g}"
-        if abs(float(text) - value) <= room:
+        if abs(float(text) - value) <= tolerance:
             return ratio(Fraction(text), 1), False
     turns = Fraction(value / math.pi).limit_denominator(360)
-    if 0 < abs(turns.numerator) <= SMALL and abs(turns.numerator / turns.denominator * math.pi - value) <= room:
+    if 0 < abs(turns.numerator) <= SMALL and abs(turns.numerator / turns.denominator * math.pi - value) <= tolerance:
         return ratio(turns, 1), True
     return value, False
 
@@ -325,10 +325,10 @@ class Costs:
         """A product."""
         if not monomial:
             return 1.0
-        found = self._products.get(monomial)
-        if found is None:
-            found = self._products[monomial] = self._product(monomial)
-        return found
+        result = self._products.get(monomial)
+        if result is None:
+            result = self._products[monomial] = self._product(monomial)
+        return result
 
     def _product(self, monomial: Monomial) -> float:
         cost = sum(self.of_power(a, n) for a, n in monomial) + (OPERATION + 1.0) * (len(monomial) - 1)

@@ -31,30 +31,30 @@ Given = Sequence[tuple[str, Expr]]
 
 
 def joined_nodes(
-    exprs: Sequence[Expr], given: Given = (), unit: Sequence[Sequence[str]] = ()
+    exprs: Sequence[Expr], raw: Given = (), unit: Sequence[Sequence[str]] = ()
 ) -> tuple[list[Expr], list[tuple[str, Expr]]]:
     """Expressions, and what names in them stand for, with nodes of one function made one node, in a graph of their own.
 
-    ``given`` are names that stand in the expressions as symbols, and what they stand for, in order; ``unit`` symbols
+    ``raw`` are names that stand in the expressions as symbols, and what they stand for, in order; ``unit`` symbols
     whose squares have the sum 1, such as the Euler parameters of a joint.
     """
-    roots = [*(x for _, x in given), *exprs]
+    roots = [*(x for _, x in raw), *exprs]
     if not roots:
         return [], []
     roots, graph = with_known_conditions(roots), roots[0].graph
     opened = Opened(graph, [x.id for x in roots])
     order = reachable(graph, [*opened.roots, *opened.operands])
-    own = [name for name, _ in given]
+    own = [name for name, _ in raw]
     names = sorted(graph.nodes[i][1] for i in order if graph.nodes[i][0] == "sym" and graph.nodes[i][1] not in own)
-    found: dict[int, int] = {}
+    result: dict[int, int] = {}
     if names and len(order) * (POINTS + MOVED * len(names)) <= MOST:
         meant = list(zip(own, (Expr(graph, i) for i in opened.roots), strict=False))
         joined = _Joined(Values(graph, order, names, meant, unit), own)
-        found = joined.nodes()
-        long = sum(joined.size[found[i]] for i in opened.roots) > LONG
-        if long and len(reachable(graph, [found[i] for i in opened.roots])) > len(reachable(graph, opened.roots)):
-            found = {}  # parts written anew share less with the others
-    ids = opened.closed(found)
+        result = joined.nodes()
+        long = sum(joined.size[result[i]] for i in opened.roots) > LONG
+        if long and len(reachable(graph, [result[i] for i in opened.roots])) > len(reachable(graph, opened.roots)):
+            result = {}  # parts written anew share less with the others
+    ids = opened.closed(result)
     made = _copied(graph, ids)
     return made[len(own) :], list(zip(own, made, strict=False))
 
@@ -95,7 +95,7 @@ class Opened:
         self.roots = [new[i] for i in roots]
         self.operands = [k for _, parts in self._stands_for.values() for k in parts]
 
-    def closed(self, found: Mapping[int, int]) -> list[int]:
+    def closed(self, result: Mapping[int, int]) -> list[int]:
         """The roots with what was found for their nodes, and with the operations in the place of the symbols."""
         graph, final = self.graph, dict[int, int]()
 
@@ -107,8 +107,8 @@ class Opened:
             return final.get(i, i)
 
         for symbol, (operation, parts) in self._stands_for.items():
-            final[symbol] = graph.make(operation, *(put_in(found.get(k, k)) for k in parts))
-        return [put_in(found.get(i, i)) for i in self.roots]
+            final[symbol] = graph.make(operation, *(put_in(result.get(k, k)) for k in parts))
+        return [put_in(result.get(i, i)) for i in self.roots]
 
 
 def _copied(graph: Graph, roots: Sequence[int]) -> list[Expr]:
@@ -135,7 +135,7 @@ class Values:
     """
 
     def __init__(
-        self, graph: Graph, order: Sequence[int], names: Sequence[str], given: Given, unit: Sequence[Sequence[str]]
+        self, graph: Graph, order: Sequence[int], names: Sequence[str], raw: Given, unit: Sequence[Sequence[str]]
     ) -> None:
         self.graph, self.order, self.names = graph, order, names
         random = np.random.default_rng(5)
@@ -144,7 +144,7 @@ class Values:
             part = random.standard_normal((len(four), POINTS))
             at |= dict(zip(four, part / np.linalg.norm(part, axis=0), strict=True))
         moved = {name: random.uniform(-3.0, 3.0, MOVED) for name in names}
-        values, bounds, same = dependence([Expr(graph, i) for i in order], at, moved, given)
+        values, bounds, same = dependence([Expr(graph, i) for i in order], at, moved, raw)
         self.values, self.bounds = dict(zip(order, values, strict=True)), dict(zip(order, bounds, strict=True))
         self.at = at
         bits = {i: np.flatnonzero(~same[k]).tolist() for k, i in enumerate(order)}
@@ -202,11 +202,11 @@ class _Joined:
             new[i] = self._measured(self.graph.make(node[0], *(new[k] for k in parts))) if parts else i
             if node[0] == "const":
                 continue
-            found = self._known(i, new, known)
-            if found is None and parts:
+            result = self._known(i, new, known)
+            if result is None and parts:
                 new[i] = self._without_symbols(i, new[i])
-            elif found is not None:
-                new[i] = self._measured(found)
+            elif result is not None:
+                new[i] = self._measured(result)
         return new
 
     def _known(self, i: int, new: Mapping[int, int], known: dict[tuple[int, int, int], list[int]]) -> int | None:
@@ -235,12 +235,12 @@ class _Joined:
     def _without_symbols(self, i: int, new: int) -> int:
         """With 0 for the symbols on which node i does not depend, if that is the same and shorter."""
         symbols = self.symbols[new]
-        idle = symbols & ~self.values.depends[i]
-        if symbols < 0 or not idle or self.left < 0:
+        absent = symbols & ~self.values.depends[i]
+        if symbols < 0 or not absent or self.left < 0:
             return new
         graph = self.graph
         self.left -= len(reachable(graph, [new]))
-        put = {graph.symbol(name): graph.zero for name, bit in self.place.items() if idle & bit}
+        put = {graph.symbol(name): graph.zero for name, bit in self.place.items() if absent & bit}
         (tried,) = substitute([Expr(graph, new)], put)
         self._measured(tried.id)
         if self.size[tried.id] >= self.size[new]:

@@ -84,10 +84,10 @@ class JoinedAngles:
         amount = group[min(group)]
         unit = {m: ratio(x, amount) for m, x in group.items()}
         key = freeze(unit)
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = min(self._forms(unit), key=self.costs.of_terms)
-        return scaled(found, amount)
+        result = self._known.get(key)
+        if result is None:
+            result = self._known[key] = min(self._forms(unit), key=self.costs.of_terms)
+        return scaled(result, amount)
 
     def _forms(self, group: Poly) -> Iterator[Poly]:
         yield group
@@ -131,9 +131,9 @@ class JoinedAngles:
                 result = add(result, {monomial: x})
                 continue
             self.work.spend(2)
-            twin = self.atoms.id(full, self.atoms.table[square].what)
+            counterpart = self.atoms.id(full, self.atoms.table[square].what)
             rest = join(monomial, ((square, -2),))
-            waiting = add(waiting, {rest: x, join(rest, ((twin, 2),)): -x})
+            waiting = add(waiting, {rest: x, join(rest, ((counterpart, 2),)): -x})
         return result
 
     def _split(self, group: Poly) -> Poly:
@@ -199,13 +199,13 @@ class JoinedAngles:
 
     def _steps(self, group: Poly) -> Iterator[Poly]:
         """Changes that are zero by a theorem and take two terms away."""
-        found: dict[tuple[Monomial, Frozen, Frozen], dict[tuple[str, str], Number]] = {}
+        result: dict[tuple[Monomial, Frozen, Frozen], dict[tuple[str, str], Number]] = {}
         for monomial, x in group.items():
             for rest, first, second in self._pairs(monomial):
                 (ka, a), (kb, b) = sorted((self.atoms.table[i] for i in (first, second)), key=lambda atom: atom.what)
-                kinds = found.setdefault((rest, a, b), {})
+                kinds = result.setdefault((rest, a, b), {})
                 kinds[ka, kb] = x
-        for (rest, a, b), kinds in found.items():
+        for (rest, a, b), kinds in result.items():
             yield from self._sums(rest, a, b, kinds)
 
     def _pairs(self, monomial: Monomial) -> Iterator[tuple[Monomial, int, int]]:
@@ -309,8 +309,8 @@ class Expansion(OfNodes[Poly]):
         waiting = [a]
         while waiting:
             done: Poly = {}
-            for given, x in waiting.pop().items():
-                monomial = self.atoms.without_squared_signs(given, "sum")
+            for raw, x in waiting.pop().items():
+                monomial = self.atoms.without_squared_signs(raw, "sum")
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x

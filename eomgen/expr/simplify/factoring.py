@@ -74,18 +74,18 @@ class Factoring:
             amount = 1  # x - 1/10, not (10 x - 1)/10
         if all(x < 0 for x in poly.values()):
             amount = -amount
-        found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
-        if len(found) == 1:
-            return multiply(found, {monomial: amount})
-        return self._wrapped(found, monomial, amount) if monomial or one_term else scaled(found, amount)
+        result = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
+        if len(result) == 1:
+            return multiply(result, {monomial: amount})
+        return self._wrapped(result, monomial, amount) if monomial or one_term else scaled(result, amount)
 
     def _sum(self, poly: Poly) -> Poly:
         """The shortest form found with what all terms share left in each of them."""
         key = freeze(poly)
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = self._primitive(poly)
-        return found
+        result = self._known.get(key)
+        if result is None:
+            result = self._known[key] = self._primitive(poly)
+        return result
 
     def _wrapped(self, sum_: Poly, monomial: Monomial, amount: Number) -> Poly:
         """amount monomial (sum), one term."""
@@ -135,18 +135,18 @@ class Factoring:
         """Common factors of two or more terms, the one that saves most first."""
         terms = list(poly)
         self.work.spend(len(terms) ** 2 // 2)
-        found: dict[Monomial, None] = {}
+        result: dict[Monomial, None] = {}
         if len(terms) <= PAIRS:
             for i, a in enumerate(terms):
                 for b in terms[i + 1 :]:
                     both = common(a, b)
                     if both:
-                        found[both] = None
+                        result[both] = None
         for monomial in terms if len(terms) > PAIRS else ():
             for atom, n in monomial:
-                found[((atom, 1 if n > 0 else -1 if n <= -1 else n),)] = None
+                result[((atom, 1 if n > 0 else -1 if n <= -1 else n),)] = None
         scores = []
-        for divisor in found:
+        for divisor in result:
             inside = [m for m in terms if common(m, divisor) == divisor]
             if len(inside) > 1 and len(inside) <= len(terms):
                 saved = (len(inside) - 1) * (self.costs.of_monomial(divisor) + 5.0) - SUM

@@ -23,7 +23,7 @@ from .names import EACH, NAME, GoodNames, Named, SharedSums, inlined, is_plain
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)
-ALONE = 30  #: operations of what is used once beyond which it gets a name in the first attempt
+NAMED_FROM = 30  #: operations of what is used once beyond which it gets a name in the first attempt
 WRITTEN = 4_000  #: operations beyond which an attempt is not made
 WORK = 100_000  #: products of terms in all attempts together
 LATER = 10_000  #: products of terms that are left in any case for names that are put in
@@ -82,12 +82,12 @@ class Form:
 
         tell_turns()
         raising.roots = {atom: (sympy.Symbol(name), n) for atom, (name, n) in good.roots.items()}
-        told: set[int] = set()
+        counted: set[int] = set()
 
         def tell_roots(poly: Poly) -> None:
             inside = self.expansion.atoms.all_in(poly)  # what a choice holds needs its roots told before it too
-            for root in sorted(inside.intersection(raising.roots).difference(told)):
-                told.add(root)
+            for root in sorted(inside.intersection(raising.roots).difference(counted)):
+                counted.add(root)
                 named.append((raising.roots[root][0], raising.root(root)))
 
         for atom, poly in self.named:
@@ -117,22 +117,22 @@ class Form:
 
 def simplify(
     exprs: Sequence[Expr],
-    given: Sequence[tuple[str, Expr]] = (),
+    raw: Sequence[tuple[str, Expr]] = (),
     rates: Collection[str] = (),
     prefix: str = "z",
     sizes: Sequence[int] = SIZES,
 ) -> Form | None:
     """The shortest form found of expressions; None of no expressions.
 
-    ``given`` are names that stand in the expressions as symbols, and what they stand for, in order; other names begin
+    ``raw`` are names that stand in the expressions as symbols, and what they stand for, in order; other names begin
     with ``prefix``.  ``rates`` names velocities and accelerations: sums of them are read more easily than sums of them
     and other quantities.  Up to so many operations of ``sizes`` what is shared is written out each time, one attempt
     each; ``WHOLE`` writes out all.
     """
-    graph = common_graph([*exprs, *(x for _, x in given)])
+    graph = common_graph([*exprs, *(x for _, x in raw)])
     if graph is None:
         return None
-    roots = [*(x.id for _, x in given), *(x.id for x in exprs)]
+    roots = [*(x.id for _, x in raw), *(x.id for x in exprs)]
     best: Form | None = None
     work = Work(WORK)
     seen: set[tuple[int, ...]] = set()
@@ -143,7 +143,7 @@ def simplify(
         if best is not None and total > WRITTEN:
             break
         seen.add(cuts)
-        form = _Attempt(graph, work, rates).form(exprs, given, cuts, prefix)
+        form = _Attempt(graph, work, rates).form(exprs, raw, cuts, prefix)
         if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
             best = form
         if work.left <= LATER or form.cost > WORSE * best.cost:
@@ -177,7 +177,7 @@ def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int
     for i in order:
         node = graph.nodes[i]
         size[i] = 0 if node[0] in LEAVES else 1 + sum(size[k] for k in operands(node))
-        limit = largest if uses[i] > 1 else max(largest, ALONE)
+        limit = largest if uses[i] > 1 else max(largest, NAMED_FROM)
         if size[i] > limit and node[0] not in unnamed and i not in roots and i not in angles:
             cuts.append(i)
             total += size[i]
@@ -187,14 +187,14 @@ def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int
 
 def _angles(graph: Graph, order: Sequence[int]) -> set[int]:
     """What stands in sines and cosines, and the sums in it."""
-    found: set[int] = set()
+    result: set[int] = set()
     left = [graph.nodes[i][1] for i in order if graph.nodes[i][0] in TURNS]
     while left:
         i = left.pop()
-        if i not in found and graph.nodes[i][0] in ("add", "sub", "neg"):
-            found.add(i)
+        if i not in result and graph.nodes[i][0] in ("add", "sub", "neg"):
+            result.add(i)
             left += operands(graph.nodes[i])
-    return found
+    return result
 
 
 class _Attempt:
@@ -210,8 +210,8 @@ class _Attempt:
         for name in sorted(node[1] for node in graph.nodes if node[0] == "sym"):  # so that ties fall alike
             self.expansion.atoms.id("sym", name)
 
-    def form(self, exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str) -> Form:
-        known = {self.graph.symbol(name).id: (x.id, name) for name, x in given}
+    def form(self, exprs: Sequence[Expr], raw: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str) -> Form:
+        known = {self.graph.symbol(name).id: (x.id, name) for name, x in raw}
         taken = {node[1] for node in self.graph.nodes if node[0] == "sym"}
         free = (f"{prefix}{k}" for k in itertools.count() if f"{prefix}{k}" not in taken)
         same: dict[Frozen, Poly] = {}
@@ -230,7 +230,7 @@ class _Attempt:
             self.literal.put(i, alike)
             self.mixed.put(i, Parts({}, alike))
         polys = [self._shortest(x.id) for x in exprs]
-        fixed = {self.expansion.atoms.id("name", name) for name, _ in given}
+        fixed = {self.expansion.atoms.id("name", name) for name, _ in raw}
         self.work.left = max(self.work.left, LATER)
         named, polys = inlined(self.expansion, self.factoring, self.named, polys, fixed)
         return Form(self.graph, self.expansion, self.factoring, named, polys)

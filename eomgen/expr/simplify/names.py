@@ -289,14 +289,14 @@ class SharedSums:
     # -- what is shared -----------------------------------------------------------------------------------------------
     def _sums(self) -> Counter[Frozen]:
         """Sums of the form and how often each is written."""
-        found: Counter[Frozen] = Counter()
+        result: Counter[Frozen] = Counter()
         outputs = {freeze(poly): poly for poly in self.polys}  # one that comes twice, as M_12 and M_21, is told once
         for poly in (*(poly for _, poly in self.named), *outputs.values()):
             if len(poly) > 1:
-                found[freeze(poly)] += 1
+                result[freeze(poly)] += 1
             inside = (self.atoms.table[a] for a, _ in self.atoms.factors(poly, ("factor",)))
-            found.update(what for kind, what in inside if kind == "factor")
-        return found
+            result.update(what for kind, what in inside if kind == "factor")
+        return result
 
     def _shared(self, sums: Collection[Frozen]) -> Iterator[Frozen]:
         """Sums of which at least two sums hold all terms, or all of them with the other sign."""
@@ -328,17 +328,17 @@ class SharedSums:
         for one in sums:
             for monomial, _ in one:
                 holders[monomial].append(one)
-        found: list[tuple[float, Frozen, list[Frozen]]] = []
+        result: list[tuple[float, Frozen, list[Frozen]]] = []
         for one in candidates:
             rarest = min((m for m, _ in one), key=lambda m: len(holders[m]))
             within = [other for other in holders[rarest] if _sign(dicts[other], one)]
             uses, length = sum(sums[other] for other in within), self.costs.of_terms(dict(one))
             saved = uses * (length - SHORT) - (length - SHORT if one in known else length + NEW)
             if saved > 0:
-                found.append((-saved, one, within))
+                result.append((-saved, one, within))
         chosen: list[Frozen] = []
         touched: set[Frozen] = set()
-        for _, one, within in sorted(found):
+        for _, one, within in sorted(result):
             if touched.isdisjoint(within):
                 chosen.append(one)
                 touched.update(within)
@@ -369,14 +369,14 @@ class SharedSums:
         """A sum with the name in it, in the factors of its terms too; itself where nothing changes."""
         if sign := _sign(poly, one):
             inside = dict(one)
-            found = add({m: x for m, x in poly.items() if m not in inside}, name, sign)
+            collected = add({m: x for m, x in poly.items() if m not in inside}, name, sign)
         else:
-            found = poly
-        terms = {m: self._term(m, one, name, new) for m in found}
+            collected = poly
+        terms = {m: self._term(m, one, name, new) for m in collected}
         if all(term is None for term in terms.values()):
-            return found
+            return collected
         result: Poly = {}
-        for m, x in found.items():
+        for m, x in collected.items():
             result = add(result, terms[m] or {m: 1}, x)
         return result
 

@@ -47,8 +47,8 @@ class Raising:
 
     def root(self, atom: int) -> Any:
         """A sum or its root, written out."""
-        found = self.expression(self.factoring.factored(dict(self.atoms.table[atom].what)))
-        return sympy.sqrt(found) if self.roots[atom][1] == 2 else found
+        result = self.expression(self.factoring.factored(dict(self.atoms.table[atom].what)))
+        return sympy.sqrt(result) if self.roots[atom][1] == 2 else result
 
     def turn(self, atom: int) -> Any:
         """A sine or cosine, written out."""

@@ -10,8 +10,8 @@ def _derive_in(name: str) -> Method:
     """The derivation in a file of its name, which is read when it is first used."""
 
     def derive(kinematics: Kinematics) -> TreeEquations:
-        found: TreeEquations = import_module(f".{name}", __package__).derive(kinematics)
-        return found
+        result: TreeEquations = import_module(f".{name}", __package__).derive(kinematics)
+        return result
 
     return derive
 

@@ -46,12 +46,12 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     rates, applied = joint_rates(kinematics), applied_wrenches(kinematics)
     rest = tuple(graph.zero for _ in kinematics.v)
     own = Resolved.in_link_axes(kinematics.links, kinematics.twists, rates, applied)
-    given = [link.spatial for link in kinematics.links]
+    raw = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
     inverse = _sweep(kinematics, own, inertias, a)
-    plain = _sweep(kinematics, own, given, a)
+    plain = _sweep(kinematics, own, raw, a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
-        inertias, inverse = given, plain
+        inertias, inverse = raw, plain
     chosen, mass, bias = own, composite_mass_matrix(own.links, inertias), _sweep(kinematics, own, inertias, rest)
     common = resolve_parallel(graph, kinematics.links, kinematics.v, rates, applied)
     if any(axes is not None for axes in common.axes):
@@ -90,8 +90,8 @@ def _turned_system(
 
 def _cost(mass: Rows, bias: Sequence[Expr]) -> int:
     """Operations of the lower triangle and the bias, sines and cosines as many as they last."""
-    found = count([*(x for i, row in enumerate(mass) for x in row[: i + 1]), *bias])
-    return found.total + 12 * (found.functions.get("sin", 0) + found.functions.get("cos", 0))
+    result = count([*(x for i, row in enumerate(mass) for x in row[: i + 1]), *bias])
+    return result.total + 12 * (result.functions.get("sin", 0) + result.functions.get("cos", 0))
 
 
 def _turning(omega: Vec3, alpha: Vec3) -> Mat3:
@@ -340,7 +340,7 @@ class ForceSlopes:
             self._inertias[k], vec.transpose((x, y, z)), vec.cross(self._twice[k], self._inertias[k].moment)
         )
 
-    def _carried(self, k: int, body: Composite) -> Composite:
+    def _outer_body(self, k: int, body: Composite) -> Composite:
         """Bodies from link k outwards, about the parent's origin in parent axes."""
         link, step = self._kinematics.links[k], self._step(k)
         turned = body.inertia.turned(link.joint_rotation).turned(link.turn)
@@ -383,30 +383,30 @@ class ForceSlopes:
                         whirl = vec.add(links[at].up(whirl), vec.cross(self._step(at), links[at].up(force[1])))
                         force, rate = links[at].lift(force), links[at].lift(rate)
             if (p := links[k].parent) != GROUND:
-                bodies[p] = bodies[p].plus(self._carried(k, body))
+                bodies[p] = bodies[p].plus(self._outer_body(k, body))
         return bodies, slopes, mass, gravity
 
     def _swept(self, a: Sequence[Expr], motions: list[tuple[Vec3, Mat3, Vec3]]) -> list[list[Twist]]:
         """Per column the second derivative of its field as seen from ground, less s x (acceleration of the origin)."""
         kinematics, two = self._kinematics, self._kinematics.graph.constant(2.0)
         along = kinematics.flow | dict(zip(kinematics.v, a, strict=True))
-        found: list[list[Twist]] = []
+        result: list[list[Twist]] = []
         for k, link in enumerate(kinematics.links):
             _, turning, linear = motions[k]
-            found.append([])
+            result.append([])
             for c, (s, l) in enumerate(link.columns):
                 if self._places[link.first + c] < 0:
                     alpha = motions[link.parent][0] if link.parent != GROUND else vec.zero(kinematics.graph)
                     fixed = _turning(self._above(k), link.down(alpha))
-                    found[k].append((vec.times(fixed, s), vec.neg(vec.cross(s, linear))))
+                    result[k].append((vec.times(fixed, s), vec.neg(vec.cross(s, linear))))
                     continue
                 first = jvp([*s, *l], kinematics.flow)
                 second = jvp(first, along)
                 rates = [vec.cross(self._omegas[k], vec.three(first, at)) for at in (0, 3)]
                 own = [vec.add(vec.three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]
                 hat = vec.sub(vec.times(turning, l), vec.cross(s, linear))
-                found[k].append((vec.add(vec.times(turning, s), own[0]), vec.add(hat, own[1])))
-        return found
+                result[k].append((vec.add(vec.times(turning, s), own[0]), vec.add(hat, own[1])))
+        return result
 
     def by_position(self, a: Sequence[Expr]) -> Entries:
         """(row, column) -> d(M a + h)/dq at fixed accelerations a (n,)."""
@@ -449,7 +449,7 @@ class ForceSlopes:
     def _by_coordinates(self, slopes: Entries) -> Entries:
         """Derivatives by angles of spherical joints as those by Euler parameters: d(angles)/de = 4 N^T / e^2."""
         kinematics = self._kinematics
-        found = {(i, self._places[j]): value for (i, j), value in slopes.items() if self._places[j] >= 0}
+        result = {(i, self._places[j]): value for (i, j), value in slopes.items() if self._places[j] >= 0}
         for slot in kinematics.quaternion_slots:
             e = kinematics.q[slot.coordinate : slot.coordinate + 4]
             rates = list(kinematics.rates[slot.coordinate : slot.coordinate + 4])
@@ -462,8 +462,8 @@ class ForceSlopes:
                     for c, slope in enumerate(angles):
                         if slope is not None:
                             total = total + slope * (N[m, c] * factor)
-                    found[i, slot.coordinate + m] = total
-        return found
+                    result[i, slot.coordinate + m] = total
+        return result
 
 
 def applied_forces(kinematics: Kinematics) -> list[Expr]:

@@ -165,8 +165,8 @@ class FreeBodyCut:
         if self.inner != GROUND:
             balances[self.inner] = add(balances[self.inner], wrench_at(self.marker, wrench))
         if self.outer != GROUND:
-            carried = wrench_at(self.holder, wrench_at(self.pose, wrench))
-            balances[self.outer] = sub(balances[self.outer], carried)
+            transferred = wrench_at(self.holder, wrench_at(self.pose, wrench))
+            balances[self.outer] = sub(balances[self.outer], transferred)
 
 
 def cut_joints(bodies: FreeBodies) -> list[FreeBodyCut]:
@@ -224,9 +224,9 @@ def _differentiate(
     entries = jacobian(rates, twist)
     flat = [entries.get((i, j), graph.zero) for i in range(len(values)) for j in range(6)]
     here = put_pose(R, p, pose.rotation, pose.position) | dict(zip(twist, (*relative[0], *relative[1]), strict=True))
-    found = substitute([*flat, *jvp(rates, flow)], here)
-    rows = tuple(tuple(found[6 * i : 6 * i + 6]) for i in range(len(values)))
-    return tuple(c.kind for c in closure), rows, tuple(found[6 * len(values) :])
+    result = substitute([*flat, *jvp(rates, flow)], here)
+    rows = tuple(tuple(result[6 * i : 6 * i + 6]) for i in range(len(values)))
+    return tuple(c.kind for c in closure), rows, tuple(result[6 * len(values) :])
 
 
 # -- free body system --------------------------------------------------------------------------------------------------

@@ -63,15 +63,15 @@ class IdleMotion:
         zero = dict.fromkeys(kinematics.velocity_names, 0.0)
         values = {**self.numbers, "t": 0.0, **dict(zip(kinematics.names, map(float, self.q), strict=True)), **zero}
         rates = dict(zip(kinematics.velocity_names, map(float, self.v), strict=True))
-        found: list[tuple[str, np.ndarray]] = []
+        result: list[tuple[str, np.ndarray]] = []
         for k, body in enumerate(kinematics.mechanism.bodies):
             marker = Marker(k, Frame.identity(graph), body.name)
             rotation = [x for row in motion.rotation(marker) for x in row]
             expressions = kinematics.resolve([*motion.angular_velocity(marker), *rotation])
             moving, still = (np.array(evaluate(expressions, values | part), dtype=float) for part in (rates, {}))
-            found.append((body.name, moving[3:].reshape(3, 3).T @ (moving[:3] - still[:3])))  # drivers turn bodies too
-        largest = max((float(np.linalg.norm(w)) for _, w in found), default=0.0)
-        return [(name, clean(w)) for name, w in found if np.linalg.norm(w) > max(FAINT * largest, UNMOVED)]
+            result.append((body.name, moving[3:].reshape(3, 3).T @ (moving[:3] - still[:3])))  # drivers turn bodies too
+        largest = max((float(np.linalg.norm(w)) for _, w in result), default=0.0)
+        return [(name, clean(w)) for name, w in result if np.linalg.norm(w) > max(FAINT * largest, UNMOVED)]
 
 
 def clean(axis: np.ndarray) -> list[float]:
@@ -95,7 +95,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     is any model whose ``check_inertia`` is ``note`` or ``off``.  Returned is what has no inertia, for the calls that
     need it; empty where all motions have.
     """
-    problems = find_idle(kinematics, mobility, tree)
+    problems = find_massless(kinematics, mobility, tree)
     if not problems:
         return ""
     mechanism = kinematics.mechanism
@@ -125,7 +125,7 @@ def _massless(kinematics: Kinematics) -> str:
     return f"; bodies without mass and inertia: {shown}"
 
 
-def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Problem]:
+def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Problem]:
     """The motions that move no mass at any configuration tried, as faults of the model.
 
     The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
@@ -138,9 +138,9 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
     n, r = len(names), mobility.rank
     if n == r:
         return []
-    found = tree.pivots or (tree.constrained().pivots if tree.constrained is not None and functions.m else ())
-    if found:
-        moved = Evaluator(list(found), (*kinematics.names, *numbers, "t"))
+    result = tree.pivots or (tree.constrained().pivots if tree.constrained is not None and functions.m else ())
+    if result:
+        moved = Evaluator(list(result), (*kinematics.names, *numbers, "t"))
         for sample in mobility.samples:
             pivots = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
             sizes = np.array(pivots)
@@ -160,13 +160,13 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             sizes, modes = np.abs(sizes[order]), modes[:, order]
         if worst is None:  # the reference is what the message speaks of
             unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), TINY))
-            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=TINY))
+            vanishing = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=TINY))
             motion = B @ (modes[:, 0] * unit / unit.max())
-            idle = None
-            if not alone.size:
+            massless = None
+            if not vanishing.size:
                 what = "negative inertia" if sizes[0] < -LEAST else "no inertia"
-                idle = IdleMotion(q, motion * functions.scales.q, what, numbers)
-            worst = float(sizes[0]), np.abs(motion), idle
+                massless = IdleMotion(q, motion * functions.scales.q, what, numbers)
+            worst = float(sizes[0]), np.abs(motion), massless
     if worst is None:
         raise EvaluationError(
             "the mass matrix is not finite at the initial configuration",
@@ -174,9 +174,9 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             mobility.q_reference,
             code="EG-NOT-FINITE",
         )
-    size, motion, idle = worst
-    if idle is not None:
-        return [idle.problem(kinematics)]
+    size, motion, massless = worst
+    if massless is not None:
+        return [massless.problem(kinematics)]
     problems = []
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():

@@ -217,7 +217,7 @@ class ArticulatedBodies:
         self.wrenches = list(loads)
         if rows:
             self._begin_at_rest(inertias)
-        self.carried: list[dict[int, Wrench]] = [{} for _ in links]
+        self.row_wrenches: list[dict[int, Wrench]] = [{} for _ in links]
         self.rests = [row.rest for row in rows]
         self.coupling: list[dict[int, Expr]] = [{} for _ in rows]  #: G without its diagonal
         self.own = [graph.zero for _ in rows]  #: the diagonal of G
@@ -261,11 +261,11 @@ class ArticulatedBodies:
                 (self.at_joint if place in moving else self.at_link).setdefault(place, []).append(i)
 
     def _path(self, k: int) -> list[int]:
-        found = []
+        result = []
         while k != GROUND:
-            found.append(k)
+            result.append(k)
             k = self.links[k].parent
-        return found
+        return result
 
     def solve(self) -> TreeMotion:
         """Both sweeps."""
@@ -294,33 +294,33 @@ class ArticulatedBodies:
 
     # -- inwards --------------------------------------------------------------------------------------------------
     def _inwards(self, k: int) -> None:
-        link, carried = self.links[k], self.carried[k]
+        link, row_wrenches = self.links[k], self.row_wrenches[k]
         self.inner[k] = self._take_out(self.at_link.get(k, ()), k)
         for c in reversed(range(len(link.columns))):
             self._release(k, c)
         self.outer[k] = self._take_out(self.at_joint.get(k, ()), k)
         at_rest = add(link.down_twist(self.base[k]), self.products[k]) if link.parent == GROUND else self.products[k]
-        for i, wrench in carried.items():
+        for i, wrench in row_wrenches.items():
             self.rests[i] = self.rests[i] + dot(wrench, at_rest)
         if link.parent == GROUND:
             return
         self.bodies[link.parent] = self.bodies[link.parent].plus(self.bodies[k].lifted(link))
         above = add(self.wrenches[k], self.bodies[k].times(self.products[k]))
         self.wrenches[link.parent] = add(self.wrenches[link.parent], link.lift(above))
-        onwards = self.carried[link.parent]
-        for i, wrench in carried.items():
+        onwards = self.row_wrenches[link.parent]
+        for i, wrench in row_wrenches.items():
             lifted = link.lift(wrench)
             onwards[i] = add(onwards[i], lifted) if i in onwards else lifted
 
     def _release(self, k: int, c: int) -> None:
-        link, body, carried = self.links[k], self.bodies[k], self.carried[k]
+        link, body, row_wrenches = self.links[k], self.bodies[k], self.row_wrenches[k]
         column, index = link.columns[c], link.first + c
         felt = body.times(column)
         pivot = dot(column, felt) + self.drives.get(index, self.graph.zero)
         reciprocal = 1.0 / pivot
         pushes: dict[int, Expr] = {}
-        for i in sorted({*carried, *self.acting.get(index, ())}):
-            push = dot(column, carried[i]) if i in carried else self.graph.zero
+        for i in sorted({*row_wrenches, *self.acting.get(index, ())}):
+            push = dot(column, row_wrenches[i]) if i in row_wrenches else self.graph.zero
             push = push + self.rows[i].entries.get(index, self.graph.zero)
             if not push.is_zero:
                 pushes[i] = push
@@ -334,9 +334,9 @@ class ArticulatedBodies:
             for i, push in pushes.items():
                 share = push * reciprocal
                 still = vec.zero(self.graph)
-                carried[i] = add(carried.get(i, (still, still)), scaled(-share, felt))
+                row_wrenches[i] = add(row_wrenches.get(i, (still, still)), scaled(-share, felt))
                 if not drive:
-                    carried[i] = _with_released(carried[i], column, self.rows[i].entries.get(index))
+                    row_wrenches[i] = _with_released(row_wrenches[i], column, self.rows[i].entries.get(index))
                 self.rests[i] = self.rests[i] + push * rate
                 self.own[i] = self.own[i] + push * share
                 self.sizes[i] = self.sizes[i] + push * share
@@ -350,17 +350,17 @@ class ArticulatedBodies:
 
     def _take_out(self, rows: Sequence[int], k: int | None) -> list[Multiplier]:
         """Take multipliers out at a link, or on ground, those that are coupled with the fewest others first."""
-        left, found = list(rows), []
+        left, result = list(rows), []
         still = vec.zero(self.graph)
-        carried: dict[int, Wrench] = self.carried[k] if k is not None else {}
+        row_wrenches: dict[int, Wrench] = self.row_wrenches[k] if k is not None else {}
         relaxed = self._term(left)
         while left:
             i = min(left, key=lambda row: (len(self.coupling[row]), row))
             left.remove(i)
             pivot = self.own[i] + relaxed
             reciprocal = 1.0 / pivot
-            wrench, others, rest = carried.pop(i, (still, still)), self.coupling[i], self.rests[i]
-            found.append(Multiplier(i, wrench, rest, reciprocal, others))
+            wrench, others, rest = row_wrenches.pop(i, (still, still)), self.coupling[i], self.rests[i]
+            result.append(Multiplier(i, wrench, rest, reciprocal, others))
             self.row_pivots[i] = pivot
             if k is not None:
                 self.bodies[k] = self.bodies[k].held(wrench, reciprocal)
@@ -371,11 +371,11 @@ class ArticulatedBodies:
                 self.own[j] = self.own[j] - share * entry
                 self.rests[j] = self.rests[j] - share * rest
                 if k is not None:
-                    carried[j] = add(carried.get(j, (still, still)), scaled(-share, wrench))
+                    row_wrenches[j] = add(row_wrenches.get(j, (still, still)), scaled(-share, wrench))
                 for other, value in others.items():
                     if other < j:
                         self._couple(j, other, -(share * value))
-        return found
+        return result
 
     def _term(self, rows: Sequence[int]) -> Expr:
         """What is added to the diagonal of G."""

@@ -137,8 +137,8 @@ def solve_tree(
         [_turn_row(blocks, row) for row in rows],
         term,
     )
-    found = bodies.solve()
-    return found._replace(accelerations=tuple(turn_back(blocks, found.accelerations)))
+    result = bodies.solve()
+    return result._replace(accelerations=tuple(turn_back(blocks, result.accelerations)))
 
 
 def _turn_row(blocks: Sequence[SlidingTriple], row: ConstraintRow) -> ConstraintRow:

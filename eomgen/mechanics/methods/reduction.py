@@ -106,7 +106,7 @@ class LoopNames:
 def eliminate(
     kinematics: Kinematics,
     mobility: Mobility,
-    given: Sequence[Sequence[Expr]],
+    raw: Sequence[Sequence[Expr]],
     bound: Sequence[int],
     values: Mapping[str, float],
     names: LoopNames | None = None,
@@ -119,31 +119,31 @@ def eliminate(
     at = dict(values) | dict(zip(kinematics.names, mobility.q_reference, strict=True))
     at |= dict.fromkeys(kinematics.velocity_names, 0.0)
     zero, one = kinematics.graph.zero, kinematics.graph.one
-    others = [k for k in range(len(given[0])) if k not in bound]
+    others = [k for k in range(len(raw[0])) if k not in bound]
     solved: dict[int, list[Expr]] = {}
-    for rows, unknowns in _blocks(given, bound):
-        left = [[given[i][j] for j in unknowns] for i in rows]
-        right = [[given[i][k] for k in others] for i in rows]
+    for rows, unknowns in _blocks(raw, bound):
+        left = [[raw[i][j] for j in unknowns] for i in rows]
+        right = [[raw[i][k] for k in others] for i in rows]
         for j, known in solved.items():
-            factors = [given[i][j] for i in rows]
+            factors = [raw[i][j] for i in rows]
             right = [
                 [x - f * known[k] for x, k in zip(row, others, strict=True)]
                 for f, row in zip(factors, right, strict=True)
             ]
-        found = _solve(left, right, at, names)
-        for j, values_of_row in zip(unknowns, found, strict=True):
+        result = _solve(left, right, at, names)
+        for j, values_of_row in zip(unknowns, result, strict=True):
             row = dict(zip(others, values_of_row, strict=True))
             if names is not None:
                 row = {k: names.entry(j, k, x) for k, x in row.items()}
-            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(given[0]))]
+            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(raw[0]))]
     return solved
 
 
-def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple[list[int], list[int]]]:
+def _blocks(raw: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple[list[int], list[int]]]:
     """Rows and unknowns of each block, in an order in which each needs only those before it."""
-    blocks = diagonal_blocks([{k: None for k, j in enumerate(bound) if not row[j].is_zero} for row in given])
+    blocks = diagonal_blocks([{k: None for k, j in enumerate(bound) if not row[j].is_zero} for row in raw])
     if blocks is None:  # no order exists: a pivot will vanish
-        return [(list(range(len(given))), list(bound))]
+        return [(list(range(len(raw))), list(bound))]
     return [(list(block.rows), [bound[k] for k in block.columns]) for block in blocks]
 
 

@@ -210,12 +210,12 @@ GIVEN = "given"  #: what stands where the name of a method would
 
 def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquations:
     """The equations of a mechanism that has them; only the lower triangle of M is read."""
-    given = kinematics.mechanism.given
-    assert given is not None
+    raw = kinematics.mechanism.given
+    assert raw is not None
     n = len(kinematics.v)
-    lower = given.mass_matrix
+    lower = raw.mass_matrix
     mass = tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
-    bias = tuple(-f for f in given.forcing)
+    bias = tuple(-f for f in raw.forcing)
     if (bare := kinematics.mechanism.lagrangian) is None:
         moved = [combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)]
     else:  # shorter
@@ -226,6 +226,6 @@ def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquatio
         mass_matrix=mass,
         bias=bias,
         inverse_dynamics=tuple(moved),
-        kinetic_energy=given.kinetic_energy,
-        potential_energy=given.potential_energy,
+        kinetic_energy=raw.kinetic_energy,
+        potential_energy=raw.potential_energy,
     )
