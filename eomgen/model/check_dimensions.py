@@ -135,13 +135,14 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
         if entry.path in units:
             for order, suffix in enumerate(RATES[:2]):
                 found[f"{entry.name}{suffix}"] = Known(units[entry.path].dimension.times(TIME, -order), True)
+    declared = set(found)  # a coordinate of such a name is reported; what it measures is unknown
     for joint in joints:
         # the parameters of a curve or surface may be lengths, angles or anything else
         free = max((option.own for option in joint.joint.options.values()), default=0)
         for name, coordinate in list(zip(joint.coordinates, joint.joint.coordinates, strict=True))[free:]:
             own = LENGTH if coordinate.kind == "length" else NONE
             for order, suffix in enumerate(RATES):
-                found[name + suffix] = Known(own.times(TIME, -order))
+                found[name + suffix] = Known(None if name in declared else own.times(TIME, -order))
         for name, velocity in zip(joint.velocities, joint.joint.velocities, strict=True):
             if velocity.of is None:
                 own = SPEED if velocity.kind == "length" else SPIN
