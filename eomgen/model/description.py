@@ -173,7 +173,7 @@ class Faults:
         Those of a marker that an instance gives for an attachment are at that marker, and no follower of them is told.
         """
         places = [(problem, *self._origin_of(problem.path)) for problem in self.problems]
-        attached = tuple(problem.message for problem, _, origin in places if origin is not None and not origin.instance)
+        attached = [(o.place, problem.message) for problem, _, o in places if o is not None and not o.instance]
         found: dict[Any, tuple[Problem, list[str]]] = {}
         for problem, own, origin in places:
             if origin is None:
@@ -181,7 +181,10 @@ class Faults:
             elif not origin.instance:
                 path = origin.place + problem.path[len(own) :]
                 found.setdefault((path, problem.message), (problem._replace(path=path), []))
-            elif not problem.message.startswith(attached):
+            elif not any(
+                f".{origin.instance.rpartition('.')[2]}.at" in place and problem.message.startswith(message)
+                for place, message in attached
+            ):
                 path = origin.place + problem.path[len(own) :]
                 alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
                 first = problem._replace(path=path)
