@@ -103,15 +103,15 @@ class Entry:
     def law(self, key: str, local: Mapping[str, Expr], exclusive: bool = True) -> Expr:
         """An expression with names that it alone knows; with ``exclusive`` none may be a name of the model too."""
         field = self.fields[key]
-        found: Expr = self.reader.expression(
+        result: Expr = self.reader.expression(
             self._at(key), self.values.get(key, field.default), field.level, local, exclusive
         )
-        return found
+        return result
 
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
-        found: tuple[Marker, Marker] | None = self[key]
-        return found
+        result: tuple[Marker, Marker] | None = self[key]
+        return result
 
     def positive(self, key: str) -> Expr:
         """An expression that must be greater than 0."""
@@ -122,9 +122,9 @@ class Entry:
         return value
 
     # -- coordinates and names ------------------------------------------------------------------------------------
-    def symbol(self, found: Found) -> Expr:
+    def symbol(self, quantity: Found) -> Expr:
         """The symbol of a coordinate."""
-        return self.graph.symbol(found.name)
+        return self.graph.symbol(quantity.name)
 
     def known(self, kind: str) -> list[str]:
         """The model's names of a kind."""
@@ -141,8 +141,8 @@ class Entry:
         value = self.values[key]
         joint = next((one for one in self.reader.joints if isinstance(value, str) and one.entry.name == value), None)
         if joint is None:
-            found = self.reader.coordinate(self._at(key), value)
-            return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)
+            result = self.reader.coordinate(self._at(key), value)
+            return None if result is None else ((result.name, self.graph.symbol(f"{result.name}_dot"), result.kind),)
         if not joint.joint.velocities:
             self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has", "EG-REFERENCE")
         names = [value + v.suffix if v.of is None else joint.coordinates[v.of] for v in joint.joint.velocities]

@@ -128,13 +128,13 @@ class Joint(ABC):
     def velocities(self) -> tuple[Velocity, ...]:
         """The generalized velocities, in order: the rates of the coordinates, but for Euler parameters."""
         turning = {slot.coordinate: slot for slot in self.quaternion_slots}
-        found: list[Velocity] = []
+        result: list[Velocity] = []
         for k, coordinate in enumerate(self.coordinates):
             if k in turning:
-                found += [Velocity(f"_w{axis}", "angle") for axis in "xyz"]
+                result += [Velocity(f"_w{axis}", "angle") for axis in "xyz"]
             elif coordinate.kind != "parameter":
-                found.append(Velocity(f"{coordinate.suffix}_dot", coordinate.kind, k))
-        return tuple(found)
+                result.append(Velocity(f"{coordinate.suffix}_dot", coordinate.kind, k))
+        return tuple(result)
 
     @property
     def allows(self) -> int:
@@ -635,8 +635,8 @@ class Guide(Joint):
     @property
     def shape(self) -> Shape:
         """The point r and its parameters."""
-        found: Shape = getattr(self, next(iter(self.options)))
-        return found
+        result: Shape = getattr(self, next(iter(self.options)))
+        return result
 
     def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
         """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""

@@ -192,11 +192,11 @@ class Field:
 
         ``place`` are the indices of the scalar in the field; ``length`` says that the entry acts on a length.
         """
-        found = None if self.dimension is None else self.dimension.along(length)
-        if found is not None and self.exponent and length:
+        result = None if self.dimension is None else self.dimension.along(length)
+        if result is not None and self.exponent and length:
             power = 1.0 if values.get("normal_law") == LINEAR else values.get(self.exponent, EXPONENT)
-            return None if isinstance(power, str) or not hasattr(power, "__float__") else found.times(LENGTH, -power)
-        return found
+            return None if isinstance(power, str) or not hasattr(power, "__float__") else result.times(LENGTH, -power)
+        return result
 
 
 Fields = dict[str, Field]
@@ -204,10 +204,10 @@ Fields = dict[str, Field]
 
 def definitions(kind: type[Field] = Field) -> dict[str, Schema]:
     """What the schemas of all kinds refer to, by name."""
-    found = {name: schema() if callable(schema) else schema for name, schema in kind.defines.items()}
+    result = {name: schema() if callable(schema) else schema for name, schema in kind.defines.items()}
     for inner in kind.__subclasses__():
-        found |= definitions(inner)
-    return found
+        result |= definitions(inner)
+    return result
 
 
 def by(method: str) -> Any:
@@ -398,12 +398,12 @@ class Scalar(Field):
     schema, defines = define("expression", _NUMBER)
 
     def read(self, reader: Any, path: str, value: Any, *_: Any) -> Any:
-        found = reader.expression(path, value, self.level)
+        result = reader.expression(path, value, self.level)
         if self.allowed is not None:
-            reader.requirements.inside(path, found, self.allowed, self.remedy or _RULES[self.allowed])
+            reader.requirements.inside(path, result, self.allowed, self.remedy or _RULES[self.allowed])
         if self.not_zero:
-            reader.requirements.not_zero(path, found, f"{self.doc}; {self.not_zero}")
-        return found
+            reader.requirements.not_zero(path, result, f"{self.doc}; {self.not_zero}")
+        return result
 
     def absent(self, reader: Any) -> Any:
         return reader.stand_in if self.required else None
@@ -441,11 +441,11 @@ class Scalars(Field):
     count = 0  #: how many, where that is fixed
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
-        found = reader.several(path, value, self.count, self, self.level)
+        result = reader.several(path, value, self.count, self, self.level)
         if self.allowed is not None:
-            for k, part in enumerate(found or ()):
+            for k, part in enumerate(result or ()):
                 reader.requirements.inside(f"{path}[{k}]", part, self.allowed, self.remedy or _RULES[self.allowed])
-        return None if found is None else tuple(found)
+        return None if result is None else tuple(result)
 
     holds = "vector"
 
@@ -503,8 +503,8 @@ class Matrix6(Scalars):
 
     def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
         """Three forces, then three torques; three lengths, then three angles."""
-        found = super().measured_in(values, place, length)
-        return None if found is None else found.times(LENGTH, -sum(index < 3 for index in (place[0], place[-1])))
+        result = super().measured_in(values, place, length)
+        return None if result is None else result.times(LENGTH, -sum(index < 3 for index in (place[0], place[-1])))
 
 
 class Rates(Field):
@@ -540,13 +540,13 @@ class Factors(Rates):
             return None
         terms: list[Any] = []
         for name, factor in sorted(value.items(), key=lambda pair: str(pair[0])):
-            found = reader.coordinate(f"{path}.{name}", name)
+            result = reader.coordinate(f"{path}.{name}", name)
             own = reader.expression(f"{path}.{name}", factor)
-            if found is not None:
-                if any(found.name == other.name for other, _ in terms):
+            if result is not None:
+                if any(result.name == other.name for other, _ in terms):
                     remedy = "name it once, with the sum of its factors"
-                    reader.fault(f"{path}.{name}", f"{found.name!r} is named twice", remedy, "EG-CONFLICT")
-                terms.append((found, own))
+                    reader.fault(f"{path}.{name}", f"{result.name!r} is named twice", remedy, "EG-CONFLICT")
+                terms.append((result, own))
         return terms
 
     def reference(self, value: Any, refer: Any) -> Any:
@@ -566,10 +566,10 @@ class Wheels(Field):
             reader.wrong(path, value, self)
             return None
         reader.check_names(path, value, self.names)
-        found = {name: reader.expression(f"{path}.{name}", value[name]) for name in self.names if name in value}
-        for name, size in found.items():
+        result = {name: reader.expression(f"{path}.{name}", value[name]) for name in self.names if name in value}
+        for name, size in result.items():
             reader.requirements.inside(f"{path}.{name}", size, POSITIVE, "give a size greater than 0")
-        return found
+        return result
 
     holds = "vector"
 
@@ -588,8 +588,8 @@ class Inertia(Wheels):
         zero = reader.graph.zero
         if isinstance(value, Mapping):
             reader.check_names(path, value, self.names)
-            given = {key: reader.expression(f"{path}.{key}", value[key]) for key in self.names if key in value}
-            xx, yy, zz, xy, xz, yz = (given.get(key, zero) for key in self.names)
+            raw = {key: reader.expression(f"{path}.{key}", value[key]) for key in self.names if key in value}
+            xx, yy, zz, xy, xz, yz = (raw.get(key, zero) for key in self.names)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         parts = items(value)
         if parts is not None and len(parts) == 3:
@@ -737,18 +737,18 @@ class Via(Field):
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
         """Markers and cylinders; None if anything is wrong with them."""
-        listed, found = items(value), list[Marker | WrapCylinder]()
+        listed, result = items(value), list[Marker | WrapCylinder]()
         if listed is None:
             reader.wrong(path, value, self)
             return None
         for k, item in enumerate(listed):
             stop = self._stop(reader, f"{path}[{k}]", item)
-            if isinstance(stop, WrapCylinder) and found and isinstance(found[-1], WrapCylinder):
+            if isinstance(stop, WrapCylinder) and result and isinstance(result[-1], WrapCylinder):
                 remedy = "put a marker between the two cylinders"
                 reader.fault(f"{path}[{k}]", "follows another cylinder directly", remedy, "EG-CONFLICT")
             if stop is not None:
-                found.append(stop)
-        return None if reader.faults.under(path) else found
+                result.append(stop)
+        return None if reader.faults.under(path) else result
 
     def _stop(self, reader: Any, path: str, value: Any) -> Marker | WrapCylinder | None:
         if not (isinstance(value, Mapping) and "body" not in value):

@@ -349,8 +349,8 @@ def angular_velocity(kind: str, values: Any, rates: Any, axes: str = "body", seq
     """Angular velocity (3,) (rad/s) in body or ground axes from rotation parameters and their rates."""
     matrix = velocity_matrix(kind, values, axes, sequence)
     listed = matrix.tolist() if hasattr(matrix, "tolist") else matrix
-    given = entries(rates, len(listed[0]), "rates")
-    return shaped([dot(row, given) for row in listed])
+    raw = entries(rates, len(listed[0]), "rates")
+    return shaped([dot(row, raw) for row in listed])
 
 
 def _half(like: Scalar) -> Scalar:

@@ -131,19 +131,19 @@ def elementary(axis: int, angle: Scalar) -> list[list[Scalar]]:
 
 
 # -- what comes in and goes out ---------------------------------------------------------------------------------------
-def entries(given: Any, size: int, what: str) -> list[Scalar]:
+def entries(raw: Any, size: int, what: str) -> list[Scalar]:
     """A vector as a list of scalars; raises ValueError if it has another length."""
-    listed = list(np.ravel(given).tolist() if isinstance(given, np.ndarray) else given)  # a SymPy matrix gives its own
+    listed = list(np.ravel(raw).tolist() if isinstance(raw, np.ndarray) else raw)  # a SymPy matrix gives its own
     if len(listed) != size:
         raise ValueError(f"{what} has {len(listed)} entries; {size} are expected")
     return listed
 
 
-def rows(given: Any) -> list[list[Scalar]]:
+def rows(raw: Any) -> list[list[Scalar]]:
     """A 3 x 3 matrix as rows; raises ValueError if it has another shape."""
-    listed = given.tolist() if hasattr(given, "tolist") else [list(row) for row in given]
+    listed = raw.tolist() if hasattr(raw, "tolist") else [list(row) for row in raw]
     if len(listed) != 3 or any(len(row) != 3 for row in listed):
-        raise ValueError(f"a 3 x 3 matrix is expected, not one of shape {np.shape(given)}")
+        raise ValueError(f"a 3 x 3 matrix is expected, not one of shape {np.shape(raw)}")
     return listed
 
 

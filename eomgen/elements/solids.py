@@ -289,13 +289,13 @@ def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
             "meshes need trimesh: pip install 'eomgen[mesh]', or pip install trimesh", code="EG-PACKAGE-MISSING"
         ) from None
     log = trimesh.util.log
-    told, log.disabled = log.disabled, True  # it logs the tracebacks of what it tries first
+    was_disabled, log.disabled = log.disabled, True  # it logs the tracebacks of what it tries first
     try:
         mesh = trimesh.load(path, file_type="stl", force="mesh")
     except Exception as error:  # whatever a parser meets in a broken file
         raise bad_data(f"{path} is not an STL file that can be read ({error})") from None
     finally:
-        log.disabled = told
+        log.disabled = was_disabled
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
         raise bad_data(f"{path} has no triangles, or vertices that are not finite")
     if not mesh.is_watertight:

@@ -273,12 +273,12 @@ def _blame(said: str, root: XmlElement) -> XmlElement:
     line = int(word(r"line (\d+)") or 0)
 
     def fits(element: XmlElement) -> bool:
-        given = element.attributes
+        raw = element.attributes
         if line:  # of the model's own file, or of one that it attaches
             return element.line == line and tag in ("", element.tag)
         if name or tag:
-            return given.get("name") == name if name else element.file != root.file and element.tag == tag
-        return bool(file) and _last(file) == _last(given.get("file", ""))
+            return raw.get("name") == name if name else element.file != root.file and element.tag == tag
+        return bool(file) and _last(file) == _last(raw.get("file", ""))
 
     likely = sorted(filter(fits, root.walk()), key=lambda element: element.file != root.file)
     return likely[0] if likely and (line or len(likely) == 1) else root
@@ -330,8 +330,8 @@ class _MjcfReader:
 
     def place(self, name: str, *tags: str) -> Place:
         """Where an element of a name is; the model's first line if it has none."""
-        found = (self.lines[tag, name] for tag in tags if (tag, name) in self.lines)
-        return next(found, (self.root.file, self.root.line))
+        result = (self.lines[tag, name] for tag in tags if (tag, name) in self.lines)
+        return next(result, (self.root.file, self.root.line))
 
     # -- bodies and joints ----------------------------------------------------------------------------------------
     def _body(self, k: int) -> None:
@@ -487,7 +487,7 @@ class _MjcfReader:
     # actuatorfrcrange, f is cut to forcerange, and what all drives do along a joint to the joint's actuatorfrcrange.
     def _actuators(self) -> None:
         m, robot = self.m, self.robot
-        left, idle, nothing = [], [], [0.0] * m.nu
+        left, unused, nothing = [], [], [0.0] * m.nu
         for k, name in enumerate(self.names["actuator"]):  # of several controls or forces each, since MuJoCo 4
             parts = self._actuated(k)
             place = self.place(name, "motor", "position", "velocity", "general", "damper", "intvelocity")
@@ -495,7 +495,7 @@ class _MjcfReader:
             self._resist(f"actuator {name}", parts, place, damping, armature)
             group = m.actuator_group[k]
             if self.off("ACTUATION") or (0 <= group < 31 and m.opt_disableactuator >> group & 1):
-                idle.append(name)
+                unused.append(name)
                 continue
             plain = m.actuator_dyntype[k] == 0 and m.actuator_gaintype[k] == _FIXED_GAIN and m.actuator_plugin[k] < 0
             if not parts or not plain or m.actuator_biastype[k] not in (_NO_BIAS, _AFFINE_BIAS):
@@ -507,23 +507,23 @@ class _MjcfReader:
             robot.drives.append(replace(drive, **self._ranges(k)))
         if left:
             robot.notes.append(f"left out: actuators that do not push along joints by a linear law ({', '.join(left)})")
-        if idle:
-            robot.notes.append(f"left out: actuators that the file disables ({', '.join(idle)})")
+        if unused:
+            robot.notes.append(f"left out: actuators that the file disables ({', '.join(unused)})")
 
     def _ranges(self, k: int) -> dict[str, Any]:
         """What the control and the force of an actuator are cut to."""
         m = self.m
         control, output = (getattr(m, key, range(m.nu))[k] for key in ("actuator_ctrladr", "actuator_outadr"))
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         if m.actuator_ctrllimited[control] and not self.off("CLAMPCTRL"):
-            found["control"] = tuple(map(float, m.actuator_ctrlrange[control]))
+            result["control"] = tuple(map(float, m.actuator_ctrlrange[control]))
         if m.actuator_forcelimited[output]:
-            found["force"] = tuple(map(float, m.actuator_forcerange[output]))
+            result["force"] = tuple(map(float, m.actuator_forcerange[output]))
         tendon = m.actuator_trnid[k][0]
         if m.actuator_trntype[k] == _TENDON and m.tendon_actfrclimited[tendon]:
-            found["tendon"] = str(tendon)
-            found["total"] = tuple(map(float, m.tendon_actfrcrange[tendon]))
-        return found
+            result["tendon"] = str(tendon)
+            result["total"] = tuple(map(float, m.tendon_actfrcrange[tendon]))
+        return result
 
     def _actuated(self, k: int) -> Parts:
         m = self.m

@@ -27,7 +27,7 @@ CONVERTED = {
     ".xacro": "expand it first: xacro FILE.xacro > FILE.urdf",
 }
 #: Options that take one of some words.
-WORDS = {
+PHRASES = {
     "mimic": ("coupling", "independent"),
     "rotation": ("euler_angles", "euler_parameters"),
     "limits": ("note", "stop", "off"),
@@ -123,14 +123,14 @@ class RobotOptions:
         return 0.01 if self.friction is True else float(self.friction)
 
 
-def make_options(given: dict[str, Any]) -> RobotOptions:
+def make_options(raw: dict[str, Any]) -> RobotOptions:
     """Checked options; ``lock`` as a mapping, ``actuate`` as a tuple unless it is True or False."""
     known = [field.name for field in fields(RobotOptions)]
-    for key in given:
+    for key in raw:
         if key not in known:
             raise no_such(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
-    options = RobotOptions(**given)
-    for key, allowed in WORDS.items():
+    options = RobotOptions(**raw)
+    for key, allowed in PHRASES.items():
         if not isinstance(word := getattr(options, key), str) or word not in allowed:
             raise no_choice(f"{key} must be one of {', '.join(allowed)}, not {word!r}")
     check, friction = options.check_inertia, options.friction
@@ -167,12 +167,12 @@ def _is_number(value: Any) -> bool:
     return bool(size <= LARGEST)
 
 
-def _names(given: Any, key: str, also: str) -> tuple[str, ...]:
+def _names(raw: Any, key: str, also: str) -> tuple[str, ...]:
     """Names of joints, one or several."""
-    given = [given] if isinstance(given, str) else given
-    names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Mapping) else (None,)
+    raw = [raw] if isinstance(raw, str) else raw
+    names = tuple(raw) if isinstance(raw, Iterable) and not isinstance(raw, Mapping) else (None,)
     if not all(isinstance(name, str) for name in names):
-        raise ill_typed(f"{key} must be names of joints, or {also}, not {given!r}")
+        raise ill_typed(f"{key} must be names of joints, or {also}, not {raw!r}")
     return names
 
 

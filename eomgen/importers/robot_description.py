@@ -127,43 +127,43 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
             _check_inertias(robot, options.check_inertia is None)
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     link = robot.links[root]
-    found = Bodies({GROUND: RobotBody(GROUND, None)}, {})
+    result = Bodies({GROUND: RobotBody(GROUND, None)}, {})
     base = GROUND
     if options.floating:
         base = root
-        found.bodies[root] = RobotBody(root, RobotJoint("base", "free", GROUND, root, link.place))
-    found.bodies[base].members.append((link, IDENTITY))
-    found.home[root] = base, IDENTITY
+        result.bodies[root] = RobotBody(root, RobotJoint("base", "free", GROUND, root, link.place))
+    result.bodies[base].members.append((link, IDENTITY))
+    result.home[root] = base, IDENTITY
     for joint in _from_root(robot, root):
         link = robot.links[joint.child]
         if joint.type == "weld" and options.merge:
-            body, frame = found.home[joint.parent]
+            body, frame = result.home[joint.parent]
             frame = frame @ joint.outer @ joint.inner.inverse()
         else:
             body, frame = link.name, IDENTITY
-            found.bodies[body] = RobotBody(body, joint)
-        found.bodies[body].members.append((link, frame))
-        found.home[link.name] = body, frame
-    if len(found.bodies) == 1:
+            result.bodies[body] = RobotBody(body, joint)
+        result.bodies[body].members.append((link, frame))
+        result.home[link.name] = body, frame
+    if len(result.bodies) == 1:
         remedy = "give the robot joints; the base of a URDF robot moves with floating=True, or --floating"
         robot.problem("robot", "no link can move", remedy, (robot.file, 1), "EG-TOPOLOGY")
-    _check_masses(robot, found, options.check)
+    _check_masses(robot, result, options.check)
     if robot.problems:
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
-    return found
+    return result
 
 
 def _from_root(robot: Robot, root: str) -> list[RobotJoint]:
     """The joints that can be reached from a link, parents first, each branch to its end."""
-    carried: dict[str, list[RobotJoint]] = {}
+    children: dict[str, list[RobotJoint]] = {}
     for joint in robot.joints.values():
-        carried.setdefault(joint.parent, []).append(joint)
-    found, waiting = [], list(reversed(carried.get(root, ())))
+        children.setdefault(joint.parent, []).append(joint)
+    result, waiting = [], list(reversed(children.get(root, ())))
     while waiting:
         joint = waiting.pop()
-        found.append(joint)
-        waiting.extend(reversed(carried.get(joint.child, ())))
-    return found
+        result.append(joint)
+        waiting.extend(reversed(children.get(joint.child, ())))
+    return result
 
 
 def _unit(axis: Sequence[float]) -> np.ndarray:
@@ -285,36 +285,36 @@ def _has_no_lever(joint: RobotJoint, inertia: Inertia) -> bool:
     return across + own.mass * float(arm @ arm) <= SINGULAR * float(own.tensor.trace() + own.mass * (own.com @ own.com))
 
 
-def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
+def _check_masses(robot: Robot, result: Bodies, check: str) -> None:
     """Note joints that move nothing, which no force could accelerate by a finite amount; with ``check`` as a fault.
 
     A robot without any mass is no slip of the pen: it is one for kinematics, and a note says so.
     """
     heavy: set[str] = set()
-    idle: list[RobotJoint] = []
-    tied = found.tied(robot)
-    carrying = {found.parent(joint) for _, joint in found.moving if joint.parent}
-    for body, joint in reversed(found.moving):  # children come after their parents
+    fixed_by_none: list[RobotJoint] = []
+    tied = result.tied(robot)
+    carrying = {result.parent(joint) for _, joint in result.moving if joint.parent}
+    for body, joint in reversed(result.moving):  # children come after their parents
         inertia = body.inertia()
         if not inertia.is_nothing:
             heavy.add(body.name)
         if body.name in heavy:
-            heavy.add(found.parent(joint))
+            heavy.add(result.parent(joint))
         elif joint.type != "weld" and not joint.armature:
-            idle.append(joint)
+            fixed_by_none.append(joint)
         if body.name not in carrying and joint.name not in tied and _has_no_lever(joint, inertia):
-            idle.append(joint)
-    found.massless = bool(found.moving) and all(
-        body.inertia().is_nothing and not joint.armature for body, joint in found.moving
+            fixed_by_none.append(joint)
+    result.massless = bool(result.moving) and all(
+        body.inertia().is_nothing and not joint.armature for body, joint in result.moving
     )
-    if found.massless and check == "error":
+    if result.massless and check == "error":
         robot.notes.append("for kinematics only: no moving link has mass or inertia")
-    elif check == "note" and idle:
-        names = ", ".join(joint.name for joint in reversed(idle))
+    elif check == "note" and fixed_by_none:
+        names = ", ".join(joint.name for joint in reversed(fixed_by_none))
         robot.notes.append(f"for kinematics only, because these joints move no mass and no inertia: {names}")
-    for joint in idle if check == "error" and not found.massless else ():
+    for joint in fixed_by_none if check == "error" and not result.massless else ():
         message = f"the joint moves no mass: link {joint.child!r} and all links on it have none"
-        if found.home[joint.child][0] in heavy:
+        if result.home[joint.child][0] in heavy:
             message = f"the joint moves no inertia: link {joint.child!r} has none about its axis (or no mass to slide)"
         remedy = (
             f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
@@ -375,14 +375,14 @@ class _Names:
 class _Writer:
     """Fills one Description."""
 
-    def __init__(self, robot: Robot, options: RobotOptions, found: Bodies) -> None:
-        self.robot, self.options, self.found = robot, options, found
+    def __init__(self, robot: Robot, options: RobotOptions, result: Bodies) -> None:
+        self.robot, self.options, self.found = robot, options, result
         gravity = robot.gravity if options.gravity is None else options.gravity
         name = clean_name(robot.name, "robot")[:LONGEST]
         name = f"{name[: LONGEST - 6]}_model" if fault_of_model_name(name) else name
         self.out = Description(values={"name": name, "gravity": gravity}, lines={"": (robot.file, 1)})
         self.out.notes = list(robot.notes)
-        check = "note" if found.massless and options.check == "error" else options.check
+        check = "note" if result.massless and options.check == "error" else options.check
         if check != "error":
             self.out.values["check_inertia"] = check
         if options.limits != "note":
@@ -391,8 +391,8 @@ class _Writer:
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
-        self.tied = found.tied(robot)
-        self.loads = found.loads()
+        self.tied = result.tied(robot)
+        self.loads = result.loads()
 
     def describe(self) -> Description:
         moving = self.found.moving
@@ -470,9 +470,9 @@ class _Writer:
     def _value(self, name: str, value: float, unit: str) -> Any:
         if not self.options.symbolic or value == 0.0:
             return float(value)
-        given = self.names.symbol(name)
-        self.out.add("parameters", given, {"value": float(value), "unit": unit})
-        return given
+        raw = self.names.symbol(name)
+        self.out.add("parameters", raw, {"value": float(value), "unit": unit})
+        return raw
 
     # -- joints ---------------------------------------------------------------------------------------------------
     def _turning(self, joint_type: str) -> Values:
@@ -656,11 +656,11 @@ class _Writer:
                 force = self.names.made(f"{name}_drive")
                 self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
         for joint, pushes in cut.items():
-            q, given = self.joints[joint], self.robot.joints[joint]
-            assert given.clamp is not None
-            law = _cut(" + ".join(pushes), given.clamp)
+            q, raw = self.joints[joint], self.robot.joints[joint]
+            assert raw.clamp is not None
+            law = _cut(" + ".join(pushes), raw.clamp)
             force = self.names.made(f"{q}_drives")
-            self._add("forces", force, {"type": "actuator", "joint": q, "value": law}, given.place)
+            self._add("forces", force, {"type": "actuator", "joint": q, "value": law}, raw.place)
 
     def _law(self, k: int, drive: Drive) -> tuple[str, str]:
         """Name of a drive and its force, empty if there is none."""

@@ -207,29 +207,29 @@ def _paired(q_dot: Sequence[Any], v: Sequence[Any], rates: dict[Any, Any]) -> li
 
 
 # -- noncontributing forces --------------------------------------------------------------------------------------------
-def replaced(value: Any, given: Mapping[Any, Any]) -> Any:
+def replaced(value: Any, raw: Mapping[Any, Any]) -> Any:
     """SymPy expressions, or lists and mappings of them, with functions of time and their derivatives replaced."""
     from sympy import Derivative
 
     def put(expression: Any) -> Any:
-        rates = {d: d.subs(given).doit() for d in expression.atoms(Derivative) if d.has(*given)}
-        return expression.xreplace(rates).xreplace(dict(given))
+        rates = {d: d.subs(raw).doit() for d in expression.atoms(Derivative) if d.has(*raw)}
+        return expression.xreplace(rates).xreplace(dict(raw))
 
-    return with_sympy(value, lambda x: put(x) if given and x.has(*given) else x)
+    return with_sympy(value, lambda x: put(x) if raw and x.has(*raw) else x)
 
 
-def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[str]) -> dict[Any, Any]:
+def solve_auxiliary(forms: Forms, raw: Collection[str], constants: Collection[str]) -> dict[Any, Any]:
     """The noncontributing forces, solved from the equations of the auxiliary speeds A F + B u' + c = 0.
 
     They are replaced in the equations of motion M u' = f + G F.  Where they depend on u' (B is not 0), F follows from
-    (A + B M^-1 G) F = -(c + B M^-1 f), so that M stays symmetric.  No such forces are the names of ``given``
+    (A + B M^-1 G) F = -(c + B M^-1 f), so that M stays symmetric.  No such forces are the names of ``raw``
     (coordinates, speeds, inputs) and of ``constants`` with a value.  The result has the expression of each force in q,
     u and u', by its function or symbol.
     """
     import sympy
     from sympy.solvers.solveset import NonlinearError
 
-    unknown = _unknown_forces(forms, given, constants)
+    unknown = _unknown_forces(forms, raw, constants)
     rows = [row for row in forms.noncontributing if row.has(*unknown)] if unknown else []
     if not rows:
         return {}
@@ -248,12 +248,12 @@ def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[
             s = len(unknown)
             A, right = A + B * solved[:, :s], right - B * solved[:, s:]
             B = 0 * B
-        found = A.LUsolve(right - B * sympy.Matrix(rates))
+        result = A.LUsolve(right - B * sympy.Matrix(rates))
     except NonlinearError:
         raise _refusal(unknown, "the equations are not linear in them") from None
     except ValueError:
         raise _refusal(unknown, "the equations do not determine them") from None
-    forces = dict(zip(unknown, found, strict=True))
+    forces = dict(zip(unknown, result, strict=True))
     others = {key: value for key, value in vars(forms).items() if key != "noncontributing"}
     vars(forms).update(replaced(others, forces))
     return forces
@@ -266,7 +266,7 @@ def _refusal(forces: Collection[Any], why: str) -> ModelError:
     return ModelError([Problem("equations", message, remedy, code="EG-UNDETERMINED")])
 
 
-def _unknown_forces(forms: Forms, given: Collection[str], constants: Collection[str]) -> list[Any]:
+def _unknown_forces(forms: Forms, raw: Collection[str], constants: Collection[str]) -> list[Any]:
     """Functions of time that stand in the auxiliary equations and are not given.
 
     In equations without one, the forces may be symbols: those without a value that stand in these equations alone and
@@ -280,17 +280,17 @@ def _unknown_forces(forms: Forms, given: Collection[str], constants: Collection[
 
     rows = forms.noncontributing
     others = [*forms.forcing, *(x for row in forms.mass_matrix for x in row), forms.kinetic, forms.potential]
-    functions = [f for f in parts(AppliedUndef, rows) if (name := function_name(f)) is not None and name not in given]
+    functions = [f for f in parts(AppliedUndef, rows) if (name := function_name(f)) is not None and name not in raw]
     if len(functions) > len(rows):  # what acts elsewhere too may be driven
         only = set(functions) - parts(AppliedUndef, others)
         functions = list(only) if len(only) == len(rows) else functions
     rest = [row for row in rows if row != 0 and not row.has(*functions)]
     acting = parts(sympy.Symbol, [*others, *forms.configuration, *forms.motion])
-    symbols = {x for x in parts(sympy.Symbol, rest) - {*forms.masses} if x.name not in {*given, *constants, "t"}}
+    symbols = {x for x in parts(sympy.Symbol, rest) - {*forms.masses} if x.name not in {*raw, *constants, "t"}}
     symbols = {x for x in symbols if not any(row.diff(x).has(*forms.masses) for row in rest if forms.masses)}
     free = symbols - acting
     used = [row.atoms(sympy.Symbol, AppliedUndef) - {*forms.q, *forms.v, sympy.Symbol("t")} for row in rest]
-    used = [part for part in used if part & free or not any(sympy_name(x) in given for x in part)]
+    used = [part for part in used if part & free or not any(sympy_name(x) in raw for x in part)]
     if len(free) == len(used):
         return sorted([*functions, *free], key=str)
     for part in used:
@@ -383,8 +383,8 @@ def describe_method(
     for output, expression in {**noncontributing, **extra}.items():
         description.add("outputs", output, {"expression": expression})
     for key, values in (("initial", initial), ("guess", guess)):
-        if found := named(key, values):
-            description.values[key] = found
+        if result := named(key, values):
+            description.values[key] = result
     give_latex(description, "equations", renamed.latex())
     return renamed.noted(description)
 
@@ -422,10 +422,10 @@ class _Names:
             for part in walk:
                 if isinstance(part, sympy.Symbol):
                     symbols.setdefault(part.name, set()).add(part)
-                elif isinstance(part, AppliedUndef | sympy.Derivative) and (found := function_name(part)) is not None:
+                elif isinstance(part, AppliedUndef | sympy.Derivative) and (result := function_name(part)) is not None:
                     walk.skip()  # f' is not f
-                    if found not in self.motion:
-                        functions.add(found)
+                    if result not in self.motion:
+                        functions.add(result)
         for name in ("t", *self.intermediates):
             symbols.pop(name, None)
         for symbol, different in symbols.items():

@@ -295,23 +295,23 @@ class _UrdfReader:
     def _shape(self, element: XmlElement, path: str) -> tuple[Placement, dict[str, Any]] | None:
         """A visual: what it looks like, as data that is never read."""
         material, geometry = element.find("material"), element.find("geometry")
-        given = geometry.children[0] if geometry is not None and geometry.children else None
-        if given is None:
+        raw = geometry.children[0] if geometry is not None and geometry.children else None
+        if raw is None:
             return None
-        shape: dict[str, Any] = {"shape": given.tag}
-        where = f"{path}.{given.tag}"
-        if given.tag == "mesh":
-            shape["file"] = given.attributes.get("filename", "")
-            scale = given.attributes.get("scale", "").split()
+        shape: dict[str, Any] = {"shape": raw.tag}
+        where = f"{path}.{raw.tag}"
+        if raw.tag == "mesh":
+            shape["file"] = raw.attributes.get("filename", "")
+            scale = raw.attributes.get("scale", "").split()
             if len(scale) == 3:  # some files give four, which no reader of theirs minds
-                shape["scale"] = factors = [self._finite(given, f"{where}.scale", part) for part in scale]
-                self._check_scale(given, f"{where}.scale", factors)
-        elif given.tag == "box":
-            shape["size"] = list(self.triple(given, "size", where, (0.0, 0.0, 0.0)))
-        elif given.tag in ("cylinder", "capsule"):
-            shape |= {key: self.number(given, key, where) for key in ("radius", "length")}
-        elif given.tag == "sphere":
-            shape["radius"] = self.number(given, "radius", where)
+                shape["scale"] = factors = [self._finite(raw, f"{where}.scale", part) for part in scale]
+                self._check_scale(raw, f"{where}.scale", factors)
+        elif raw.tag == "box":
+            shape["size"] = list(self.triple(raw, "size", where, (0.0, 0.0, 0.0)))
+        elif raw.tag in ("cylinder", "capsule"):
+            shape |= {key: self.number(raw, key, where) for key in ("radius", "length")}
+        elif raw.tag == "sphere":
+            shape["radius"] = self.number(raw, "radius", where)
         else:
             return None
         own = "" if material is None else _color(material) or self.colors.get(material.attributes.get("name", ""), "")
@@ -329,17 +329,17 @@ class _UrdfReader:
         if name is None:
             return
         path = f"joint.{name}"
-        given = element.attributes.get("type", "")
-        kind = TYPES.get(given)
+        raw = element.attributes.get("type", "")
+        kind = TYPES.get(raw)
         if kind is None:
-            message = f"no joint of type {given!r}" if given else "is missing"
+            message = f"no joint of type {raw!r}" if raw else "is missing"
             self.fault(element, f"{path}.type", message, f"types: {', '.join(TYPES)}", "EG-CHOICE")
         ends = {}
         for end in ("parent", "child"):
-            found = element.find(end)
-            link = found.attributes.get("link") if found is not None else None
+            result = element.find(end)
+            link = result.attributes.get("link") if result is not None else None
             if not link:
-                self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>', "EG-MISSING")
+                self.fault(result or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>', "EG-MISSING")
             ends[end] = link or ""
         direction = self._axis(element, path, kind)
         if kind == "planar" and (direction[:2] != (0.0, 0.0) or direction[2] < 0.0):
@@ -350,7 +350,7 @@ class _UrdfReader:
         one_degree = kind in ("revolute", "prismatic")
         if kind in ("planar", "free"):
             left = [tag for tag in ("dynamics", "mimic") if element.find(tag) is not None]
-            self.robot.notes += [f"left out: <{tag}> of the {given} joint {name}" for tag in left]
+            self.robot.notes += [f"left out: <{tag}> of the {raw} joint {name}" for tag in left]
         dynamics = element.find("dynamics") if one_degree else None
         self.robot.joints[name] = RobotJoint(
             name=name,
@@ -360,7 +360,7 @@ class _UrdfReader:
             place=(element.file, element.line),
             outer=self.placement(element.find("origin"), f"{path}.origin"),
             axis=direction,
-            limits=self._limits(element, path, given) if one_degree else {},
+            limits=self._limits(element, path, raw) if one_degree else {},
             damping=0.0 if dynamics is None else self.number(dynamics, "damping", f"{path}.dynamics", 0.0),
             dry_friction=0.0 if dynamics is None else self.number(dynamics, "friction", f"{path}.dynamics", 0.0),
         )
@@ -380,21 +380,21 @@ class _UrdfReader:
         """A joint beside the tree; without a type it is a hinge, or, without an axis too, a ball."""
         name = element.attributes.get("name") or f"loop_{len(self.robot.loops)}"
         path = f"{element.tag}.{name}"
-        given = element.attributes.get("type")
+        raw = element.attributes.get("type")
         plain = "spherical" if element.find("axis") is None else "revolute"
-        if given is None:
+        if raw is None:
             self.robot.notes.append(f"{path}: names no type; taken as {plain}")
-        kind = LOOP_TYPES.get(given or plain)
+        kind = LOOP_TYPES.get(raw or plain)
         if kind is None:
             remedy = f"types: {', '.join(LOOP_TYPES)}"
-            self.fault(element, f"{path}.type", f"no loop is closed by {given!r}", remedy, "EG-CHOICE")
+            self.fault(element, f"{path}.type", f"no loop is closed by {raw!r}", remedy, "EG-CHOICE")
         ends = []
-        for words in ENDS:
-            end = next((found for word in words if (found := element.find(word)) is not None), None)
+        for pair in ENDS:
+            end = next((result for word in pair if (result := element.find(word)) is not None), None)
             link = end.attributes.get("link", "") if end is not None else ""
             if end is None or not link:
-                remedy = f'give <{words[0]} link="..." xyz= rpy=/>'
-                self.fault(element, f"{path}.{words[0]}", "is missing", remedy, "EG-MISSING")
+                remedy = f'give <{pair[0]} link="..." xyz= rpy=/>'
+                self.fault(element, f"{path}.{pair[0]}", "is missing", remedy, "EG-MISSING")
                 return
             at = element.find(f"{end.tag}_origin") or end
             ends.append((link, self.placement(at, f"{path}.{at.tag}")))
@@ -405,14 +405,14 @@ class _UrdfReader:
         limit = element.find("limit")
         if limit is None:
             return {}
-        given = limit.attributes
+        raw = limit.attributes
         sides = () if kind == "continuous" else ("lower", "upper")  # they mean nothing there
-        result = dict.fromkeys(sides, 0.0) if any(key in given for key in sides) else {}  # the format's default
+        result = dict.fromkeys(sides, 0.0) if any(key in raw for key in sides) else {}  # the format's default
         for key in (*sides, "velocity", "effort"):
-            text = given.get(key, "").strip().lower()
+            text = raw.get(key, "").strip().lower()
             if text.lstrip("+-") in ("inf", "infinity"):
                 result[key] = float(text)
-            elif key in given:
+            elif key in raw:
                 result[key] = self.number(limit, key, f"{path}.limit", most=math.inf)
         lower, upper = result.get("lower", -math.inf), result.get("upper", math.inf)
         if lower > upper or math.inf in (lower, -upper):

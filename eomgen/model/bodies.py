@@ -58,23 +58,23 @@ def check_bodies(
     )
     for body, mass, tensor, scale in zip(bodies, masses, tensors, scales, strict=True):
         path = f"bodies.{body.name}"
-        found: list[tuple[str, str, str]] = []
+        result: list[tuple[str, str, str]] = []
         remedy = f"give a mass of 0 or more, {SWITCH}"
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"
-            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", remedy))
+            result.append((f"{path}.mass", f"is {mass[0]:g}{how}", remedy))
         elif body.check == "error":
             requirements.inside(f"{path}.mass", body.mass, NOT_NEGATIVE, remedy)
         if not faults.under(f"{path}.inertia"):
             if not is_symmetric(body.inertia, None if tensor is None else tensor.tolist(), COMPUTED * scale):
-                found.append((f"{path}.inertia", *ASYMMETRIC))
+                result.append((f"{path}.inertia", *ASYMMETRIC))
             else:
-                found += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
-        for place, message, told in found:
+                result += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
+        for place, message, advice in result:
             if body.check == "error":
-                faults.add(place, message, told, "EG-INERTIA")
+                faults.add(place, message, advice, "EG-INERTIA")
             else:
-                if told not in (EXCESS, ASYMMETRIC[1]):
+                if advice not in (EXCESS, ASYMMETRIC[1]):
                     negative[body.name] = None
                 if body.check == "note":
                     notes.append(f"{place}: {message}; it is used as given")
@@ -98,8 +98,8 @@ def _described(body: Body, numbers: Sequence[Sequence[Expr]], judged: bool) -> t
 
 
 def _known(requirements: Requirements, group: Sequence[Expr]) -> list[float]:
-    found = requirements.known(group)
-    return [math.nan] * len(group) if found is None else found.tolist()
+    result = requirements.known(group)
+    return [math.nan] * len(group) if result is None else result.tolist()
 
 
 def _entries(body: Body) -> list[Expr]:
@@ -119,8 +119,8 @@ def _points(bodies: Sequence[Body], joints: Sequence[JointSpec]) -> list[list[Ve
 
 
 def _known_points(requirements: Requirements, points: Sequence[Vec3]) -> list[Array]:
-    found = [requirements.known(point) for point in points]
-    return [point for point in found if point is not None]
+    result = [requirements.known(point) for point in points]
+    return [point for point in result if point is not None]
 
 
 ASYMMETRIC = ("the tensor is not symmetric", "entries [i][j] and [j][i] must be equal")
@@ -160,12 +160,12 @@ def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[Mas
         if listed is None:
             reader.wrong(f"{path}.{key}", values[key], BODY[key])
             continue
-        for k, given in enumerate(listed):
+        for k, raw in enumerate(listed):
             place = f"{path}.{key}[{k}]"
-            if not isinstance(given, Mapping):
-                reader.wrong(place, given, kinds.Table)
+            if not isinstance(raw, Mapping):
+                reader.wrong(place, raw, kinds.Table)
                 continue
-            part = read(reader, place, given)
+            part = read(reader, place, raw)
             if part is not None:
                 parts.append(part)
     return parts
@@ -189,15 +189,13 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     if ("mass" in values) == (density in values):
         wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
         faults.add(path, wrong, "give one of them", "EG-CONFLICT")
-    given = {
-        key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values
-    }
+    raw = {key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values}
     frame = _frame(reader, path, values)
     subtract = reader.flag(f"{path}.subtract", values["subtract"]) if "subtract" in values else False
-    own = _mesh(reader, path, values, given.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
+    own = _mesh(reader, path, values, raw.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
     if own is None or faults.under(path):
         return None
-    mass = given["mass"] if "mass" in given else given[density] * own.mass
+    mass = raw["mass"] if "mass" in raw else raw[density] * own.mass
     if subtract:
         mass = -mass
     tensor = rotate_symmetric(frame.rotation, own.inertia)
@@ -226,8 +224,8 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
         else:
             lengths[key] = (reader.expression(place, values[key]),) * 3
         for x in dict.fromkeys(lengths[key]):
-            told = f"{values[key]!r} is negative".replace("{", "{{").replace("}", "}}")
-            reader.requirements.inside(place, x, NOT_NEGATIVE, "a length must be 0 or positive", told)
+            advice = f"{values[key]!r} is negative".replace("{", "{{").replace("}", "}}")
+            reader.requirements.inside(place, x, NOT_NEGATIVE, "a length must be 0 or positive", advice)
     if "inner_radius" in lengths and "outer_radius" in lengths:
         inner, outer = (lengths[key][0] for key in ("inner_radius", "outer_radius"))
         message, remedy = "{:g} exceeds the outer radius {:g}", "give a smaller inner radius"
@@ -253,15 +251,15 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
         if need.inside(size, scale, NOT_NEGATIVE, remedy, mirrored) or need.not_zero(size, scale, remedy, nothing):
             return None
     try:
-        found = measure_mesh(_locate(reader, file))
+        result = measure_mesh(_locate(reader, file))
     except UsageError as error:
         needed = "a mesh must be a closed surface of triangles that face outwards"
         reader.fault(place, str(error), needed * (error.code == "EG-FILE-DAMAGED"), error.code)
         return None
     one = graph.one if scale is None else scale
-    x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)
-    centre = vec.scale(one, vec.vector(graph, found.centre))
-    return MassProperties(found.volume * one * one * one, centre, (x, y, z))  # type: ignore[arg-type]
+    x, y, z = (tuple(graph.constant(v / result.volume) * one * one for v in row) for row in result.inertia)
+    centre = vec.scale(one, vec.vector(graph, result.centre))
+    return MassProperties(result.volume * one * one * one, centre, (x, y, z))  # type: ignore[arg-type]
 
 
 def _locate(reader: Reader, file: str) -> str:
@@ -278,26 +276,26 @@ def read_body_shapes(reader: Reader, path: str, body: int, values: Mapping[str, 
     """Shapes of one body, where its description has no faults; ``display`` comes first, as solids are for the mass."""
     displayed = [
         shape
-        for k, given in enumerate(items(values.get("display", ())) or ())
-        if (shape := _displayed(reader, f"{path}.display[{k}]", body, given)) is not None
+        for k, raw in enumerate(items(values.get("display", ())) or ())
+        if (shape := _displayed(reader, f"{path}.display[{k}]", body, raw)) is not None
     ]
     if displayed:
         return displayed
     return [
         shape
-        for k, given in enumerate(items(values.get("solids", ())) or ())
-        if not given.get("subtract") and (shape := _solid_shape(reader, f"{path}.solids[{k}]", body, given)) is not None
+        for k, raw in enumerate(items(values.get("solids", ())) or ())
+        if not raw.get("subtract") and (shape := _solid_shape(reader, f"{path}.solids[{k}]", body, raw)) is not None
     ]
 
 
 def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str, ...]) -> tuple[Expr, ...]:
-    found: list[Expr] = []
+    result: list[Expr] = []
     for key in keys:
         if items(values[key]) is not None:
-            found += reader.vector(f"{path}.{key}", values[key])
+            result += reader.vector(f"{path}.{key}", values[key])
         else:
-            found.append(reader.expression(f"{path}.{key}", values[key]))
-    return tuple(found)
+            result.append(reader.expression(f"{path}.{key}", values[key]))
+    return tuple(result)
 
 
 def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
@@ -323,11 +321,11 @@ def _solid_shape(reader: Reader, path: str, body: int, values: Mapping[str, Any]
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
-def check_display(reader: Reader, path: str, given: Any) -> None:
+def check_display(reader: Reader, path: str, raw: Any) -> None:
     """Note faults of the shapes of a body; the files they name are not looked for."""
-    listed = items(given)
+    listed = items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.Display)
+        reader.wrong(path, raw, kinds.Display)
         return
     for k, shape in enumerate(listed):
         place = f"{path}[{k}]"
@@ -338,8 +336,8 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
         for key, value in shape.items():
             if key not in DISPLAY:
                 continue
-            found = DISPLAY[key].read(reader, f"{place}.{key}", value)
-            if key == "scale" and any(x.is_zero for x in found):
+            result = DISPLAY[key].read(reader, f"{place}.{key}", value)
+            if key == "scale" and any(x.is_zero for x in result):
                 remedy = "give three numbers other than 0; negative ones mirror"
                 message = "a scale of 0 leaves nothing of the mesh"
                 reader.fault(f"{place}.{key}", message, remedy, "EG-RANGE")
@@ -435,12 +433,12 @@ def _tensor(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[Mat3,
     o = vec.zero(reader.graph)
     tensor: Mat3 = (o, o, o)
     if key in values:
-        given = values[key]
-        parts = items(given)
+        raw = values[key]
+        parts = items(raw)
         if key == "principal" and (parts is None or any(items(part) is not None for part in parts)):
-            reader.wrong(f"{path}.{key}", given, kinds.Vector)
+            reader.wrong(f"{path}.{key}", raw, kinds.Vector)
         else:
-            tensor = BODY["inertia"].read(reader, f"{path}.{key}", given)
+            tensor = BODY["inertia"].read(reader, f"{path}.{key}", raw)
     if "axes" not in values:
         return tensor, reader.identity
     return tensor, rpy_rotation(reader.graph, reader.vector(f"{path}.axes", values["axes"]))
@@ -470,6 +468,6 @@ def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | 
 
 def _plane(tensor: Mat3) -> int | None:
     """The axis of the one moment that was given, None where there are others, or products."""
-    given = [i for i in range(3) if not tensor[i][i].is_zero]
+    raw = [i for i in range(3) if not tensor[i][i].is_zero]
     products = any(not tensor[i][j].is_zero for i in range(3) for j in range(3) if i != j)
-    return given[0] if len(given) == 1 and not products else None
+    return raw[0] if len(raw) == 1 and not products else None

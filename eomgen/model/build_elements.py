@@ -36,21 +36,21 @@ def limits_nothing(key: str, value: Any) -> bool:
     return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
 
 
-def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
+def read_limits(reader: Reader, path: str, raw: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
     """Limits of each coordinate of a joint.
 
     A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
     """
-    if not isinstance(given, Mapping):
-        reader.wrong(path, given, kinds.Limits)
+    if not isinstance(raw, Mapping):
+        reader.wrong(path, raw, kinds.Limits)
         return tuple(() for _ in coordinates)
-    check_keys(path, given, LIMITS, reader.faults)
+    check_keys(path, raw, LIMITS, reader.faults)
     result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
     for key in LIMITS:
-        if key not in given or given[key] is None:
+        if key not in raw or raw[key] is None:
             continue
-        listed = items(given[key])
-        values = [given[key]] if listed is None else listed
+        listed = items(raw[key])
+        values = [raw[key]] if listed is None else listed
         if len(values) != len(coordinates):
             message = f"{len(values)} values for {len(coordinates)} coordinates"
             reader.fault(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
@@ -62,17 +62,17 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
                 reader.fault(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
             elif number is not None:
                 result[k].append((key, number))
-    for name, found in zip(coordinates, result, strict=True):
-        limits = dict(found)
+    for name, collected in zip(coordinates, result, strict=True):
+        limits = dict(collected)
         if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
             message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
             reader.fault(path, message, "exchange them", "EG-RANGE")
-    return tuple(tuple(found) for found in result)
+    return tuple(tuple(collected) for collected in result)
 
 
-def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
+def read_dry_friction(reader: Reader, path: str, raw: Any) -> float:
     """Coulomb friction of a joint (N m or N), as data."""
-    value = reader.number(path, given)
+    value = reader.number(path, raw)
     if value is not None and value < 0:
         reader.fault(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
     return value or 0.0
@@ -126,8 +126,8 @@ def coordinate_names(
     if "coordinate" in values:
         return (name_of(values["coordinate"]),), True
     if "coordinates" in values:
-        given = values["coordinates"]
-        listed = [given] if isinstance(given, str) else items(given)
+        raw = values["coordinates"]
+        listed = [raw] if isinstance(raw, str) else items(raw)
         return tuple(name_of(x) for x in listed or ()), True
     return tuple(name + c.suffix for c in (joint or sketch(type_name, values)).coordinates), False
 
@@ -135,8 +135,8 @@ def coordinate_names(
 def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
     """A joint from its raw keys, whose faults are told elsewhere."""
     kind = JOINTS[type_name]
-    given = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
-    return kind(**{key: field.default for key, field in kind.options.items()} | given)
+    raw = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
+    return kind(**{key: field.default for key, field in kind.options.items()} | raw)
 
 
 def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[Declared]:
@@ -239,12 +239,12 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
 def _with_expressions(reader: Reader, declared: Declared) -> Joint:
     """The joint with those of its options that are expressions."""
     joint, values = declared.joint, declared.entry.values
-    found = {
+    result = {
         option: field.read(reader, f"{declared.entry.path}.{option}", values[option], declared.coordinates[: field.own])
         for option, field in joint.options.items()
         if isinstance(field, Scalar) and option in values
     }
-    return replace(joint, **found)
+    return replace(joint, **result)
 
 
 # -- forces and constraints --------------------------------------------------------------------------------------------
@@ -254,11 +254,11 @@ def declare_contacts(reader: Reader, entries: list[DescribedEntry]) -> None:
     """Take the polar angles of all contact points of cams into the namespace."""
     for entry in entries:
         kind, shape = entry.values.get("type"), entry.values.get("shape")
-        found = kind == "cam_contact" and "contour" in entry.values and shape in ("roller", "flat_face")
-        if found and isinstance(entry.name, str):
-            given = entry.values.get("coordinate")
-            name = f"{entry.name}_contact" if given is None else name_of(given)
-            path = entry.path if given is None else f"{entry.path}.coordinate"
+        result = kind == "cam_contact" and "contour" in entry.values and shape in ("roller", "flat_face")
+        if result and isinstance(entry.name, str):
+            raw = entry.values.get("coordinate")
+            name = f"{entry.name}_contact" if raw is None else name_of(raw)
+            path = entry.path if raw is None else f"{entry.path}.coordinate"
             reader.names.declare("coordinate", name, path)
             reader.contacts[entry.path] = str(name)
             take_latex(reader, f"{entry.path}.latex", name, entry.values.get("latex", ""))
@@ -298,9 +298,9 @@ def element_states(
     return tuple(states), rates
 
 
-def _keys_of_law(found: ElementType) -> set[str]:
+def _keys_of_law(element: ElementType) -> set[str]:
     """The keys of a type that belong to its law: those that follow the key ``law``, and that key."""
-    keys = list(found.keys)
+    keys = list(element.keys)
     return set(keys[keys.index("law") :])
 
 
@@ -308,37 +308,37 @@ def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     """The type, if the entry has one and says in one way what it acts on; its keys are checked."""
     if e.at_fault():
         return None
-    given = e.reader.type_of(e.path, e.values, types, what)
-    if not given:
+    raw = e.reader.type_of(e.path, e.values, types, what)
+    if not raw:
         return None
-    found = types[given]
-    if _misunderstood(e, found):
+    result = types[raw]
+    if _misunderstood(e, result):
         return None
-    e.element_type, e.fields = found, found.fields(what, types)
-    if isinstance(found.keys.get("law"), Law) and not e.values.keys() & _keys_of_law(found):
+    e.element_type, e.fields = result, result.fields(what, types)
+    if isinstance(result.keys.get("law"), Law) and not e.values.keys() & _keys_of_law(result):
         e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has", "EG-MISSING")
         return None
     check_keys(e.path, e.values, e.fields, e.reader.faults)
-    present = [key for key in found.one_of if key in e.values]
-    if found.one_of and len(present) != 1:
-        message = f"{' or '.join(found.one_of)} is missing"
+    present = [key for key in result.one_of if key in e.values]
+    if result.one_of and len(present) != 1:
+        message = f"{' or '.join(result.one_of)} is missing"
         if present:
             message = f"{'both ' * (len(present) == 2)}{', '.join(present[:-1])} and {present[-1]} are given"
-        e.fault("", message, f"give one of {', '.join(found.one_of)}")
+        e.fault("", message, f"give one of {', '.join(result.one_of)}")
         return None
-    return found
+    return result
 
 
-def _misunderstood(e: Entry, found: ElementType) -> bool:
+def _misunderstood(e: Entry, element: ElementType) -> bool:
     """Note a joint where a marker is asked for, with what people who give one want."""
-    if not found.remedies:
+    if not element.remedies:
         return False
     names = {name for joint in e.reader.joints for name in (joint.entry.name, *joint.coordinates)}
-    for key, remedy in found.remedies.items():
-        given = "joint" if "joint" in e.values and "joint" not in found.keys else key
-        named = e.values.get(given)
-        if given == "joint" or (isinstance(named, str) and named in names and named not in e.reader.markers):
-            e.fault(given, f"a {found.name} acts at a marker, and {named!r} is not a marker", remedy, "EG-TYPE")
+    for key, remedy in element.remedies.items():
+        raw = "joint" if "joint" in e.values and "joint" not in element.keys else key
+        named = e.values.get(raw)
+        if raw == "joint" or (isinstance(named, str) and named in names and named not in e.reader.markers):
+            e.fault(raw, f"a {element.name} acts at a marker, and {named!r} is not a marker", remedy, "EG-TYPE")
             return True
     return False
 
@@ -351,6 +351,6 @@ def build_elements(reader: Reader, what: str, entries: list[DescribedEntry], typ
 
 
 def _build(e: Entry, what: str, types: Types) -> Any:
-    found = _type_of(e, what, types)
-    element = None if found is None or found.read is None else found.read(e)
+    result = _type_of(e, what, types)
+    element = None if result is None or result.read is None else result.read(e)
     return None if e.at_fault() else element

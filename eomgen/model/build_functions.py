@@ -43,16 +43,16 @@ class Signature(NamedTuple):
 
 def find_signature(text: str, name: str) -> Signature | None:
     """Where and how C source defines a function; None if that cannot be seen, as behind a macro."""
-    bare = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    bare = _HIDDEN.sub(lambda result: re.sub(r"[^\n]", " ", result[0]), text)
     pattern = rf"(?P<given>[A-Za-z_]\w*(?:\s+[A-Za-z_]\w*|\s*\*)*)[\s*]*\b{name}\s*\((?P<taken>[^()]*)\)\s*[{{;]"
-    for found in re.finditer(pattern, bare):
-        given = found["given"].split()
-        if given[0] in ("return", "else", "case"):
+    for result in re.finditer(pattern, bare):
+        raw = result["given"].split()
+        if raw[0] in ("return", "else", "case"):
             continue  # a call
-        taken = [part.strip() for part in found["taken"].split(",")]
+        taken = [part.strip() for part in result["taken"].split(",")]
         taken = [] if taken in ([""], ["void"]) else taken
-        foreign = next((part for part in [" ".join(given), *taken] if _is_foreign(part)), "")
-        return Signature(bare.count("\n", 0, found.start("taken")) + 1, len(taken), " ".join(foreign.split()))
+        foreign = next((part for part in [" ".join(raw), *taken] if _is_foreign(part)), "")
+        return Signature(bare.count("\n", 0, result.start("taken")) + 1, len(taken), " ".join(foreign.split()))
     return None
 
 
@@ -60,8 +60,8 @@ def _is_foreign(declared: str) -> bool:
     """Whether words that declare a value are surely not those of a double."""
     if "*" in declared or "[" in declared:
         return True
-    words = [word for word in declared.split() if word not in _QUALIFIERS]
-    return bool(words) and words[0] in _OTHERS
+    tokens = [word for word in declared.split() if word not in _QUALIFIERS]
+    return bool(tokens) and tokens[0] in _OTHERS
 
 
 ARGUMENTS = 16  #: of one function
@@ -96,37 +96,37 @@ def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
         return None
     for _, name in names:
         _check_signature(reader, path, name, arity, source)
-    twin = _twin(reader, entry, arity, names)
+    fallback = _fallback(reader, entry, arity, names)
     if faults.under(path):
         return None
     code = NativeCode(source[0], source[1], tuple(names))
-    return Function(entry.name, arity, twin, code, reader.description.place(path))
+    return Function(entry.name, arity, fallback, code, reader.description.place(path))
 
 
 def _check_signature(reader: Reader, path: str, name: str, arity: int, source: tuple[str, str]) -> None:
     """Note a C function that is not there, or not one of so many doubles."""
     file, text = source
-    found = find_signature(text, name)
+    result = find_signature(text, name)
     one = "double " + name + "(" + ", ".join(["double"] * arity) + ")"
-    if found is None:
+    if result is None:
         if not re.search(rf"\b{name}\b", text):
             remedy = "it must be a C function double f(double, ...)"
             reader.fault(f"{path}.source", f"{file} has no function {name!r}", remedy, "EG-NAME-UNKNOWN")
-    elif found.foreign:
-        message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is not double"
+    elif result.foreign:
+        message = f"{name} in {file}:{result.line} has {result.foreign!r}, which is not double"
         reader.fault(f"{path}.source", message, f"write {one}", "EG-TYPE")
-    elif found.arguments != arity:
-        message = f"{name} in {file}:{found.line} takes {found.arguments} arguments, not the {arity} declared"
-        reader.fault(f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}", "EG-SHAPE")
+    elif result.arguments != arity:
+        message = f"{name} in {file}:{result.line} takes {result.arguments} arguments, not the {arity} declared"
+        reader.fault(f"{path}.arguments", message, f"give arguments: {result.arguments}, or write {one}", "EG-SHAPE")
 
 
 def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:
     listed = items(values.get("derivatives"))
-    given = values.get("arguments", len(listed) if listed else 1)
-    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= ARGUMENTS:
-        reader.fault(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}", "EG-SHAPE")
+    raw = values.get("arguments", len(listed) if listed else 1)
+    if isinstance(raw, bool) or not isinstance(raw, int) or not 1 <= raw <= ARGUMENTS:
+        reader.fault(f"{path}.arguments", f"{raw!r} arguments", f"allowed: 1 to {ARGUMENTS}", "EG-SHAPE")
         return None
-    return given
+    return raw
 
 
 def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orders, str]] | None:
@@ -151,12 +151,12 @@ def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orde
     return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
 
 
-def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
-    if given is None:
+def _listed(reader: Reader, path: str, raw: Any, length: int) -> list[Any]:
+    if raw is None:
         return []
-    listed = items(given)
+    listed = items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.Functions)
+        reader.wrong(path, raw, kinds.Functions)
         return []
     if len(listed) != length:
         what = f"with that many arguments it needs {length}, null where the source has none"
@@ -165,9 +165,9 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
     return listed
 
 
-def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str] | None:
+def _read(reader: Reader, path: str, raw: Any, folder: str) -> tuple[str, str] | None:
     """Name and text of a file."""
-    name = reader.file(path, given)
+    name = reader.file(path, raw)
     if name is None:
         return None
     file = Path(folder) / name
@@ -189,26 +189,26 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
     return None
 
 
-def _twin(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]) -> Twin | None:
+def _fallback(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]) -> Twin | None:
     """The Python twin."""
-    given, path = entry.values.get("python"), f"{entry.path}.python"
-    if given is None:
+    raw, path = entry.values.get("python"), f"{entry.path}.python"
+    if raw is None:
         return None
-    if isinstance(given, FallbackSource):
-        functions = {(0,) * arity: given.value}
+    if isinstance(raw, FallbackSource):
+        functions = {(0,) * arity: raw.value}
         for key, total in (("derivatives", 1), ("second_derivatives", 2)):
             every = list(up_to(arity, total))
-            listed = _listed(reader, f"{entry.path}.python_{key}", getattr(given, key) or None, len(every))
+            listed = _listed(reader, f"{entry.path}.python_{key}", getattr(raw, key) or None, len(every))
             functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
         if not all(callable(f) for f in functions.values()):
             reader.fault(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
             return None
         return Twin(functions)
-    source = _read(reader, path, given, entry.folder)
+    source = _read(reader, path, raw, entry.folder)
     if source is None:
         return None
     try:
-        spec = importlib.util.spec_from_file_location(f"_native_{entry.name}", Path(entry.folder) / given)
+        spec = importlib.util.spec_from_file_location(f"_native_{entry.name}", Path(entry.folder) / raw)
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
@@ -245,19 +245,17 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
 
 
 def _arity_meant(entry: DescribedEntry) -> int:
-    given = entry.values.get("arguments", len(items(entry.values.get("derivatives")) or ()))
-    return given if isinstance(given, int) and 1 <= given <= 16 else 2 if "z" in entry.values else 1
+    raw = entry.values.get("arguments", len(items(entry.values.get("derivatives")) or ()))
+    return raw if isinstance(raw, int) and 1 <= raw <= 16 else 2 if "z" in entry.values else 1
 
 
 def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
-    given = reader.type_of(entry.path, entry.values, FUNCTION, "function")
-    if given:
-        check_keys(entry.path, entry.values, function_fields(given), reader.faults)
+    raw = reader.type_of(entry.path, entry.values, FUNCTION, "function")
+    if raw:
+        check_keys(entry.path, entry.values, function_fields(raw), reader.faults)
     if reader.faults.under(entry.path):
         return None
-    return (
-        build_native(reader, entry) if given == "native" else read_table(reader, entry.name, entry.path, entry.values)
-    )
+    return build_native(reader, entry) if raw == "native" else read_table(reader, entry.name, entry.path, entry.values)
 
 
 def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> Function | None:
@@ -320,9 +318,9 @@ def curve_function(name: str, x: Array, y: Array, kind: str, linear: bool = True
     return Function(name, 1, Curve(x, curve_coefficients(x, y, slopes(x, y, kind), linear), period))
 
 
-def _points(reader: Reader, path: str, given: Any) -> Array | None:
+def _points(reader: Reader, path: str, raw: Any) -> Array | None:
     """Places of a table, at least two and in order."""
-    x = _numbers(reader, path, given)
+    x = _numbers(reader, path, raw)
     if x is None:
         return None
     if len(x) < 2:
@@ -341,11 +339,11 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
     return x
 
 
-def _numbers(reader: Reader, path: str, given: Any) -> Array | None:
+def _numbers(reader: Reader, path: str, raw: Any) -> Array | None:
     """A list of finite numbers; a text such as ``pi/2`` counts as one."""
-    listed = items(given)
+    listed = items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.Numbers)
+        reader.wrong(path, raw, kinds.Numbers)
         return None
     if len(listed) > POINTS:
         reader.fault(path, f"has {len(listed)} numbers", f"a table has at most {POINTS} points", "EG-TOO-LARGE")
@@ -354,15 +352,15 @@ def _numbers(reader: Reader, path: str, given: Any) -> Array | None:
         float(x) if is_number(x) and -1e300 < x < 1e300 else reader.number(f"{path}[{k}]", x)
         for k, x in enumerate(listed)
     ]
-    found = [x for x in read if x is not None]
-    return np.array(found) if len(found) == len(listed) else None
+    result = [x for x in read if x is not None]
+    return np.array(result) if len(result) == len(listed) else None
 
 
-def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | None:
+def _grid(reader: Reader, path: str, raw: Any, n_x: int, n_y: int) -> Array | None:
     """Values on a grid, a row for each x."""
-    rows = items(given)
+    rows = items(raw)
     if rows is None:
-        reader.wrong(path, given, kinds.Grid)
+        reader.wrong(path, raw, kinds.Grid)
         return None
     if len(rows) != n_x:
         reader.fault(path, f"has {len(rows)} rows for {n_x} points x", "give one for each x", "EG-SHAPE")
@@ -374,8 +372,8 @@ def _grid(reader: Reader, path: str, given: Any, n_x: int, n_y: int) -> Array | 
     for k, row in enumerate(read):
         if row is not None and len(row) != n_y:
             reader.fault(f"{path}[{k}]", f"has {len(row)} values for {n_y} points y", "give one for each y", "EG-SHAPE")
-    found = [row for row in read if row is not None and len(row) == n_y]
-    return np.array(found) if len(found) == n_x else None
+    result = [row for row in read if row is not None and len(row) == n_y]
+    return np.array(result) if len(result) == n_x else None
 
 
 def surface_nodes(x: Array, y: Array, z: Array, kind: str) -> Array:

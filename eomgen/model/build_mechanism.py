@@ -107,10 +107,10 @@ def build(description: Description) -> Mechanism:
     reader.shapes = partial(read_shapes, reader)
     forces = build_elements(reader, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
-    given = build_equations(reader, given_values)
+    raw = build_equations(reader, given_values)
     if lagrangian is not None:
-        given = differentiate(graph, lagrangian, clock(graph, inputs))
-        require_quadratic(reader, given)
+        raw = differentiate(graph, lagrangian, clock(graph, inputs))
+        require_quadratic(reader, raw)
     constraints = build_elements(reader, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     states, begun, clocks, samplings = build_states(reader, declared, by_clock)
@@ -120,7 +120,7 @@ def build(description: Description) -> Mechanism:
     own_events = build_events(reader, sections["events"])
     check_resets(reader, own_events, clocks, switched)
     events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
-    differentiated = list_differentiated(reader, lagrangian, given, constraints, switched, events, outputs)
+    differentiated = list_differentiated(reader, lagrangian, raw, constraints, switched, events, outputs)
     inputs = add_rates(reader, inputs, differentiated)
     moves = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*moves, "output"))
@@ -138,7 +138,7 @@ def build(description: Description) -> Mechanism:
     negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
     check_turns(constraints, reader.requirements)
     if lagrangian is None:
-        check_energies(given, outputs, faults)
+        check_energies(raw, outputs, faults)
     _check_path_quantities(reader, forces)
     check_dimensions(reader, joints)
     if len(joints) == len(sections["joints"]):
@@ -146,7 +146,7 @@ def build(description: Description) -> Mechanism:
     if faults:
         raise ModelError(faults.sorted())
     outputs = with_units(reader, joints, outputs)
-    exerted, carried = _wrenches(reader)
+    exerted, reactions = _wrenches(reader)
     described = len(bodies)
     bodies, joints = (*bodies, *reader.added[0]), (*joints, *reader.added[1])
     return Mechanism(
@@ -163,9 +163,10 @@ def build(description: Description) -> Mechanism:
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.carried} | state_rates,
+        element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.is_reaction}
+        | state_rates,
         wrench_quantities=exerted,
-        reaction_quantities=carried,
+        reaction_quantities=reactions,
         initial=begun
         | {s.state: graph.one if s.closed else graph.zero for s in switched}
         | {name: value for name, value in starts.items() if name in moving},
@@ -174,7 +175,7 @@ def build(description: Description) -> Mechanism:
         independent=independent,
         simulation=simulation,
         lagrangian=lagrangian,
-        given=given,
+        given=raw,
         constraints=constraints,
         switched=switched,
         lines=dict(description.lines),
@@ -197,12 +198,12 @@ def build(description: Description) -> Mechanism:
     )
 
 
-def _limit_notes(reader: Reader, given: Any) -> bool:
-    if given == "stop":
+def _limit_notes(reader: Reader, raw: Any) -> bool:
+    if raw == "stop":
         remedy = "add a force of type stop for each joint; allowed here: note, off"
         reader.fault("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy, "EG-CHOICE")
         return True
-    return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
+    return raw is None or reader.choice("limits", raw, MODEL["limits"]) != "off"
 
 
 def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
@@ -232,13 +233,13 @@ def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
 def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntry]:
     """Markers of a body: a mapping from a file, a list of (name, placement) from Python."""
     path = f"{entry.path}.markers"
-    given: Any = entry.values.get("markers", ())
-    if isinstance(given, Mapping):
-        given = list(given.items())
-    if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
-        reader.wrong(path, given, kinds.Markers)
+    raw: Any = entry.values.get("markers", ())
+    if isinstance(raw, Mapping):
+        raw = list(raw.items())
+    if not isinstance(raw, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in raw):
+        reader.wrong(path, raw, kinds.Markers)
         return []
-    return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+    return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in raw]
 
 
 def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
@@ -252,14 +253,14 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
 
 def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, ReactionQuantity]]:
     """The parts of what force elements exert on bodies, and of reactions and multipliers, that expressions speak of."""
-    exerted, carried = dict[str, WrenchQuantity](), dict[str, ReactionQuantity]()
+    exerted, reactions = dict[str, WrenchQuantity](), dict[str, ReactionQuantity]()
     for asked, path in reader.asked.items():
         axes = reader.moving(asked.axes) if asked.axes else None
-        if asked.carried:
-            carried[str(asked)] = ReactionQuantity(asked.of, asked.part, axes, path)
+        if asked.is_reaction:
+            reactions[str(asked)] = ReactionQuantity(asked.of, asked.part, axes, path)
         elif asked.on:
             exerted[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
-    return exerted, carried
+    return exerted, reactions
 
 
 def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
@@ -268,23 +269,23 @@ def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
     for asked, path in reader.asked.items():
         quantity, name, on = asked.name, asked.of, asked.on
         if name in known and known[name].is_rigid and not on:
-            told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
+            fault = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
-            reader.fault(path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED")
+            reader.fault(path, fault, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED")
         elif quantity != "power" and not on and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             message = f"{name!r} does not act along a path"
             reader.fault(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")
 
 
-def _initial(reader: Reader, section: str, given: Any, whats: tuple[str, ...]) -> dict[str, Expr]:
+def _initial(reader: Reader, section: str, raw: Any, whats: tuple[str, ...]) -> dict[str, Expr]:
     """Values by coordinate (or rate, or output): expressions in parameters."""
-    if not isinstance(given, Mapping):
-        reader.wrong(section, given, kinds.Table)
+    if not isinstance(raw, Mapping):
+        reader.wrong(section, raw, kinds.Table)
         return {}
     known = list(dict.fromkeys(reader.names.of(*whats)))
     result: dict[str, Expr] = {}
-    for name, value in in_order(given, known):
+    for name, value in in_order(raw, known):
         path = f"{section}.{name}"
         if name in known:
             result[name] = reader.expression(path, value)
@@ -310,17 +311,17 @@ def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
         )
 
 
-def _listed(words: Sequence[str], last: str) -> str:
-    return f"{', '.join(words[:-1])} {last} {words[-1]}" if words[1:] else words[0]
+def _listed(names: Sequence[str], last: str) -> str:
+    return f"{', '.join(names[:-1])} {last} {names[-1]}" if names[1:] else names[0]
 
 
 _PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "states", "output": "outputs"}
 
 
-def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
-    listed = [given] if isinstance(given, str) else items(given)
+def _independent(reader: Reader, raw: Any) -> tuple[str, ...]:
+    listed = [raw] if isinstance(raw, str) else items(raw)
     if listed is None:
-        reader.wrong("independent", given, kinds.Names)
+        reader.wrong("independent", raw, kinds.Names)
         return ()
     coordinates = list(reader.names.of("coordinate"))
     rates = [name + "_dot" for name in coordinates]
@@ -337,18 +338,18 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     return tuple(result)
 
 
-def _simulation(reader: Reader, given: Any) -> Simulation:
-    if not isinstance(given, Mapping):
-        reader.wrong("simulation", given, kinds.Table)
+def _simulation(reader: Reader, raw: Any) -> Simulation:
+    if not isinstance(raw, Mapping):
+        reader.wrong("simulation", raw, kinds.Table)
         return Simulation()
-    check_keys("simulation", given, SIMULATION, reader.faults)
+    check_keys("simulation", raw, SIMULATION, reader.faults)
     settings: dict[str, Any] = {}
     for key, field in SIMULATION.items():
-        if key not in given:
+        if key not in raw:
             continue
-        settings[key] = field.read(reader, f"simulation.{key}", given[key])
+        settings[key] = field.read(reader, f"simulation.{key}", raw[key])
     if (settings.get("method") in FIXED_STEP) != ("step" in settings):
         remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
-        told = "only methods RK4 and moreau take steps of one size, and they need their size"
-        reader.fault("simulation.step", told, remedy, "EG-CONFLICT")
+        fault = "only methods RK4 and moreau take steps of one size, and they need their size"
+        reader.fault("simulation.step", fault, remedy, "EG-CONFLICT")
     return Simulation(**settings)

@@ -48,22 +48,22 @@ def in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float |
     """A value in SI units; one that no double holds there is a fault."""
     if value is None or unit.size == 1.0:
         return value
-    found = value * unit.size
-    if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
+    result = value * unit.size
+    if not math.isfinite(result) or (value != 0.0 and abs(result) < sys.float_info.min):
         remedy = "check the value and its unit"
         reader.fault(
             path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy, "EG-UNIT"
         )
         return None
-    return found
+    return result
 
 
 def read_parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     """The parameter of an entry."""
     reader.names.declare("parameter", entry.name, entry.path)
     unit, doc = read_described(reader, entry, PARAMETER)
-    given = entry.values.get("value")
-    value = None if given is None else reader.number(f"{entry.path}.value", given)
+    raw = entry.values.get("value")
+    value = None if raw is None else reader.number(f"{entry.path}.value", raw)
     return Parameter(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
 
 
@@ -71,15 +71,15 @@ def read_input(reader: Reader, entry: DescribedEntry) -> Input:
     """The input of an entry, without its expression over time."""
     reader.names.declare("input", entry.name, entry.path)
     unit, doc = read_described(reader, entry, INPUT)
-    given = entry.values.get("value")
-    value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
+    raw = entry.values.get("value")
+    value = 0.0 if raw is None else reader.number(f"{entry.path}.value", raw)
     return Input(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
 
 
-def with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
+def with_signal(reader: Reader, declared: Input, entry: DescribedEntry) -> Input:
     """The input with its expression over time, read when all coordinates are known."""
     if entry.values.get("signal") is None:
-        return given
+        return declared
     path = f"{entry.path}.signal"
     expression = reader.expression(path, entry.values["signal"], MOTION)
     for name in sorted(symbols_of([expression])):
@@ -88,7 +88,7 @@ def with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
             reader.fault(path, f"the input {name!r} cannot be used here", remedy, "EG-REFERENCE")
     if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
         reader.fault(path, "a function of the model cannot be used here", "write out its expression", "EG-REFERENCE")
-    return replace(given, signal=expression)
+    return replace(declared, signal=expression)
 
 
 class Outputs:
@@ -150,8 +150,8 @@ class Outputs:
             elif unit.size != 1.0:
                 remedy = f"leave the unit out, or give the output in {unit.text} another name"
                 faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy, "EG-UNIT")
-        given = expression / unit.size if unit.size != 1.0 else expression
-        return Output(str(entry.name), given, unit.text, doc, self._of_velocities(entry, expression)), expression
+        raw = expression / unit.size if unit.size != 1.0 else expression
+        return Output(str(entry.name), raw, unit.text, doc, self._of_velocities(entry, expression)), expression
 
     def _of_velocities(self, entry: DescribedEntry, expression: Expr) -> bool:
         """Whether an output is written with velocities, also where they cancel, as in ``0*vx(b) - 2``."""
@@ -216,21 +216,21 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
 
 def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[float | None, tuple[str, ...]]:
     """The coefficient of friction of an impact, and the outputs that are its sliding velocities."""
-    given, slip = values.get("friction"), values.get("slip")
-    if given is None and slip is None:
+    raw, slip = values.get("friction"), values.get("slip")
+    if raw is None and slip is None:
         return None, ()
     if values.get("restitution") is None:
-        what = "friction" if given is not None else "slip"
+        what = "friction" if raw is not None else "slip"
         remedy = "give the restitution of the impact, from 0 to 1"
         reader.fault(
             f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy, "EG-MISSING"
         )
-    if given is None or slip is None:
+    if raw is None or slip is None:
         missing, there = ("slip", "friction") if slip is None else ("friction", "slip")
         remedy = "slip: the output that is the sliding velocity" if slip is None else "friction: the coefficient"
         reader.fault(f"{path}.{there}", f"is given without {missing}", f"give {remedy}", "EG-MISSING")
         return None, ()
-    friction = reader.number(f"{path}.friction", given)
+    friction = reader.number(f"{path}.friction", raw)
     if friction is not None and not friction >= 0.0:
         reader.fault(f"{path}.friction", f"{friction:g} is negative", "give 0 or more", "EG-RANGE")
     names = [slip] if isinstance(slip, str) else items(slip)
@@ -290,13 +290,13 @@ def instant(reader: Reader, path: str, value: Any) -> Expr:
     return expression
 
 
-def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...]:
-    if not isinstance(given, Mapping):
-        reader.wrong(path, given, kinds.Rates)
+def _reset(reader: Reader, path: str, raw: Any) -> tuple[tuple[str, Expr], ...]:
+    if not isinstance(raw, Mapping):
+        reader.wrong(path, raw, kinds.Rates)
         return ()
     known = list(reader.names.of("coordinate", "velocity", "state"))
     result = []
-    for name, value in in_order(given, known):
+    for name, value in in_order(raw, known):
         if name in known:
             result.append((str(name), instant(reader, f"{path}.{name}", value)))
         else:
@@ -347,25 +347,25 @@ def build_clocks(
 
 def _sampling_times(reader: Reader, entries: Sequence[DescribedEntry]) -> tuple[Expr, Expr]:
     """Period and offset of a clock, read in each entry so that each fault has its place."""
-    found = []
+    result = []
     for entry in entries:
-        path, given = f"{entry.path}.period", entry.values.get("period")
-        if given is None:
+        path, raw = f"{entry.path}.period", entry.values.get("period")
+        if raw is None:
             reader.faults.missing(path, "give the time from one sampling time to the next, in s")
-        period = reader.stand_in if given is None else reader.expression(path, given)
-        if given is not None:
+        period = reader.stand_in if raw is None else reader.expression(path, raw)
+        if raw is not None:
             remedy = "give the time between samples, in s"
             reader.requirements.inside(path, period, POSITIVE, remedy, "{:g} is not positive")
-        found.append((period, reader.expression(f"{entry.path}.offset", entry.values.get("offset", 0.0))))
-    return found[0]
+        result.append((period, reader.expression(f"{entry.path}.offset", entry.values.get("offset", 0.0))))
+    return result[0]
 
 
-def _time_text(given: Any) -> str:
+def _time_text(raw: Any) -> str:
     """A number or expression as text, so that 0.010 and "0.01" are the same."""
     try:
-        return repr(float(given))
+        return repr(float(raw))
     except (TypeError, ValueError):
-        return "".join(str(given).split())
+        return "".join(str(raw).split())
 
 
 def declare_states(
@@ -438,13 +438,13 @@ def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
 
 def declare_switches(reader: Reader, entries: Sequence[DescribedEntry]) -> list[DescribedEntry]:
     """Take in the names of states and events; the entries that have them."""
-    found = [entry for entry in entries if isinstance(entry.name, str) and is_switched(entry.values)]
-    for entry in found:
+    result = [entry for entry in entries if isinstance(entry.name, str) and is_switched(entry.values)]
+    for entry in result:
         reader.names.declare("state", state_of(entry.name), entry.path)
         for key in ("closes", "opens"):
             if key in entry.values:
                 reader.names.declare("event", event_of(entry.name, key), entry.path)
-    return found
+    return result
 
 
 def build_switches(
@@ -453,7 +453,7 @@ def build_switches(
     """The constraints that close and open, with what makes them do so."""
     names = [str(entry.name) for entry in entries]
     made = {constraint.name: constraint for constraint in constraints}
-    found = []
+    result = []
     for entry in entries:
         path, values = entry.path, entry.values
         closed = values.get("closed", "closes" not in values)
@@ -461,23 +461,23 @@ def build_switches(
         rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
         reader.requirements.positive(f"{path}.stabilisation", rate)
         held = (state_of(str(entry.name)), reader.flag(f"{path}.closed", closed), rate)
-        found.append(Switched(made.get(str(entry.name)), *held, tuple(map(state_of, releases))))
-    return tuple(found)
+        result.append(Switched(made.get(str(entry.name)), *held, tuple(map(state_of, releases))))
+    return tuple(result)
 
 
 def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> list[str]:
     """The constraints that let go; one name counts as a list of one."""
-    path, given = f"{entry.path}.releases", entry.values.get("releases")
-    if given is None:
+    path, raw = f"{entry.path}.releases", entry.values.get("releases")
+    if raw is None:
         return []
-    listed = [given] if isinstance(given, str) else items(given)
+    listed = [raw] if isinstance(raw, str) else items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.SomeNames)
+        reader.wrong(path, raw, kinds.SomeNames)
         return []
     for k, name in enumerate(listed):
         if name not in names or name == entry.name:
             remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
-            place = path if isinstance(given, str) else f"{path}[{k}]"
+            place = path if isinstance(raw, str) else f"{path}[{k}]"
             reader.fault(place, f"{name!r} is no other constraint that opens", remedy, "EG-NAME-UNKNOWN")
     return [str(name) for name in listed]
 
@@ -501,14 +501,14 @@ def events_of_switches(
 def _falling(reader: Reader, path: str, value: object) -> Expr:
     """An expression that can fall to 0."""
     before = len(reader.faults.problems)
-    found = instant(reader, path, value)
+    result = instant(reader, path, value)
     if len(reader.faults.problems) > before:
-        return found
+        return result
     remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
-    if is_comparison(found):
+    if is_comparison(result):
         reader.fault(
             path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy, "EG-EXPRESSION"
         )
-    elif symbols_of([found]) <= {*reader.names.of("parameter")}:
+    elif symbols_of([result]) <= {*reader.names.of("parameter")}:
         reader.fault(path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy, "EG-EXPRESSION")
-    return found
+    return result

@@ -105,7 +105,7 @@ def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Out
     turns = {name: q.level in TURNING or (q.level < 2 and q.axis == 3) for name, q in reader.quantities.items()}
     angles |= {name for name, turn in turns.items() if turn}
     check = _Check(reader.graph, names)
-    found = []
+    result = []
     for output in outputs:
         faulty = bool(list(check.faults(output.expression, None)))
         own = check.known[output.expression.id].dimension
@@ -118,39 +118,39 @@ def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Out
                 output = replace(output, unit="J")
             elif angle or (own != NONE and own.times(SPIN, -1) != NONE):
                 output = replace(output, unit=si_text(own, "rad" if angle else ""))
-        found.append(output)
-    return tuple(found)
+        result.append(output)
+    return tuple(result)
 
 
 def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, ...]) -> dict[str, Known]:
     """What is known of every name that can stand in an expression."""
-    found = {"t": Known(TIME)}
+    result = {"t": Known(TIME)}
     for section in ("parameters", "inputs"):
         for entry in reader.description.sections[section]:
             if entry.path in units:
                 for order, suffix in enumerate(RATES if section == "inputs" else ("",)):
                     own = units[entry.path].dimension.times(TIME, -order)
-                    found.setdefault(f"{entry.name}{suffix}", Known(own, True))
+                    result.setdefault(f"{entry.name}{suffix}", Known(own, True))
     for entry in reader.description.sections["states"]:
         if entry.path in units:
             for order, suffix in enumerate(RATES[:2]):
-                found[f"{entry.name}{suffix}"] = Known(units[entry.path].dimension.times(TIME, -order), True)
-    declared = set(found)  # a coordinate of such a name is reported; what it measures is unknown
+                result[f"{entry.name}{suffix}"] = Known(units[entry.path].dimension.times(TIME, -order), True)
+    declared = set(result)  # a coordinate of such a name is reported; what it measures is unknown
     for joint in joints:
         # the parameters of a curve or surface may be lengths, angles or anything else
         free = max((option.own for option in joint.joint.options.values()), default=0)
         for name, coordinate in list(zip(joint.coordinates, joint.joint.coordinates, strict=True))[free:]:
             own = LENGTH if coordinate.kind == "length" else NONE
             for order, suffix in enumerate(RATES):
-                found[name + suffix] = Known(None if name in declared else own.times(TIME, -order))
+                result[name + suffix] = Known(None if name in declared else own.times(TIME, -order))
         for name, velocity in zip(joint.velocities, joint.joint.velocities, strict=True):
             if velocity.of is None:
                 own = SPEED if velocity.kind == "length" else SPIN
-                found |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
+                result |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
-        found[name] = Known(quantity.dimension)
-    found |= {str(asked): Known(asked.dimension) for asked in reader.asked if asked.dimension is not None}
-    return found | {f"{name}()": Known(ENERGY) for name in ENERGIES}
+        result[name] = Known(quantity.dimension)
+    result |= {str(asked): Known(asked.dimension) for asked in reader.asked if asked.dimension is not None}
+    return result | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 
 def _place(description: Description, path: str) -> tuple[str, DescribedEntry | None, list[Any]]:
@@ -213,10 +213,10 @@ class _Check:
         for i in nodes:
             if i not in self.known:
                 self.known[i] = self._node(i)
-        found = [self.wrong[i] for i in nodes if i in self.wrong]
-        yield from found
+        collected = [self.wrong[i] for i in nodes if i in self.wrong]
+        yield from collected
         result = self.known[expression.id]
-        if found or wanted is None or result.dimension is None or not (result.declared or certain):
+        if collected or wanted is None or result.dimension is None or not (result.declared or certain):
             return
         if mass and result.dimension.alike(wanted.times(MASS, -1)) and self.holds_mass(expression.id, mass):
             return

@@ -117,8 +117,8 @@ class Renaming(Visitor):
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:
                 return marker
-            found = self.marker(marker)
-            return found if isinstance(found, str) else self._named(marker, found)
+            result = self.marker(marker)
+            return result if isinstance(result, str) else self._named(marker, result)
 
         def quantity(named: Named) -> str:
             return str(named.renamed(place, lambda name: self.prefix + name))
@@ -150,13 +150,13 @@ class Renaming(Visitor):
         return super().marker(reference)
 
     def _on_attachment(self, body: str, name: str, reference: Any) -> Any:
-        found = self.attached[body]
+        result = self.attached[body]
         if isinstance(reference, str):
             if name:  # a marker that the component gives to ground
-                return f"{found.body}.{self.prefix}{name}"
-            return found.reference
+                return f"{result.body}.{self.prefix}{name}"
+            return result.reference
         placed = self.placement(body, {key: value for key, value in reference.items() if key != "body"})
-        return {"body": found.body, **self.placed(body, placed)}
+        return {"body": result.body, **self.placed(body, placed)}
 
     def placed(self, attachment: str, placed: Any) -> Mapping[str, Any]:
         """A place in the axes of an attachment, in the axes of the body that it is on."""
@@ -188,23 +188,23 @@ class InstanceValue(NamedTuple):
     unit: str | None = None  #: None for that of the component
 
 
-def read_instance_value(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
+def read_instance_value(entry: DescribedEntry, raw: Any, path: str, fault: Fault) -> InstanceValue | None:
     """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
 
-    ``entry`` is the parameter or input of the component, ``given`` what the instance has for it, at ``path``.
+    ``entry`` is the parameter or input of the component, ``raw`` what the instance has for it, at ``path``.
     """
-    if not isinstance(given, Mapping):
-        return InstanceValue(given)
-    for key in given:
+    if not isinstance(raw, Mapping):
+        return InstanceValue(raw)
+    for key in raw:
         if key not in VALUE_KEYS:
             fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), VALUE_KEYS, "keys"), "EG-NAME-UNKNOWN")
             return None
-    if given.get("value") is None:
-        fault(path, f"{dict(given)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
+    if raw.get("value") is None:
+        fault(path, f"{dict(raw)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
         return None
-    unit, own = given.get("unit"), entry.values.get("unit")
+    unit, own = raw.get("unit"), entry.values.get("unit")
     if unit is None:
-        return InstanceValue(given["value"])
+        return InstanceValue(raw["value"])
     try:
         if not isinstance(unit, str):
             raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
@@ -216,13 +216,13 @@ def read_instance_value(entry: DescribedEntry, given: Any, path: str, fault: Fau
     except UnitError as error:
         fault(f"{path}.unit", str(error), error.remedy, "EG-UNIT")
         return None
-    if not is_constant(given["value"]) and read.size != 1.0:
+    if not is_constant(raw["value"]) and read.size != 1.0:
         remedy = "leave the unit out: parameters are in SI units, so the expression is too"
         fault(
-            f"{path}.unit", f"{str(given['value'])!r} is an expression, and {unit} is not an SI unit", remedy, "EG-UNIT"
+            f"{path}.unit", f"{str(raw['value'])!r} is an expression, and {unit} is not an SI unit", remedy, "EG-UNIT"
         )
         return None
-    return InstanceValue(given["value"], unit)
+    return InstanceValue(raw["value"], unit)
 
 
 @dataclass
@@ -265,13 +265,13 @@ class Instance:
 def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> bool:
     """Add the entries of an instance to a description; False, and faults at ``path``, if it has any."""
 
-    def told(place: str, message: str, remedy: str, code: str) -> None:
+    def report(place: str, message: str, remedy: str, code: str) -> None:
         """A fault of the component itself."""
         where = component.description.place(place)
         faults.take(Problem(f"{component.place}{place}", message, remedy, *where, code))
 
     attached = _attachments(target, component, instance, path, faults.add)
-    values = _values(component, instance, path, faults.add, told)
+    values = _values(component, instance, path, faults.add, report)
     if attached is None or values is None or not claim(target, instance, path, faults.add):
         return False
     numbers, texts, units = values
@@ -303,9 +303,9 @@ def add_instance(target: Description, component: Component, instance: Instance, 
                 made.path = f"{section}.{made.name}"
                 target.sections[section].append(made)
                 for key, kind in fields_of(section, entry.values).items():
-                    given = entry.values.get(key) if kind.holds in _HOLDERS else None
-                    one = isinstance(given, Mapping) and isinstance(made.values[key], list)  # shape in place of a list
-                    for name, where in _attachments_in([given] if one else given, key):
+                    raw = entry.values.get(key) if kind.holds in _HOLDERS else None
+                    one = isinstance(raw, Mapping) and isinstance(made.values[key], list)  # shape in place of a list
+                    for name, where in _attachments_in([raw] if one else raw, key):
                         if name in instance.at:
                             note_attachment(name, f"{made.path}.{where}")
     for name, (body, placed) in renaming.markers.items():
@@ -326,7 +326,7 @@ def _attachments(
     target: Description, component: Component, instance: Instance, path: str, fault: Fault
 ) -> dict[str, Attached] | None:
     known = [*component.attachments, GROUND_NAME]
-    found, sound = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}, True
+    result, sound = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}, True
     for name in instance.at:
         if name not in known:
             message = f"{component.name} has no attachment {name!r}"
@@ -340,12 +340,12 @@ def _attachments(
                 fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy, "EG-TYPE")
                 sound = False
             else:
-                found[name] = attached
+                result[name] = attached
         elif name != GROUND_NAME:
             remedy = "give a body, body.marker, ground or {body, at, rpy}"
             fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy, "EG-MISSING")
             sound = False
-    return found if sound else None
+    return result if sound else None
 
 
 #: What kinds of keys hold that may speak of an attachment.
@@ -387,7 +387,7 @@ def _attached(target: Description, reference: Any) -> Attached | None:
 
 
 def _values(
-    component: Component, instance: Instance, path: str, fault: Fault, told: Fault
+    component: Component, instance: Instance, path: str, fault: Fault, report: Fault
 ) -> tuple[dict[str, Any], dict[str, str], dict[str, str]] | None:
     """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
     sound = True
@@ -403,17 +403,17 @@ def _values(
         if read is None:
             sound = False
             continue
-        given = read.value
-        if given is not None and is_constant(given):
-            numbers[name] = given
+        raw = read.value
+        if raw is not None and is_constant(raw):
+            numbers[name] = raw
             units |= {} if read.unit is None else {name: read.unit}
-        elif given is not None:
-            texts[name] = str(given)
+        elif raw is not None:
+            texts[name] = str(raw)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
             if _is_converted(entry.values.get("unit")):
                 place = f"{entry.path}.unit"
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
-                told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
+                report(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
                 sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed)
             texts[name] = str(renaming.scalar(value))
@@ -432,8 +432,8 @@ def _copy_origins(target: Description, component: Component, instance: Instance,
     """Lines and origins of what the instance brings."""
     inner = component.description
     for key, new in origins.items():
-        found = inner.origins.get(key)
-        place, name, prefix = found or (f"{component.place}{key}", "", "")
+        result = inner.origins.get(key)
+        place, name, prefix = result or (f"{component.place}{key}", "", "")
         whole = f"{instance.name}.{name}" if name else instance.name
         target.origins[new] = Origin(place, whole, instance.prefix + prefix)
     for key, place_in_file in inner.lines.items():
@@ -465,8 +465,8 @@ def _add_to_ground(target: Description, renaming: Renaming, entry: DescribedEntr
 
 def _body_entry(target: Description, body: str) -> DescribedEntry | None:
     entries = target.sections["bodies"]
-    found = next((entry for entry in entries if entry.name == body), None)
-    return target.add("bodies", GROUND_NAME, {}) if found is None and body == GROUND_NAME else found
+    result = next((entry for entry in entries if entry.name == body), None)
+    return target.add("bodies", GROUND_NAME, {}) if result is None and body == GROUND_NAME else result
 
 
 def _add_marker(target: Description, body: str, name: str, placed: Mapping[str, Any]) -> None:
@@ -479,14 +479,14 @@ def _add_marker(target: Description, body: str, name: str, placed: Mapping[str, 
 
 def _add_starts(target: Description, component: Component, instance: Instance, renaming: Renaming) -> None:
     """Initial values and guesses; those of the model itself come after them, and before them in force."""
-    for key, given in (("initial", instance.initial), ("guess", instance.guess)):
+    for key, raw in (("initial", instance.initial), ("guess", instance.guess)):
         own = component.description.values.get(key, {})
 
         def inside(name: Any) -> Any:
             return started(name, lambda plain: renaming.prefix + plain, renaming)
 
         made = {inside(name): renaming.scalar(x) for name, x in (own.items() if isinstance(own, Mapping) else ())}
-        made |= {inside(name): value for name, value in given.items()}
+        made |= {inside(name): value for name, value in raw.items()}
         if made:
             kept = target.values.get(key, {})
             whole = {**made, **kept} if isinstance(kept, Mapping) else made
@@ -503,13 +503,13 @@ Round = dict[str, Any]
 _LISTS = "give a list of numbers or expressions, a count n for 1 to n, or {from, to, step}"
 
 
-def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
+def rounds_of(raw: Any, path: str, fault: Fault) -> list[Round] | None:
     """The values of all variables in each round; None where something is wrong, which is told."""
-    if not isinstance(given, Mapping) or not given:
-        fault(path, f"{given!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
+    if not isinstance(raw, Mapping) or not raw:
+        fault(path, f"{raw!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
         return None
     columns: dict[str, list[Any]] = {}
-    for name, values in given.items():
+    for name, values in raw.items():
         place = f"{path}.{name}"
         wrong = fault_of_name(name, symbol=True)
         if wrong:
@@ -593,10 +593,10 @@ class Components:
     """
 
     def __init__(
-        self, given: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
+        self, raw: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
     ) -> None:
         self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
-        self.given = faults.mapping("components", given, "write the names of the components as keys")
+        self.given = faults.mapping("components", raw, "write the names of the components as keys")
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
 
@@ -623,26 +623,26 @@ class Components:
         return self.read[name]
 
     def _read(self, name: str) -> Component | None:
-        given, path = self.given[name], f"components.{name}"
+        raw, path = self.given[name], f"components.{name}"
         wrong = fault_of_name(name)
         if wrong:
             self.fault(path, *wrong, "EG-NAME-FORM")
-        if not isinstance(given, Mapping):
+        if not isinstance(raw, Mapping):
             self.fault(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
             return None
-        check_keys(path, given, COMPONENT, self.faults)
-        if "file" in given:
-            if len(given) > 1:
+        check_keys(path, raw, COMPONENT, self.faults)
+        if "file" in raw:
+            if len(raw) > 1:
                 remedy = "give file alone; the file describes the whole component"
                 self.fault(path, "has keys beside file", remedy, "EG-CONFLICT")
-            return self._read_file(name, given["file"], path)
+            return self._read_file(name, raw["file"], path)
         start = f"{path}."
         lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
         description = Description(lines=lines)
-        self.fill(given, start, description)
-        self.add(given.get("add"), start, description)
+        self.fill(raw, start, description)
+        self.add(raw.get("add"), start, description)
         description = undotted(description)
-        return self._checked(Component(name, start, description, self._attachments(given, start), closed=False))
+        return self._checked(Component(name, start, description, self._attachments(raw, start), closed=False))
 
     def _read_file(self, name: str, file: Any, path: str) -> Component | None:
         if not isinstance(file, str):
@@ -672,8 +672,8 @@ class Components:
                 self.fault(f"{component.place}attachments", message, "rename one of them", "EG-NAME-TAKEN")
         return component
 
-    def _attachments(self, given: Mapping[str, Any], start: str) -> tuple[str, ...]:
-        listed = given.get("attachments") or []
+    def _attachments(self, raw: Mapping[str, Any], start: str) -> tuple[str, ...]:
+        listed = raw.get("attachments") or []
         listed = [listed] if isinstance(listed, str) else listed
         if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
             self.fault(f"{start}attachments", f"{listed!r} is not {kinds.Names.says}", "such as [foot, top]", "EG-TYPE")
@@ -681,9 +681,9 @@ class Components:
         return tuple(listed)
 
     # -- instances ------------------------------------------------------------------------------------------------
-    def add(self, given: Any, start: str, target: Description) -> None:
+    def add(self, raw: Any, start: str, target: Description) -> None:
         """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
-        for name, keys in self.faults.mapping(f"{start}add", given, "write the names of the instances as keys").items():
+        for name, keys in self.faults.mapping(f"{start}add", raw, "write the names of the instances as keys").items():
             self._add_one(name, keys, f"{start}add.{name}", target)
 
     def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:
@@ -724,11 +724,11 @@ class Components:
     ) -> Instance | None:
         tables: dict[str, Mapping[str, Any]] = {}
         for key in ("parameters", "inputs", "initial", "guess"):
-            given = put_in(keys.get(key) or {}, variables)
-            if not isinstance(given, Mapping):
+            raw = put_in(keys.get(key) or {}, variables)
+            if not isinstance(raw, Mapping):
                 self.fault(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
                 return None
-            tables[key] = given
+            tables[key] = raw
         at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
         values = {**tables["parameters"], **tables["inputs"]}
         named = named_attachments(component, at, f"{path}.at", self.fault)
@@ -767,7 +767,7 @@ def claim(target: Description, instance: Instance, path: str, fault: Fault) -> b
 def component_of(description: Description, name: str, place: str, faults: Faults, path: str) -> Component:
     """A component of the description of a whole model, which is at ``path``; it knows no names but its own."""
 
-    def told(inside: str, message: str, remedy: str, code: str) -> None:
+    def report(inside: str, message: str, remedy: str, code: str) -> None:
         faults.take(Problem(f"{place}{inside}", message, remedy, *description.place(inside), code))
 
     for key in ("lagrangian", "equations"):
@@ -783,7 +783,7 @@ def component_of(description: Description, name: str, place: str, faults: Faults
     component = Component(name, place, description, tuple(map(str, attachments)))
     ground = Attached(GROUND_NAME, GROUND_NAME, {})
     own = dict.fromkeys((*component.attachments, GROUND_NAME), ground)
-    check = Renaming(component.names, "", {}, own, True, told)
+    check = Renaming(component.names, "", {}, own, True, report)
     for section, entries in description.sections.items():
         for entry in entries:
             visit_entry(section, entry, check)

@@ -103,9 +103,9 @@ class Description:
 def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]:
     """File and line of a dotted path, or of the nearest enclosing one; ``("", 0)`` if there is none."""
     while True:
-        found = lines.get(path)
-        if found is not None:
-            return found
+        result = lines.get(path)
+        if result is not None:
+            return result
         if not path:
             return ("", 0)
         path = parent_of(path)
@@ -174,13 +174,13 @@ class Faults:
         """
         places = [(problem, *self._origin_of(problem.path)) for problem in self.problems]
         attached = [(o.place, problem.message) for problem, _, o in places if o is not None and not o.instance]
-        found: dict[Any, tuple[Problem, list[str]]] = {}
+        result: dict[Any, tuple[Problem, list[str]]] = {}
         for problem, own, origin in places:
             if origin is None:
-                found[problem] = (problem, [])
+                result[problem] = (problem, [])
             elif not origin.instance:
                 path = origin.place + problem.path[len(own) :]
-                found.setdefault((path, problem.message), (problem._replace(path=path), []))
+                result.setdefault((path, problem.message), (problem._replace(path=path), []))
             elif not any(
                 f".{origin.instance.rpartition('.')[2]}.at" in place and problem.message.startswith(message)
                 for place, message in attached
@@ -188,8 +188,8 @@ class Faults:
                 path = origin.place + problem.path[len(own) :]
                 alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
                 first = problem._replace(path=path)
-                found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
-        return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in found.values()]
+                result.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
+        return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in result.values()]
 
     def _origin_of(self, path: str) -> tuple[str, Origin | None]:
         """The part of a path that an instance brought, and where that comes from."""
@@ -200,13 +200,13 @@ class Faults:
 
 def list_names_once(problems: Sequence[Problem]) -> list[Problem]:
     """The same problems, of which only the first that lists certain names does so; the others refer to it."""
-    told: set[str] = set()
+    seen: set[str] = set()
     result = []
     for problem in problems:
         for names in _LISTED.findall(problem.remedy):
-            if names in told:
+            if names in seen:
                 problem = problem._replace(remedy=problem.remedy.replace(names, "those listed above", 1))
-            told.add(names)
+            seen.add(names)
         result.append(problem)
     return result
 
@@ -273,8 +273,8 @@ def _summary(entry: DescribedEntry) -> str:
         elif entry.path.startswith("functions.") and key in ("x", "y", "z"):
             parts.append(f"{len(items(value) or ())} {key}")
         elif key in ("display", "solids") and all(isinstance(one, Mapping) for one in items(value) or ("",)):
-            words = (text_of(one.get("shape", one.get("type"))) for one in items(value) or ())
-            parts.append(f"{key} " + ", ".join(words))
+            kinds = (text_of(one.get("shape", one.get("type"))) for one in items(value) or ())
+            parts.append(f"{key} " + ", ".join(kinds))
         elif key in ("type", "value", "expression"):
             parts.append(text_of(value))
         elif key in ("between", "marker", "body", "joint"):

@@ -96,8 +96,8 @@ class ElementMethods(Described):
         JointHandle
         """
         between = [References(self).marker(end) for end in (predecessor, successor)]
-        given = {key: value for key, value in keys.items() if value is not None}
-        return JointHandle(self, self._add("joints", name, {"type": type, "between": between, **given}))
+        raw = {key: value for key, value in keys.items() if value is not None}
+        return JointHandle(self, self._add("joints", name, {"type": type, "between": between, **raw}))
 
     def _method(self, name: str) -> Any:
         """The method of a type that was added to the tables later; None if there is none."""

@@ -36,25 +36,25 @@ def describe_lagrangian(
 ) -> Description:  # fmt: skip
     """Describe a system by its Lagrangian; arguments as for ``Model.from_lagrangian``."""
     names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
-    given: dict[str, Any] = {"coordinates": names, "expression": L}
+    raw: dict[str, Any] = {"coordinates": names, "expression": L}
     if forces is not None:
-        given["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
+        raw["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
     if dissipation is not None:
-        given["dissipation"] = dissipation
+        raw["dissipation"] = dissipation
     if items(constraints) or not isinstance(constraints, list | tuple):
-        given["constraints"] = constraints
+        raw["constraints"] = constraints
 
-    description = Description(values={"name": name, "lagrangian": given})
+    description = Description(values={"name": name, "lagrangian": raw})
     values, driven = named("parameters", parameters), named("inputs", inputs)
     known = {q + rate for q in names for rate in RATES} | set(driven)
     stems = {split_rate(source)[0] for source in driven}
-    found = _names_of_section(given)
-    further = derivative_names([*values_in(given)])
-    others = [name for name in sorted({*found, *further}) if name not in {*known, *values}]
+    result = _names_of_section(raw)
+    further = derivative_names([*values_in(raw)])
+    others = [name for name in sorted({*result, *further}) if name not in {*known, *values}]
     rates = [name for name in others if split_rate(name)[0] in stems]
     known |= set(rates)
     own = {name: value for name, value in values.items() if name not in known}
-    description.declare(own, driven | dict.fromkeys(rates), [name for name in found if name not in known])
+    description.declare(own, driven | dict.fromkeys(rates), [name for name in result if name not in known])
     give_latex(description, "lagrangian", latex)
     return description
 
@@ -115,68 +115,68 @@ def describe_equations(
     """
     names = names_of("equations.coordinates", coordinates, "a coordinate")
     speeds = names_of("equations.velocities", velocities, "a velocity")
-    given: dict[str, Any] = {"coordinates": names}
+    raw: dict[str, Any] = {"coordinates": names}
     if speeds:
-        given["velocities"] = speeds
+        raw["velocities"] = speeds
     for key, table in (("rates", rates), ("intermediates", intermediates)):
         if values := named(key, table):
-            given[key] = values
+            raw[key] = values
     rows = [items(row) for row in items(mass_matrix) or ()]
     if rows and all(row is None for row in rows):  # one coordinate: SymPy's 1 x 1 matrix counts as a plain list
         rows = [items(mass_matrix)]
-    given |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
+    raw |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
     if items(constraints):
-        given["constraints"] = items(constraints)
+        raw["constraints"] = items(constraints)
     if forces := names_of("equations.multipliers", multipliers, "a multiplier"):
-        given["multipliers"] = forces
+        raw["multipliers"] = forces
     for key, energy in (("kinetic_energy", kinetic_energy), ("potential_energy", potential_energy)):
         if energy is not None:
-            given[key] = energy
-    description = Description(values={"name": name, "equations": given})
+            raw[key] = energy
+    description = Description(values={"name": name, "equations": raw})
     values, driven = named("parameters", parameters), named("inputs", inputs)
     known = {part + rate for part in (*names, *speeds) for rate in RATES}
-    known |= {*driven, *given.get("intermediates", ()), *given.get("multipliers", ())}
+    known |= {*driven, *raw.get("intermediates", ()), *raw.get("multipliers", ())}
     own = {name: value for name, value in values.items() if name not in known}
-    description.declare(own, driven, [name for name in _names_of_section(given) if name not in known])
+    description.declare(own, driven, [name for name in _names_of_section(raw) if name not in known])
     give_latex(description, "equations", latex)
     return description
 
 
-def _names_of_section(given: Mapping[str, Any]) -> list[str]:
+def _names_of_section(raw: Mapping[str, Any]) -> list[str]:
     """Names in the expressions of a section; functions of time are coordinates or faults, never parameters."""
     declared = ("coordinates", "velocities", "multipliers")
-    found: set[str] = set()
-    for part in values_in({key: value for key, value in given.items() if key not in declared}):
-        found |= names_in(part) if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
-    return sorted(found - {"t"})
+    result: set[str] = set()
+    for part in values_in({key: value for key, value in raw.items() if key not in declared}):
+        result |= names_in(part) if isinstance(part, str) else {*free_names([part])} - {*function_names([part])}
+    return sorted(result - {"t"})
 
 
 # -- the sections of a model file --------------------------------------------------------------------------------------
-def _section(reader: Reader, path: str, given: Any, has_others: bool, fields: Fields) -> dict[str, Any] | None:
+def _section(reader: Reader, path: str, raw: Any, has_others: bool, fields: Fields) -> dict[str, Any] | None:
     """A checked section, its coordinates by name; empty if it is no mapping, None if there is none."""
-    if given is None:
+    if raw is None:
         return None
-    if not isinstance(given, Mapping):
-        reader.wrong(path, given, kinds.Table)
+    if not isinstance(raw, Mapping):
+        reader.wrong(path, raw, kinds.Table)
         return {}
     if has_others:
         remedy = "describe only one: bodies, a Lagrangian, equations"
         reader.fault(path, "the model has bodies, joints or another such section too", remedy, "EG-CONFLICT")
-    check_keys(path, given, fields, reader.faults)
-    values = dict(given)
+    check_keys(path, raw, fields, reader.faults)
+    values = dict(raw)
     values["coordinates"] = _names(reader, path, values, "coordinates", ())
-    if not values["coordinates"] and "coordinates" in given:
+    if not values["coordinates"] and "coordinates" in raw:
         reader.fault(f"{path}.coordinates", "there are no coordinates", "name at least one", "EG-MISSING")
     return values
 
 
 def _names(reader: Reader, path: str, values: Mapping[str, Any], key: str, default: Sequence[str]) -> list[str]:
-    given = values.get(key)
-    if given is None:
+    raw = values.get(key)
+    if raw is None:
         return list(default)
-    listed = items(given)
+    listed = items(raw)
     if listed is None:
-        reader.wrong(f"{path}.{key}", given, kinds.Names)
+        reader.wrong(f"{path}.{key}", raw, kinds.Names)
         return list(default)
     return [str(name_of(item)) for item in listed]
 
@@ -199,9 +199,9 @@ def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str])
 
 
 # -- a Lagrangian ------------------------------------------------------------------------------------------------------
-def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str, Any] | None:
+def declare_lagrangian(reader: Reader, raw: Any, has_bodies: bool) -> dict[str, Any] | None:
     """Check the section and take its coordinates into the namespace; None if there is no section."""
-    values = _section(reader, "lagrangian", given, has_bodies, LAGRANGIAN)
+    values = _section(reader, "lagrangian", raw, has_bodies, LAGRANGIAN)
     if not values:
         return values
     for k, name in enumerate(values["coordinates"]):
@@ -236,19 +236,19 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
     return Lagrangian(tuple(names), expression, forces, dissipation, tuple(rows))
 
 
-def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Expr, ...]:
+def _forces(reader: Reader, path: str, raw: Any, names: list[str]) -> tuple[Expr, ...]:
     """One generalized force for each coordinate; those not given are 0."""
     result = dict.fromkeys(names, reader.graph.zero)
-    if isinstance(given, Mapping):
-        for name, value in in_order(given, names):
+    if isinstance(raw, Mapping):
+        for name, value in in_order(raw, names):
             if name not in result:
                 reader.unknown(f"{path}.{name}", "coordinate", name, names, "coordinates")
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result[name] for name in names)
-    listed = items(given)
+    listed = items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.CoordinateForces)
+        reader.wrong(path, raw, kinds.CoordinateForces)
     elif listed and len(listed) != len(names):
         reader.fault(
             path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order", "EG-SHAPE"
@@ -290,15 +290,15 @@ def differentiate(graph: Graph, bare: Lagrangian, clock: Mapping[Expr, Expr]) ->
     )
 
 
-def require_quadratic(reader: Reader, given: GivenEquations) -> None:
+def require_quadratic(reader: Reader, raw: GivenEquations) -> None:
     """Refuse a Lagrangian whose mass matrix d2L/(dq_dot dq_dot) depends on velocities: kernels take M(q, t)."""
-    used = symbols_of([x for row in given.mass_matrix for x in row])
-    found = [rate for rate in given.velocities if rate in used]
-    if found:
+    used = symbols_of([x for row in raw.mass_matrix for x in row])
+    result = [rate for rate in raw.velocities if rate in used]
+    if result:
         reader.fault(
             "lagrangian.expression",
             "is not quadratic in the velocities: the mass matrix (its second derivatives by them) depends on "
-            + ", ".join(found),
+            + ", ".join(result),
             "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), with all products expanded; for "
             "another kind of Lagrangian give the equations of motion: `equations:` of a model file, with mass_matrix "
             "1 and the accelerations as forcing",
@@ -310,9 +310,9 @@ def require_quadratic(reader: Reader, given: GivenEquations) -> None:
 PATH = "equations"
 
 
-def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str, Any] | None:
+def declare_equations(reader: Reader, raw: Any, has_others: bool) -> dict[str, Any] | None:
     """Check the section and take its names into the namespace; None if there is no section."""
-    faults, values = reader.faults, _section(reader, PATH, given, has_others, EQUATIONS)
+    faults, values = reader.faults, _section(reader, PATH, raw, has_others, EQUATIONS)
     if not values:
         return values
     q = values["coordinates"]
@@ -362,10 +362,10 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         return substitute([expression], mapping)[0] if not symbols_of([expression]).isdisjoint(derived) else expression
 
     def listed(key: str, size: int | None) -> tuple[Expr, ...]:
-        path, given = f"{PATH}.{key}", values.get(key, ())
-        parts = items(given)
+        path, raw = f"{PATH}.{key}", values.get(key, ())
+        parts = items(raw)
         if parts is None:
-            reader.wrong(path, given, kinds.Scalars)
+            reader.wrong(path, raw, kinds.Scalars)
             return ()
         if size is not None and len(parts) != size and key in values:
             faults.add(
@@ -374,10 +374,10 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(parts))
 
     rows: list[tuple[Expr, ...]] = []
-    given = values.get("mass_matrix", ())
-    lines = items(given)
+    raw = values.get("mass_matrix", ())
+    lines = items(raw)
     if lines is None or any(items(line) is None for line in lines):
-        reader.wrong(f"{PATH}.mass_matrix", given, kinds.Matrix)
+        reader.wrong(f"{PATH}.mass_matrix", raw, kinds.Matrix)
         lines = []
     for i, line in enumerate(lines):
         parts = items(line) or []
@@ -409,9 +409,9 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     )
 
 
-def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faults: Faults) -> None:
+def check_energies(raw: GivenEquations | None, outputs: Sequence[Output], faults: Faults) -> None:
     """Note outputs of an energy that given equations do not know."""
-    if given is None or not given.kinetic_energy.is_zero:
+    if raw is None or not raw.kinetic_energy.is_zero:
         return
     for output in outputs:
         for name in sorted(symbols_of([output.expression]) & {f"{energy}()" for energy in ENERGIES}):
@@ -419,22 +419,20 @@ def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faul
             faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy", "EG-MISSING")
 
 
-def _rates(
-    reader: Reader, given: Any, q: Sequence[str], v: Sequence[str], local: Mapping[str, Expr]
-) -> tuple[Expr, ...]:
+def _rates(reader: Reader, raw: Any, q: Sequence[str], v: Sequence[str], local: Mapping[str, Expr]) -> tuple[Expr, ...]:
     """q' in terms of the velocities."""
     path, faults = f"{PATH}.rates", reader.faults
-    if given is None:
+    if raw is None:
         if len(q) != len(v):
             faults.add(
                 path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate", "EG-SHAPE"
             )
         symbols = [reader.graph.symbol(name) for name in v[: len(q)]]
         return (*symbols, *(reader.stand_in,) * (len(q) - len(symbols)))
-    if not isinstance(given, Mapping):
-        reader.wrong(path, given, kinds.Rates)
+    if not isinstance(raw, Mapping):
+        reader.wrong(path, raw, kinds.Rates)
         return (reader.stand_in,) * len(q)
-    named = {name_of(key): value for key, value in given.items()}
+    named = {name_of(key): value for key, value in raw.items()}
     for name in named:
         if name not in q:
             reader.unknown(f"{path}.{name}", "coordinate", name, q, "coordinates")
@@ -556,7 +554,7 @@ def add_rates(reader: Reader, inputs: tuple[Input, ...], differentiated: Sequenc
 def list_differentiated(
     reader: Reader,
     lagrangian: Lagrangian | None,
-    given: GivenEquations | None,
+    raw: GivenEquations | None,
     constraints: Sequence[Constraint],
     switched: Sequence[Switched],
     events: Sequence[Event],
@@ -568,32 +566,32 @@ def list_differentiated(
     time, whose errors die away.
     """
     symbol = reader.graph.symbol
-    found: list[Differentiated] = []
+    result: list[Differentiated] = []
     if lagrangian is not None:
         v = [symbol(f"{name}_dot") for name in lagrangian.coordinates]
-        found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)", "lagrangian"))
-    if given is not None:
-        rates = {f"{name}_dot" for name in given.coordinates} | set(given.velocities)
-        positions = [e for e in given.constraints if symbols_of([e]).isdisjoint(rates)]
-        velocities = [e for e in given.constraints if not symbols_of([e]).isdisjoint(rates)]
+        result.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)", "lagrangian"))
+    if raw is not None:
+        rates = {f"{name}_dot" for name in raw.coordinates} | set(raw.velocities)
+        positions = [e for e in raw.constraints if symbols_of([e]).isdisjoint(rates)]
+        velocities = [e for e in raw.constraints if not symbols_of([e]).isdisjoint(rates)]
         section = f"{'equations' if lagrangian is None else 'lagrangian'}.constraints"
-        found += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
-    if given is not None and lagrangian is None:
-        seconds = {f"{name}_ddot" for name in given.coordinates}
+        result += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
+    if raw is not None and lagrangian is None:
+        seconds = {f"{name}_ddot" for name in raw.coordinates}
         shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
         if positions or shown:
-            found.append((list(given.rates), 1, "q'' of the given rates", "equations.rates"))
+            result.append((list(raw.rates), 1, "q'' of the given rates", "equations.rates"))
     for_a_time = [switch.constraint for switch in switched if switch.constraint is not None]
     for c in (*constraints, *for_a_time):
         if isinstance(c, Driver):
-            found.append(([c.value], 2, f"the driver {c.name!r}", None))
+            result.append(([c.value], 2, f"the driver {c.name!r}", None))
         elif isinstance(c, Equation):
             times = 2 if c.level == POSITION else 1
             place = None if c in for_a_time else f"constraints.{c.name}"
-            found.append(([c.expression], times, f"the constraint {c.name!r}", place))
+            result.append(([c.expression], times, f"the constraint {c.name!r}", place))
     hits = [e for e in events if e.restitution is not None]
-    found += [([e.expression], 1, f"the gap {e.name!r}", f"events.{e.name}") for e in hits]
-    return found
+    result += [([e.expression], 1, f"the gap {e.name!r}", f"events.{e.name}") for e in hits]
+    return result
 
 
 def _with_signals(reader: Reader, inputs: tuple[Input, ...]) -> tuple[Input, ...]:
@@ -603,12 +601,12 @@ def _with_signals(reader: Reader, inputs: tuple[Input, ...]) -> tuple[Input, ...
         last = base
         for rate in rates if base in signals else ():
             if rate not in signals:
-                found: Expr | None = signals[last]
+                result: Expr | None = signals[last]
                 for k in range(split_rate(rate)[1] - split_rate(last)[1]):
-                    found = None if found is None else _rate_of_signal(reader, found, last, k)
-                if found is None:
+                    result = None if result is None else _rate_of_signal(reader, result, last, k)
+                if result is None:
                     return inputs
-                signals[rate] = found
+                signals[rate] = result
             last = rate
     return tuple(replace(u, signal=signals[u.name]) if u.name in signals else u for u in inputs)
 

@@ -101,7 +101,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError(
             f"a number is followed directly by {word!r}", joined.start(1) + 1, "write a space between them", text
         )
-    line = _KEYWORD.sub(lambda found: _KEYWORDS[found[1]], re.sub(r"\s", " ", text))
+    line = _KEYWORD.sub(lambda result: _KEYWORDS[result[1]], re.sub(r"\s", " ", text))
     start = len(line) - len(line.lstrip())
     try:
         tree = parse_python(line[start:].rstrip() + "\n", statement=True)
@@ -287,11 +287,11 @@ class _Walker:
             remedy = "use it in outputs, events and the laws of force elements"
             raise self.fault(node, f"{name}(...) {what}cannot be used here", remedy)
         words = {word: key for key, word in _KEYWORDS.items()}
-        given = {words.get(x.arg or "**", x.arg or "**"): _label(x.value) for x in node.keywords}
+        raw = {words.get(x.arg or "**", x.arg or "**"): _label(x.value) for x in node.keywords}
         try:
-            if len(given) < len(node.keywords):
+            if len(raw) < len(node.keywords):
                 raise ExpressionError(f"{name}() is given a keyword twice", 0, "leave one out")
-            return self.locate(Named.read(Call(name, [_label(x) for x in node.args], given, part)))
+            return self.locate(Named.read(Call(name, [_label(x) for x in node.args], raw, part)))
         except ExpressionError as error:
             raise self.fault(node.args[0] if node.args else node, error.message, error.remedy, error.code) from None
 

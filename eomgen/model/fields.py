@@ -381,8 +381,8 @@ def _contacts() -> Schema:
 
 
 def _body() -> Schema:
-    given = [{"required": [key]} for key in ("mass", "solids", "points")]
-    return {**table_schema(BODY), "anyOf": given}
+    raw = [{"required": [key]} for key in ("mass", "solids", "points")]
+    return {**table_schema(BODY), "anyOf": raw}
 
 
 def _element(what: str, types: Types, type_name: str) -> Schema:
@@ -398,10 +398,10 @@ def _section(entry: Schema, doc: str) -> Schema:
 
 def _short(section: str, fields: Fields) -> Schema:
     """An entry that may be written as the value of its main key alone."""
-    alone: list[Schema] = [fields[SHORT[section]].json()]
+    forms: list[Schema] = [fields[SHORT[section]].json()]
     if not fields[SHORT[section]].required:
-        alone.append({"type": "null"})
-    return {"anyOf": [*alone, table_schema(fields)]}
+        forms.append({"type": "null"})
+    return {"anyOf": [*forms, table_schema(fields)]}
 
 
 def model_schema() -> dict[str, Any]:

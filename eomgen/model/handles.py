@@ -452,15 +452,15 @@ class Settings(dict[str, Any]):
 
     def __call__(self, *mappings: Any, **values: Any) -> None:
         """Set the given entries, those of mappings first, and keep the others."""
-        for given in mappings:
-            if not isinstance(given, Mapping):
-                told = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(given)} alone"
-                raise ill_typed(told)
-        named = [str(name) for given in (*mappings, values) for name in given]
+        for raw in mappings:
+            if not isinstance(raw, Mapping):
+                message = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(raw)} alone"
+                raise ill_typed(message)
+        named = [str(name) for raw in (*mappings, values) for name in raw]
         if twice := sorted({name for name in named if named.count(name) > 1}):
             raise at_odds(f"{', '.join(twice)}: given twice in one call; give each name once")
-        for given in mappings:
-            self.update(given)
+        for raw in mappings:
+            self.update(raw)
         self.update(values)
 
 
@@ -534,12 +534,12 @@ class References(NamedTuple):
             raise ill_placed(f"{value.label} is a body or marker; a joint or a coordinate is expected")
         return self._own(value).name if isinstance(value, JointHandle) else value
 
-    def markers(self, given: Any) -> Any:
+    def markers(self, raw: Any) -> Any:
         """Markers by name, their axes as a model file writes them; what is no mapping is left as it is."""
-        if not isinstance(given, Mapping):
-            return given
-        turned = {n: _turned(x.get("axes"), x.get("matrix")) for n, x in given.items() if isinstance(x, Mapping)}
-        return {name: {**x, **turned[name]} if name in turned else x for name, x in given.items()}
+        if not isinstance(raw, Mapping):
+            return raw
+        turned = {n: _turned(x.get("axes"), x.get("matrix")) for n, x in raw.items() if isinstance(x, Mapping)}
+        return {name: {**x, **turned[name]} if name in turned else x for name, x in raw.items()}
 
     def _own(self, handle: Any) -> Any:
         if handle.model is self.model:

@@ -409,5 +409,5 @@ def _fields(value: Any) -> dict[str, Any]:
     if (declared := getattr(value, "__dataclass_fields__", None)) is not None:
         return {name: getattr(value, name) for name in declared}
     slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
-    found = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
-    return {**found, **getattr(value, "__dict__", {})}
+    result = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
+    return {**result, **getattr(value, "__dict__", {})}

@@ -46,16 +46,16 @@ class Argument(NamedTuple):
     doc: str
 
 
-def arguments_of(found: ElementType) -> list[Argument]:
+def arguments_of(element: ElementType) -> list[Argument]:
     """The arguments of the method that adds an element, after its name; ``*between`` is called so."""
     made: list[Argument] = []
-    for key, field in found.keys.items():
-        made += _arguments(found, key, field, any(one.default is not Parameter.empty for one in made))
+    for key, field in element.keys.items():
+        made += _arguments(element, key, field, any(one.default is not Parameter.empty for one in made))
     star = [one for one in made if one.name.startswith("*")]
     return star + [one for one in made if not one.name.startswith("*")]
 
 
-def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[Argument]:
+def _arguments(element: ElementType, key: str, field: Field, later: bool) -> list[Argument]:
     kind, annotation = field.described, field.annotation
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
     default: Any = field.default if type(field.default) in (int, float) else None
@@ -63,10 +63,10 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
         isinstance(field.default, (str, bool)) and field.default != ""
     ):  # which is no default of the method: given, it may contradict the rest
         doc = f"{doc} Default: {str(field.default).lower()}."
-    anywhere = {"joint", "between"} <= {*found.one_of}
+    anywhere = {"joint", "between"} <= {*element.one_of}
     if field.required and (anywhere or not later):  # what follows *between is given by its keyword
         default = Parameter.empty
-    if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
+    if {"joint", "body"} <= {*element.one_of} and key in ("joint", "body"):
         on = "A joint or coordinate if value is one number, a body or marker if it is three."
         return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
     if anywhere and key in ("joint", "between"):
@@ -74,18 +74,18 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
             return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
         return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
     if field.required and field.joins:
-        return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in found.ends]
+        return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in element.ends]
     return [Argument(key, key, kind, annotation, default, doc)]
 
 
-def signature_of(found: ElementType) -> Signature:
+def signature_of(element: ElementType) -> Signature:
     """The signature of the method; UsageError if two keys would have arguments of one name."""
-    every = arguments_of(found)
+    every = arguments_of(element)
     names = ["self", "name", *(one.name.lstrip("*") for one in every)]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise UsageError(
-            f"type {found.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends",
+            f"type {element.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends",
             code="EG-NAME-TAKEN",
         )
     made = [Parameter("self", Parameter.POSITIONAL_ONLY), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
@@ -99,15 +99,15 @@ def signature_of(found: ElementType) -> Signature:
     return Signature(made)
 
 
-def documentation_of(section: str, found: ElementType) -> str:
+def documentation_of(section: str, element: ElementType) -> str:
     """The documentation of the method, in the manner of NumPy."""
-    summary, _, more = found.doc.partition(".  ")
+    summary, _, more = element.doc.partition(".  ")
     lines = textwrap.wrap(f"Add {summary.removesuffix('.')}.", _WIDTH)
-    if found.one_of and not any(one.name in ("on", "*between") for one in arguments_of(found)):
-        more = f"{more}  Give exactly one of {', '.join(found.one_of)}.".strip()
+    if element.one_of and not any(one.name in ("on", "*between") for one in arguments_of(element)):
+        more = f"{more}  Give exactly one of {', '.join(element.one_of)}.".strip()
     lines += ["", *textwrap.wrap(more, _WIDTH)] if more else []
     lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
-    every, skip = arguments_of(found), False
+    every, skip = arguments_of(element), False
     for k, one in enumerate(every):
         if skip:
             skip = False
@@ -115,41 +115,43 @@ def documentation_of(section: str, found: ElementType) -> str:
         names = one.name
         if k + 1 < len(every) and every[k + 1].key == one.key:
             names, skip = f"{one.name}, {every[k + 1].name}", True
-        needed = found.keys[one.key].required or one.name in ("on", "*between")
+        needed = element.keys[one.key].required or one.name in ("on", "*between")
         lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
         lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
     return "\n".join(lines + (["", "Returns", "-------", RESULTS[section][0]] if section in RESULTS else []))
 
 
-def method_of(section: str, found: ElementType) -> Callable[..., Any]:
+def method_of(section: str, element: ElementType) -> Callable[..., Any]:
     """The method that adds an entry to a section of a description, an element of a type."""
-    signature, every = signature_of(found), arguments_of(found)
+    signature, every = signature_of(element), arguments_of(element)
     allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
     required = [one.name for one in every if one.default is Parameter.empty]
     anywhere = any(one.name == "*between" for one in every)
 
     def add(self: Described, /, *args: Any, **keys: Any) -> Any:
-        check_keywords(found.name, keys, allowed)
+        check_keywords(element.name, keys, allowed)
         if anywhere:
             args = _take_value(required, args, keys)
         try:
             bound = signature.bind(self, *args, **keys)
         except TypeError as error:
-            twin = f"joint_{found.name}" if section == "forces" else ""
-            more = f"; on the coordinate of a joint use {twin}" if hasattr(type(self), twin or "-") else ""
-            raise TypeError(f"{found.name}() {error}{more}") from None
+            counterpart = f"joint_{element.name}" if section == "forces" else ""
+            more = (
+                f"; on the coordinate of a joint use {counterpart}" if hasattr(type(self), counterpart or "-") else ""
+            )
+            raise TypeError(f"{element.name}() {error}{more}") from None
         if section not in _HANDLES:
             bound.apply_defaults()
-        given = {key: value for key, value in bound.arguments.items() if value is not None or key in found.ends}
-        name, given = bound.arguments["name"], {key: x for key, x in given.items() if key not in ("self", "name")}
-        values = _entry(self, found, name, given) if section in _HANDLES else _said(self, found, given)
+        raw = {key: value for key, value in bound.arguments.items() if value is not None or key in element.ends}
+        name, raw = bound.arguments["name"], {key: x for key, x in raw.items() if key not in ("self", "name")}
+        values = _entry(self, element, name, raw) if section in _HANDLES else _said(self, element, raw)
         if section in (*_HANDLES, "functions"):
-            values = {"type": found.name, **values}
+            values = {"type": element.name, **values}
         entry = self._add(section, name, values)
         return RESULTS[section][1](self, entry) if section in RESULTS else None
 
-    add.__name__, add.__qualname__, add.__module__ = found.name, f"Model.{found.name}", "eomgen.api.model"
-    add.__doc__ = documentation_of(section, found)
+    add.__name__, add.__qualname__, add.__module__ = element.name, f"Model.{element.name}", "eomgen.api.model"
+    add.__doc__ = documentation_of(section, element)
     add.__signature__ = signature  # type: ignore[attr-defined]
     add.__annotations__ = {}
     return add
@@ -169,11 +171,11 @@ def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, 
     return args
 
 
-def _said(model: Described, found: ElementType, given: dict[str, Any]) -> dict[str, Any]:
+def _said(model: Described, element: ElementType, raw: dict[str, Any]) -> dict[str, Any]:
     """What a model file would write of an entry that is no element; whole numbers by default say nothing."""
     values, refer = dict[str, Any](), References(model)
-    for key, value in given.items():
-        field = found.keys[key]
+    for key, value in raw.items():
+        field = element.keys[key]
         kind = Text if isinstance(value, str) else Rates
         empty = isinstance(value, str | dict) and not value and isinstance(field, kind)
         whole = isinstance(value, int) and not isinstance(field.default, float) and value == field.default
@@ -182,41 +184,41 @@ def _said(model: Described, found: ElementType, given: dict[str, Any]) -> dict[s
     return values
 
 
-def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:
+def _entry(model: Described, element: ElementType, name: Any, raw: dict[str, Any]) -> dict[str, Any]:
     """What a model file would write."""
     entry, refer = dict[str, Any](), References(model)
-    if "on" in given and "on" not in found.keys:
-        on = given.pop("on")
-        several = items(given.get("value")) is not None
-        given["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
-    first, second = found.ends
-    if first in given and first not in found.keys:
-        key = next(key for key, field in found.keys.items() if field.joins)
-        entry[key] = found.keys[key].reference([given.pop(first), given.pop(second)], refer)
-    elif {"joint", "between"} <= {*found.one_of}:
-        entry |= _where(refer, given.pop("between", ()), given.pop("joint", None))
-    law = given.pop("law", None) if isinstance(found.keys.get("law"), Law) else None
+    if "on" in raw and "on" not in element.keys:
+        on = raw.pop("on")
+        several = items(raw.get("value")) is not None
+        raw["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
+    first, second = element.ends
+    if first in raw and first not in element.keys:
+        key = next(key for key, field in element.keys.items() if field.joins)
+        entry[key] = element.keys[key].reference([raw.pop(first), raw.pop(second)], refer)
+    elif {"joint", "between"} <= {*element.one_of}:
+        entry |= _where(refer, raw.pop("between", ()), raw.pop("joint", None))
+    law = raw.pop("law", None) if isinstance(element.keys.get("law"), Law) else None
     if law is not None:
-        given = {**given, **_law(found, name, law, given)}
-    for key, field in found.keys.items():
-        if key in given and not _is_default(given[key], field):
-            if isinstance(given[key], JointHandle) and key in found.remedies:
-                told = f"{given[key]!r} is not a marker; {found.remedies[key]}"
-                raise ill_typed(f"{found.name} {name!r} acts at a marker, and {told}")
-            entry[key] = field.reference(given[key], refer)
+        raw = {**raw, **_law(element, name, law, raw)}
+    for key, field in element.keys.items():
+        if key in raw and not _is_default(raw[key], field):
+            if isinstance(raw[key], JointHandle) and key in element.remedies:
+                message = f"{raw[key]!r} is not a marker; {element.remedies[key]}"
+                raise ill_typed(f"{element.name} {name!r} acts at a marker, and {message}")
+            entry[key] = field.reference(raw[key], refer)
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _law(found: ElementType, name: Any, law: Any, given: Mapping[str, Any]) -> Mapping[str, Any]:
+def _law(element: ElementType, name: Any, law: Any, raw: Mapping[str, Any]) -> Mapping[str, Any]:
     """The keys of a law that is given as a mapping."""
     if not isinstance(law, Mapping):
-        raise ill_typed(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
+        raise ill_typed(f"{element.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
     check_keywords(
-        f"the law of {found.name}", dict(law), [key for key in found.keys if not isinstance(found.keys[key], Law)]
+        f"the law of {element.name}", dict(law), [key for key in element.keys if not isinstance(element.keys[key], Law)]
     )
-    twice = sorted(law.keys() & given.keys())
+    twice = sorted(law.keys() & raw.keys())
     if twice:
-        raise at_odds(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
+        raise at_odds(f"{element.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
     return law
 
 
@@ -259,9 +261,9 @@ def keywords_of(function: Callable[..., Any]) -> list[str]:
     return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
 
 
-def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> None:
+def check_keywords(name: str, raw: Iterable[str], allowed: Sequence[str]) -> None:
     """Raise UsageError for the first keyword that a method does not have."""
-    for key in given:
+    for key in raw:
         if key not in allowed:
             if name in JOINTS and key in SWITCHING:
                 raise no_such(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")

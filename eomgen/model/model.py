@@ -139,9 +139,9 @@ class Builder(ElementMethods):
             A coordinate is neither a symbol nor a function of time ``q(t)``.
         """
         coordinates = one_or_several(coordinates)
-        given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
-        names = SympyNames(given, coordinates)
-        return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*given, names.latex(latex)]))))
+        raw = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
+        names = SympyNames(raw, coordinates)
+        return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*raw, names.latex(latex)]))))
 
     @classmethod
     def from_equations(
@@ -198,9 +198,9 @@ class Builder(ElementMethods):
         -------
         sympy.Symbol
         """
-        given = {"sampled": value, "period": period, "offset": offset, "initial": initial}
-        given |= {key: text for key, text in (("unit", unit), ("doc", doc), ("latex", latex)) if text != ""}
-        self._add("states", name, {key: x for key, x in given.items() if x is not None})
+        raw = {"sampled": value, "period": period, "offset": offset, "initial": initial}
+        raw |= {key: text for key, text in (("unit", unit), ("doc", doc), ("latex", latex)) if text != ""}
+        self._add("states", name, {key: x for key, x in raw.items() if x is not None})
         return symbol(name)
 
     @checked_keywords
@@ -244,31 +244,31 @@ class Builder(ElementMethods):
         -------
         sympy.Function
         """
-        twin: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
+        fallback: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
         further: list[Any] = [
-            items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)
+            items(() if raw is None else raw) for raw in (python_derivatives, python_second_derivatives)
         ]
         if None in further:
             raise ill_typed(f"native {name}: python_derivatives must be lists of functions")
-        if twin is not None and not isinstance(twin, str):
-            twin = FallbackSource(twin, *further)
+        if fallback is not None and not isinstance(fallback, str):
+            fallback = FallbackSource(fallback, *further)
         elif any(further):
             raise incomplete(
                 "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
             )
-        given = {
+        raw = {
             "source": str(source),
             "function": function,
             "arguments": arguments,
             "derivatives": derivatives,
             "second_derivatives": second_derivatives,
-            "python": twin,
+            "python": fallback,
         }
-        return self._function("native", name, given)
+        return self._function("native", name, raw)
 
     def _function(self, type_name: str, name: str, keys: dict[str, Any]) -> Any:
-        given = {key: value for key, value in keys.items() if value is not None}
-        self._add("functions", name, {"type": type_name, **given})
+        raw = {key: value for key, value in keys.items() if value is not None}
+        self._add("functions", name, {"type": type_name, **raw})
         return function(name)
 
     # -- bodies ---------------------------------------------------------------------------------------------------
@@ -300,8 +300,8 @@ class Builder(ElementMethods):
     @property
     def check_inertia(self) -> bool | str:
         """What happens to a mass and inertia that no rigid body can have: error (True), note or off (False)."""
-        given: bool | str = self._description.values.get("check_inertia", True)
-        return given
+        raw: bool | str = self._description.values.get("check_inertia", True)
+        return raw
 
     @check_inertia.setter
     def check_inertia(self, check: bool | str) -> None:
@@ -374,8 +374,8 @@ class Builder(ElementMethods):
         for what, group in groups.items():
             if not isinstance(group, Mapping):
                 raise ill_typed(f"add {part.name}: {what} must be a mapping of names to values, not {group!r}")
-        given = [name for group in groups.values() for name in group]
-        if twice := sorted({name for name in given if given.count(name) > 1}):
+        raw = [name for group in groups.values() for name in group]
+        if twice := sorted({name for name in raw if raw.count(name) > 1}):
             raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
         numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
         name = prefix.rstrip("_") or part.name
@@ -386,8 +386,8 @@ class Builder(ElementMethods):
         if named is not None:
             add_instance(self._description, part, instance, f"add.{name}", faults)
         if faults:
-            told = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
-            raise UsageError(f"add {part.name}: {told}", code=faults.problems[0].code)
+            messages = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
+            raise UsageError(f"add {part.name}: {messages}", code=faults.problems[0].code)
         return InstanceHandle(self, name, prefix)
 
     def _references(self, at: Any) -> Any:
@@ -539,15 +539,15 @@ class Builder(ElementMethods):
 _SINGULAR = {section: {"bodies": "body"}.get(section, section[:-1]) for section in SECTIONS}
 
 
-def _component(given: Any) -> Component:
+def _component(raw: Any) -> Component:
     """A component of a Model, or of the file of one."""
     faults = Faults(Description())
-    if isinstance(given, str | os.PathLike):
-        description = describe_yaml_file(given)
-    elif isinstance(given, Described):
-        description = plain_description(given.description)
+    if isinstance(raw, str | os.PathLike):
+        description = describe_yaml_file(raw)
+    elif isinstance(raw, Described):
+        description = plain_description(raw.description)
     else:
-        raise ill_typed(f"{given!r} is not a component; give a Model, or the name of a model file")
+        raise ill_typed(f"{raw!r} is not a component; give a Model, or the name of a model file")
     name = str(description.values.get("name", "component"))
     part = component_of(description, name, f"components.{name}.", faults, "")
     for problem in (*description.problems, *faults.problems):

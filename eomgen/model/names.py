@@ -27,8 +27,8 @@ LISTED = 20  #: names that a message lists at most
 def callable_names() -> dict[str, tuple[int, int]]:
     """Functions an expression may call, with the least and the greatest number of arguments."""
     rows = [row for row in OPERATIONS.values() if row.word]
-    found = {row.word: (row.arity, MOST if row.many else row.arity) for row in rows}
-    return {**found, "heaviside": (1, 1), "deg": (1, 1), "diff": (2, 17)}
+    result = {row.word: (row.arity, MOST if row.many else row.arity) for row in rows}
+    return {**result, "heaviside": (1, 1), "deg": (1, 1), "diff": (2, 17)}
 
 
 _C_KEYWORDS = frozenset(
@@ -156,11 +156,11 @@ ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 
 def names_of_acceleration(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
-    late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
-    late["rate of a state"] = "rate of a state"
+    prefixes = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
+    prefixes["rate of a state"] = "rate of a state"
     for name in sorted(used):
-        what, found = late.get(names.kinds.get(name, "")), Named.parse(name)
-        if found is not None and found.level in ACCELERATIONS:
+        what, result = prefixes.get(names.kinds.get(name, "")), Named.parse(name)
+        if result is not None and result.level in ACCELERATIONS:
             what = "acceleration"
         if what is not None:
             yield name, what
@@ -279,36 +279,36 @@ class Scope:
 
     def _read(self, output: str) -> Expr:
         """The expression of an output."""
-        found = self.output(output)
-        for name, what in names_of_acceleration(self.names, symbols_of([found])) if self.level < OUTPUT else ():
+        result = self.output(output)
+        for name, what in names_of_acceleration(self.names, symbols_of([result])) if self.level < OUTPUT else ():
             message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
-        energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([found])
+        energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([result])
         for name in sorted(energies) if self.level < OUTPUT else ():
             message = f"the output {output!r} depends on {name.removesuffix('()')!r}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
-        return found
+        return result
 
-    def locate(self, found: Named) -> Expr:
+    def locate(self, named: Named) -> Expr:
         """The symbol of ``vx(rod.tip)`` or ``force(k1)``; raises ExpressionError for an unknown marker or element."""
-        if not found.is_motion:
+        if not named.is_motion:
             if self.level < LAW:
-                carried = "reaction" if found.carried else "quantity of a force element"
-                self._refuse(str(found), carried)
+                kind = "reaction" if named.is_reaction else "quantity of a force element"
+                self._refuse(str(named), kind)
             else:
-                self.reader.ask(found, self.path)
-            return self.graph.symbol(str(found))
-        level, axis = QUANTITIES[found.name]
+                self.reader.ask(named, self.path)
+            return self.graph.symbol(str(named))
+        level, axis = QUANTITIES[named.name]
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
-            self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")
-            return self.graph.symbol(str(found))
-        seen = found
-        if axis == 4 and found.origin == COM:  # a distance is the same from either end
-            seen = found._replace(of=found.origin, origin=found.of)
+            self._refuse(str(named), "motion of a marker" if self.level < LAW else "acceleration of a marker")
+            return self.graph.symbol(str(named))
+        seen = named
+        if axis == 4 and named.origin == COM:  # a distance is the same from either end
+            seen = named._replace(of=named.origin, origin=named.of)
         point = self._point(seen)
         origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
-        self.reader.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
-        return self.graph.symbol(str(found))
+        self.reader.quantities[str(named)] = Quantity(point, level, axis, origin, axes)
+        return self.graph.symbol(str(named))
 
     def _fixed(self, label: str) -> Marker:
         """The marker of a label that is not a centre of mass."""
@@ -320,14 +320,14 @@ class Scope:
                 raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
             raise
 
-    def _point(self, found: Named) -> Marker | None:
+    def _point(self, named: Named) -> Marker | None:
         """The marker of a quantity; None for the centre of mass of all bodies."""
         try:
-            return self.marker(found.of)
+            return self.marker(named.of)
         except ExpressionError:
-            if found.of != COM:
+            if named.of != COM:
                 raise
-        if found.name in ONE_OR_TWO or found.level in TURNING:
+        if named.name in ONE_OR_TWO or named.level in TURNING:
             raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         return None
 
@@ -347,8 +347,8 @@ def join_surrogates(text: str) -> str:
 
 def lone_surrogate(text: str) -> str:
     """``U+D83D`` of the first half of a pair that stands alone, which no file can hold; empty if there is none."""
-    found = _LONE.search(join_surrogates(text))
-    return f"U+{ord(found[0]):04X}" if found else ""
+    match = _LONE.search(join_surrogates(text))
+    return f"U+{ord(match[0]):04X}" if match else ""
 
 
 #: What to do about one.

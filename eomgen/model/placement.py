@@ -74,8 +74,8 @@ def complete_axes(first: int, a: Numbers, second: int, b: Numbers) -> tuple[Numb
     x, y, z = axes_columns(a, b)
     if (second - first) % 3 != 1:
         z = (-z[0], -z[1], -z[2])
-    found = {first: x, second: y, 3 - first - second: z}
-    return found[0], found[1], found[2]
+    result = {first: x, second: y, 3 - first - second: z}
+    return result[0], result[1], result[2]
 
 
 def turn_matrix(graph: Graph, columns: Sequence[Numbers]) -> Mat3:

@@ -151,17 +151,17 @@ class Call(NamedTuple):
 
 def call_of(text: str) -> Call | None:
     """The call in a text such as ``vx(rod.at(l, 0, 0), in=road)``; None where it is none."""
-    found = _CALL.match(text)
-    if found is None:
+    result = _CALL.match(text)
+    if result is None:
         return None
-    labels, given = list[str](), dict[str, str]()
-    for part in _split(found[2]):
+    labels, raw = list[str](), dict[str, str]()
+    for part in _split(result[2]):
         key = _KEYWORD.match(part)
         if key is None:
             labels.append(part)
         else:
-            given[key[1]] = part[key.end() :]
-    return Call(found[1], labels, given, found[3] or "")
+            raw[key[1]] = part[key.end() :]
+    return Call(result[1], labels, raw, result[3] or "")
 
 
 def _split(arguments: str) -> list[str]:
@@ -203,58 +203,58 @@ class Named(NamedTuple):
     @classmethod
     def read(cls, call: Call) -> Named:
         """The quantity of a call; ExpressionError if it takes other arguments."""
-        name, labels, given, part = call
+        name, labels, raw, part = call
         if name in QUANTITIES:
-            return cls._motion(name, labels, given, part)
+            return cls._motion(name, labels, raw, part)
         element = labels[0] if len(labels) == 1 else ""
         if name == MULTIPLIER:
-            if not element or element.count(".") > 1 or given or part:
+            if not element or element.count(".") > 1 or raw or part:
                 raise ExpressionError("a multiplier is that of one equation", 0, _WRITE[MULTIPLIER])
             return cls(name, element)
-        if name == REACTION or (name == WRENCH and (given or part)):
-            return cls._wrench(name, element, given, part)
-        if not element or given or part:
+        if name == REACTION or (name == WRENCH and (raw or part)):
+            return cls._wrench(name, element, raw, part)
+        if not element or raw or part:
             raise ExpressionError(f"{name}() takes the name of one force element", 0, f"write {name}(spring_1)")
         return cls(name, element)
 
     @classmethod
-    def _motion(cls, name: str, labels: Sequence[str], given: Mapping[str, str], part: str) -> Named:
+    def _motion(cls, name: str, labels: Sequence[str], raw: Mapping[str, str], part: str) -> Named:
         pair = name in PAIRS and (name not in ONE_OR_TWO or len(labels) == 2)
         if part:
             raise ExpressionError(f"{name}() has no part {part!r}", 0, f"leave .{part} out")
-        if unknown := given.keys() - {"from", "in"}:
+        if unknown := raw.keys() - {"from", "in"}:
             raise ExpressionError(f"{name}() takes no {min(unknown)}=", 0, "from= and in= take a marker")
-        if given and (pair or name not in RESOLVED):
+        if raw and (pair or name not in RESOLVED):
             remedy = f"write {name}(a, b)" if name in PAIRS else f"it is known of {', '.join(RESOLVED)}"
-            raise ExpressionError(f"{name}() takes no {next(iter(given))}=", 0, remedy)
+            raise ExpressionError(f"{name}() takes no {next(iter(raw))}=", 0, remedy)
         one, two = f"write {name}(body) or {name}(body.marker)", f"write {name}(a, b)"
         if len(labels) != (2 if pair else 1):
             if name in ONE_OR_TWO:
                 raise ExpressionError(f"{name}() takes one or two markers", 0, f"write {name}(b) or {name}(a, b)")
             raise ExpressionError(f"{name}() takes {'two markers' if pair else 'one marker'}", 0, two if pair else one)
-        if "" in (*labels, *given.values()):
+        if "" in (*labels, *raw.values()):
             raise ExpressionError(f"{name}() takes markers, not expressions", 0, one)
-        return cls(name, labels[-1], labels[0] if pair else given.get("from", ""), given.get("in", ""))
+        return cls(name, labels[-1], labels[0] if pair else raw.get("from", ""), raw.get("in", ""))
 
     @classmethod
-    def _wrench(cls, name: str, element: str, given: Mapping[str, str], part: str) -> Named:
+    def _wrench(cls, name: str, element: str, raw: Mapping[str, str], part: str) -> Named:
         what = "a reaction" if name == REACTION else "what an element exerts on a body"
         parts = REACTION_PARTS if name == REACTION else WRENCH_PARTS
         keywords: Collection[str] = ("in",) if name == REACTION else ("in", "on")
         if not part:
             raise ExpressionError(f"{what} has several parts", 0, _WRITE[name])
-        if name == WRENCH and element and given.keys() <= {"in"} and part in parts:
+        if name == WRENCH and element and raw.keys() <= {"in"} and part in parts:
             message = f"{WRENCH}({element}).{part} does not say on which body the element acts"
             raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{part}")
-        missing = name == WRENCH and "on" not in given
-        if not element or missing or "" in given.values() or not given.keys() <= {*keywords}:
+        missing = name == WRENCH and "on" not in raw
+        if not element or missing or "" in raw.values() or not raw.keys() <= {*keywords}:
             owner = "joint" if name == REACTION else "element"
             raise ExpressionError(f"{what} is that of one {owner}", 0, _WRITE[name])
         if part not in parts:
             raise ExpressionError(f"{what} has no part {part!r}", 0, _WRITE[name])
-        if "in" in given and part in ("size", "normal"):
+        if "in" in raw and part in ("size", "normal"):
             raise ExpressionError(f"the part {part} does not depend on axes", 0, "leave in= out")
-        return cls(name, element, "", given.get("in", ""), given.get("on", ""), part)
+        return cls(name, element, "", raw.get("in", ""), raw.get("on", ""), part)
 
     def __str__(self) -> str:
         seen = self.origin and self.name not in PAIRS
@@ -269,7 +269,7 @@ class Named(NamedTuple):
         return self.name in QUANTITIES
 
     @property
-    def carried(self) -> bool:
+    def is_reaction(self) -> bool:
         """Whether it is the reaction of a joint or the multiplier of an equation."""
         return self.name in (REACTION, MULTIPLIER)
 

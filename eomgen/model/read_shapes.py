@@ -36,20 +36,20 @@ from .values import Reader
 SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
 
 
-def _positive(reader: Reader, path: str, given: Mapping[str, Any], *keys: str) -> list[Expr]:
+def _positive(reader: Reader, path: str, raw: Mapping[str, Any], *keys: str) -> list[Expr]:
     """Sizes that must be greater than 0."""
-    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
+    sizes = [reader.expression(f"{path}.{key}", raw[key]) for key in keys]
     for key, x in zip(keys, sizes, strict=True):
         reader.requirements.positive(f"{path}.{key}", x)
     return sizes
 
 
-def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
+def outline_sizes(reader: Reader, path: str, raw: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
     """Depth and points, clockwise, of an outline whose corners are known, counterclockwise."""
     points = list(zip(corners[::2], corners[1::2], strict=True))[::-1]
     numbers = _numbers(reader, points)
-    if "depth" in given:
-        (depth,) = _positive(reader, path, given, "depth")
+    if "depth" in raw:
+        (depth,) = _positive(reader, path, raw, "depth")
         if all(x.value is not None for x in corners):
             depth = reader.graph.apply("min", depth, half_gap(numbers))
     elif all(x.value is not None for x in corners):
@@ -60,20 +60,20 @@ def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: 
     return (depth, *(x for point in points for x in point))
 
 
-def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+def sprocket_sizes(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
-    teeth = teeth_of_sprocket(given)
+    teeth = teeth_of_sprocket(raw)
     if teeth is None:
         reader.fault(
-            f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
+            f"{path}.teeth", f"is {shown(raw['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
         )
         return ()
-    sizes = _positive(reader, path, given, "pitch", "seat", "tip_radius")
-    sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
+    sizes = _positive(reader, path, raw, "pitch", "seat", "tip_radius")
+    sizes.append(reader.expression(f"{path}.seat_angle", raw.get("seat_angle", SEAT_ANGLE)))
     if reader.faults.under(path) or reader.requirements.judge(path, SPROCKET, sizes, (teeth,)):
         return ()
-    if "depth" in given:
-        (depth,) = _positive(reader, path, given, "depth")
+    if "depth" in raw:
+        (depth,) = _positive(reader, path, raw, "depth")
     else:
         depth = half_tooth(teeth, *sizes)
     return (depth, reader.graph.constant(float(teeth)), *sizes)
@@ -92,78 +92,76 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ..
         remedy = "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
         reader.fault(path, "has no shapes", remedy, "EG-MISSING")
         return None
-    found: list[ContactShape] = []
-    for k, given in enumerate(listed):
-        found += _read(reader, f"{path}[{k}]", given)
-    return None if reader.faults.under(path) else tuple(found)
+    result: list[ContactShape] = []
+    for k, raw in enumerate(listed):
+        result += _read(reader, f"{path}[{k}]", raw)
+    return None if reader.faults.under(path) else tuple(result)
 
 
-def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
-    if not isinstance(given, Mapping):
-        reader.wrong(path, given, ContactShapes)
+def _read(reader: Reader, path: str, raw: Any) -> list[ContactShape]:
+    if not isinstance(raw, Mapping):
+        reader.wrong(path, raw, ContactShapes)
         return []
-    kind = reader.type_of(path, given, SHAPE_FIELDS, "shape", "shape")
+    kind = reader.type_of(path, raw, SHAPE_FIELDS, "shape", "shape")
     if not kind:
         return []
-    check_keys(path, given, SHAPE_FIELDS[kind], reader.faults)
+    check_keys(path, raw, SHAPE_FIELDS[kind], reader.faults)
     if reader.faults.under(path):
         return []
-    on = given["on"]
+    on = raw["on"]
     many = items(on)
     if many is not None and not many:
         reader.fault(f"{path}.on", "names no marker", "give a body or a marker, or a list of them", "EG-MISSING")
     places = [(f"{path}.on", on)] if many is None else [(f"{path}.on[{k}]", one) for k, one in enumerate(many)]
     markers = [reader.marker(place, one) for place, one in places]
-    sizes = _sizes(reader, path, kind, given)
+    sizes = _sizes(reader, path, kind, raw)
     return [] if sizes is None else [ContactShape(kind, marker, sizes) for marker in markers if marker is not None]
 
 
-def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tuple[Expr, ...] | None:
+def _sizes(reader: Reader, path: str, kind: str, raw: Mapping[str, Any]) -> tuple[Expr, ...] | None:
     if kind in ("half_plane", "half_space"):
         return ()
     if kind == "box":
-        size = _several(reader, f"{path}.size", given["size"], 2, True)
+        size = _several(reader, f"{path}.size", raw["size"], 2, True)
         if size is None:
             return None
         x, y = 0.5 * size[0], 0.5 * size[1]
         return (-x, -y, x, -y, x, y, -x, y)
     if kind == "polygon":
-        return _corners(reader, f"{path}.points", given["points"])
+        return _corners(reader, f"{path}.points", raw["points"])
     if kind in ("outline", "smooth_outline"):
-        corners = _corners(reader, f"{path}.points", given["points"], False)
-        return None if corners is None else outline_sizes(reader, path, given, corners)
+        corners = _corners(reader, f"{path}.points", raw["points"], False)
+        return None if corners is None else outline_sizes(reader, path, raw, corners)
     if kind == "sprocket":
-        return sprocket_sizes(reader, path, given)
+        return sprocket_sizes(reader, path, raw)
     if kind in ("profile", "smooth_profile"):
-        return _profile(reader, path, given, 2 if kind == "profile" else 3)
+        return _profile(reader, path, raw, 2 if kind == "profile" else 3)
     if kind in ("ellipsoid", "cuboid"):
         key = "semi_axes" if kind == "ellipsoid" else "size"
-        lengths = _several(reader, f"{path}.{key}", given[key], 3, True)
-        return (
-            None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
-        )
+        lengths = _several(reader, f"{path}.{key}", raw[key], 3, True)
+        return None if lengths is None else (*lengths, *(_edge(reader, path, raw, lengths) if kind == "cuboid" else ()))
     if kind == "height_field":
-        return _height(reader, path, given)
+        return _height(reader, path, raw)
     if kind == BED:
-        return _bed(reader, path, given)
+        return _bed(reader, path, raw)
     if kind == "plate":
-        return _plate(reader, path, given)
-    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
-    sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
+        return _plate(reader, path, raw)
+    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in raw)))
+    sizes = [reader.expression(f"{path}.{name}", raw.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
-        if name in given:
+        if name in raw:
             reader.requirements.positive(f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
 
 
-def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] | None:
+def _height(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr] | None:
     """The height of a field, as an expression or a table of its own."""
     local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
-    table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
-    if "height" in given:
+    table = {key: value for key, value in raw.items() if key not in ("shape", "on", "height")}
+    if "height" in raw:
         for key in table:
             reader.fault(f"{path}.{key}", "stands beside height", "give height, or x, y and z", "EG-CONFLICT")
-        return (reader.expression(f"{path}.height", given["height"], local=local),)
+        return (reader.expression(f"{path}.height", raw["height"], local=local),)
     if missing := [key for key in ("x", "y", "z") if key not in table]:
         remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
         reader.fault(f"{path}.{missing[0]}", "is missing, and there is no height", remedy, "EG-MISSING")
@@ -179,51 +177,51 @@ def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] 
     return (Expr(reader.graph, reader.graph.call(function, (0, 0), places)),)
 
 
-def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
+def _edge(reader: Reader, path: str, raw: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
     """The radius of the edges of a cuboid."""
     least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
-    if "edge_radius" not in given:
+    if "edge_radius" not in raw:
         return (EDGES * least,)
-    (radius,) = _positive(reader, path, given, "edge_radius")
-    told = ("is {:g}", "must be less than half of its least length, {1:g}")
-    reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], told)
+    (radius,) = _positive(reader, path, raw, "edge_radius")
+    phrases = ("is {:g}", "must be less than half of its least length, {1:g}")
+    reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], phrases)
     return (radius,)
 
 
-def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+def _plate(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Length, width and number of points of a plate."""
-    sizes = _positive(reader, path, given, "length", "width")
-    count = points_of_plate(given)
+    sizes = _positive(reader, path, raw, "length", "width")
+    count = points_of_plate(raw)
     if count is None:
         remedy = f"give a whole number from 1 to {POINTS}"
-        reader.fault(f"{path}.points", f"is {shown(given['points'])}", remedy, "EG-RANGE")
+        reader.fault(f"{path}.points", f"is {shown(raw['points'])}", remedy, "EG-RANGE")
     return (*sizes, reader.graph.constant(float(count or 1)))
 
 
-def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+def _bed(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Length and number of cells of a bed."""
-    (length,) = _positive(reader, path, given, "length")
-    count = cells_of_bed(given)
+    (length,) = _positive(reader, path, raw, "length")
+    count = cells_of_bed(raw)
     if count is None:
         reader.fault(
-            f"{path}.cells", f"is {shown(given['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}", "EG-RANGE"
+            f"{path}.cells", f"is {shown(raw['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}", "EG-RANGE"
         )
     return (length, reader.graph.constant(float(count or 1)))
 
 
 def _several(reader: Reader, path: str, value: Any, count: int, lengths: bool = False) -> list[Expr] | None:
     """So many expressions, of lengths greater than 0."""
-    found = reader.several(path, value, count, kinds.Two if count == 2 else kinds.Vector)
-    for k, x in enumerate(found if found and lengths else ()):
+    result = reader.several(path, value, count, kinds.Two if count == 2 else kinds.Vector)
+    for k, x in enumerate(result if result and lengths else ()):
         reader.requirements.positive(f"{path}[{k}]", x)
-    return found
+    return result
 
 
 def _points(reader: Reader, path: str, listed: Sequence[Any]) -> list[tuple[Expr, Expr]] | None:
     """Points [x, y]; None if one is none."""
-    found = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
-    points = [(point[0], point[1]) for point in found if point is not None]
-    return points if len(points) == len(found) else None
+    result = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(point[0], point[1]) for point in result if point is not None]
+    return points if len(points) == len(result) else None
 
 
 def _numbers(reader: Reader, points: Sequence[tuple[Expr, Expr]]) -> list[tuple[float, float]]:
@@ -232,9 +230,9 @@ def _numbers(reader: Reader, points: Sequence[tuple[Expr, Expr]]) -> list[tuple[
     return [(x, y) for x, y in known if x is not None and y is not None]
 
 
-def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
+def _profile(reader: Reader, path: str, raw: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
     """Depth and points of a profile, from left to right."""
-    listed, place = items(given["points"]), f"{path}.points"
+    listed, place = items(raw["points"]), f"{path}.points"
     if listed is None or len(listed) < least:
         reader.fault(place, "is no profile", f"give {least} or more points [x, y] from left to right", "EG-TYPE")
         return None
@@ -244,8 +242,8 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
     for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
         if reader.requirements.judge(f"{place}[{k + 1}]", RISING, [a, b]):
             return None
-    if "depth" in given:
-        (depth,) = _positive(reader, path, given, "depth")
+    if "depth" in raw:
+        (depth,) = _positive(reader, path, raw, "depth")
     else:
         depth = 0.1 * (points[-1][0] - points[0][0])
     return (depth, *(x for point in points for x in point))

@@ -76,14 +76,14 @@ class Requirements:
             if None not in numbers:
                 values = np.array(numbers, dtype=float)
                 return values if np.isfinite(values).all() else None
-        given = {**self.numbers, **(points or {})}
-        if not symbols_of(expressions) <= given.keys():
+        raw = {**self.numbers, **(points or {})}
+        if not symbols_of(expressions) <= raw.keys():
             return None
         with np.errstate(all="ignore"):
-            found = evaluate(expressions, given)
+            result = evaluate(expressions, raw)
         if points:
-            return np.array(np.broadcast_arrays(*found, *points.values())[: len(found)], dtype=float)
-        values = np.array(found, dtype=float)
+            return np.array(np.broadcast_arrays(*result, *points.values())[: len(result)], dtype=float)
+        values = np.array(result, dtype=float)
         return values if np.isfinite(values).all() else None
 
     # -- rules of one and two numbers -----------------------------------------------------------------------------

@@ -33,28 +33,28 @@ def require_name(what: str, name: Any) -> str:
     return name
 
 
-def named(what: str, given: Any) -> dict[Any, Any]:
+def named(what: str, raw: Any) -> dict[Any, Any]:
     """Values by name, of a mapping by symbol or name; none of None, UsageError if it is no mapping."""
-    if given is None:
+    if raw is None:
         return {}
-    if not isinstance(given, Mapping):
-        raise ill_typed(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(given)}")
-    return {require_name(what, name_of(key)): value for key, value in given.items()}
+    if not isinstance(raw, Mapping):
+        raise ill_typed(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(raw)}")
+    return {require_name(what, name_of(key)): value for key, value in raw.items()}
 
 
-def one_or_several(given: Any) -> list[Any]:
+def one_or_several(raw: Any) -> list[Any]:
     """The items of a list, array, set, view of a mapping or generator; anything else is one item, None none."""
-    if given is None:
+    if raw is None:
         return []
-    if (listed := items(given)) is not None:
+    if (listed := items(raw)) is not None:
         return listed
-    one = isinstance(given, str | bytes | Mapping) or hasattr(given, "tolist")  # an array without axes
-    return [given] if one or not isinstance(given, Iterable) else list(given)
+    one = isinstance(raw, str | bytes | Mapping) or hasattr(raw, "tolist")  # an array without axes
+    return [raw] if one or not isinstance(raw, Iterable) else list(raw)
 
 
-def names_of(path: str, given: Any, what: str) -> list[str]:
+def names_of(path: str, raw: Any, what: str) -> list[str]:
     """Names of what is given as symbols, functions of time or texts, one or several; ModelError for anything else."""
-    listed = one_or_several(given)
+    listed = one_or_several(raw)
     remedy = "give symbols q or functions q(t) of the time t"
     wrong = [
         Problem(f"{path}[{k}]", f"{shortened(q)} is not {what}", remedy, code="EG-TYPE")
@@ -86,12 +86,12 @@ def is_sympy(value: object) -> bool:
     return sympy is not None and isinstance(value, sympy.Basic)
 
 
-def values_in(given: Any, keys: bool = False) -> Iterator[Any]:
+def values_in(raw: Any, keys: bool = False) -> Iterator[Any]:
     """Texts and SymPy expressions in lists, matrices and mappings, of these the keys too if asked for."""
-    if isinstance(given, str) or is_sympy(given):
-        yield given
+    if isinstance(raw, str) or is_sympy(raw):
+        yield raw
         return
-    parts = (*(given if keys else ()), *given.values()) if isinstance(given, Mapping) else items(given) or ()
+    parts = (*(raw if keys else ()), *raw.values()) if isinstance(raw, Mapping) else items(raw) or ()
     for part in parts:
         yield from values_in(part, keys)
 
@@ -129,10 +129,10 @@ def sympy_name(value: object) -> str | None:
     return function_name(value)
 
 
-def in_order(given: Mapping[Any, Any], known: Sequence[str]) -> list[tuple[Any, Any]]:
+def in_order(raw: Mapping[Any, Any], known: Sequence[str]) -> list[tuple[Any, Any]]:
     """Names and values of a mapping in the order of the known names, others last, however it was written."""
     places = {name: k for k, name in enumerate(known)}
-    named = [(name_of(key), value) for key, value in given.items()]
+    named = [(name_of(key), value) for key, value in raw.items()]
     return sorted(named, key=lambda pair: places.get(pair[0], len(places)))
 
 
@@ -206,7 +206,7 @@ def derivative_names(expressions: list[Any]) -> list[str]:
 
 
 LARGE = 200  #: operations of an expression from which given equations are written with intermediates
-_WORDS = {sign: word for word, sign in GREEK.items()}
+_SPELLED = {sign: word for word, sign in GREEK.items()}
 
 
 class SympyNames:
@@ -216,28 +216,28 @@ class SympyNames:
     it is called.
     """
 
-    def __init__(self, given: Any, coordinates: Any) -> None:
+    def __init__(self, raw: Any, coordinates: Any) -> None:
         import sympy
         from sympy.core.function import AppliedUndef
 
-        found: dict[Any, str] = {}
+        result: dict[Any, str] = {}
         listed = [x for x in one_or_several(coordinates) if isinstance(x, AppliedUndef) and len(x.args) == 1]
         time = sympy.Symbol("t")
         clock = next((x.args[0] for x in listed if isinstance(x.args[0], sympy.Symbol) and x.args[0].name != "t"), time)
         self.replaced: dict[Any, Any] = {} if clock == time else {clock: time}
-        for expression in filter(is_sympy, values_in(given, keys=True)):
+        for expression in filter(is_sympy, values_in(raw, keys=True)):
             for part in parts_of(expression):
                 if isinstance(part, sympy.Symbol) and part.name != clock.name:
-                    found[part] = part.name
+                    result[part] = part.name
                 elif isinstance(part, AppliedUndef) and [getattr(x, "name", "") for x in part.args] == [clock.name]:
-                    found[part] = part.func.__name__
+                    result[part] = part.func.__name__
         self.renamed: dict[str, str] = {}
-        taken = {name + rate for name in found.values() if not fault_of_name(name, symbol=True) for rate in RATES}
-        for name in sorted(set(found.values())):
+        taken = {name + rate for name in result.values() if not fault_of_name(name, symbol=True) for rate in RATES}
+        for name in sorted(set(result.values())):
             if fault_of_name(name, symbol=True):
                 stem = split_rate(name)[0]
                 self.renamed[stem] = self.renamed.get(stem) or unique(_plain(stem), "symbol", taken, RATES)
-        for part, name in found.items():
+        for part, name in result.items():
             if (new := self.name(name)) != name:
                 if isinstance(part, sympy.Symbol):
                     self.replaced[part] = sympy.Symbol(new, **part.assumptions0)
@@ -261,22 +261,22 @@ class SympyNames:
         listed = items(value)
         return value if listed is None else [self.put(part) for part in listed]
 
-    def latex(self, given: Any = None) -> Any:
+    def latex(self, raw: Any = None) -> Any:
         """The LaTeX of names: as it is given, else what the names were in SymPy where that is LaTeX."""
         own: dict[str, str] = {}
         for old, new in self.renamed.items():
-            text = "".join(f"\\{_WORDS[c]} " if c in _WORDS else c for c in normalize("NFKC", old)).strip()
+            text = "".join(f"\\{_SPELLED[c]} " if c in _SPELLED else c for c in normalize("NFKC", old)).strip()
             with suppress(NotationError):
                 if text.startswith("\\"):
                     read_latex(text)
                     own[new] = text
-        return own | self.put(dict(given or {})) if own else self.put(given)
+        return own | self.put(dict(raw or {})) if own else self.put(raw)
 
     def noted(self, description: Description) -> Description:
         """The description with a note of what was renamed."""
-        places, given = ("outputs", "parameters", "inputs"), description.values.get("equations", {})
+        places, raw = ("outputs", "parameters", "inputs"), description.values.get("equations", {})
         homes = {entry.name: place for place in places for entry in description.sections[place]}
-        for name in (*given.get("coordinates", ()), *given.get("velocities", ())):  # which outputs may repeat
+        for name in (*raw.get("coordinates", ()), *raw.get("velocities", ())):  # which outputs may repeat
             homes.pop(name, None)
         renamed: dict[str, dict[str, str]] = {}
         for old, new in self.renamed.items():
@@ -287,8 +287,8 @@ class SympyNames:
 
 def _plain(name: str) -> str:
     """Letters like ``theta_1`` of ``\\theta_{1}``."""
-    words = "".join(_WORDS.get(c, c) for c in normalize("NFKC", name)).replace("_{", "_")
-    return words.translate({ord(c): None for c in "\\{}$"}).strip()
+    text = "".join(_SPELLED.get(c, c) for c in normalize("NFKC", name)).replace("_{", "_")
+    return text.translate({ord(c): None for c in "\\{}$"}).strip()
 
 
 def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
@@ -398,8 +398,8 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 # -- given equations ---------------------------------------------------------------------------------------------------
 def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
     """The section with the common parts of its expressions named, if one of them is large."""
-    found = [*filter(is_sympy, values_in(equations))]
-    if not found or max(int(x.count_ops()) for x in found) < LARGE:
+    collected = [*filter(is_sympy, values_in(equations))]
+    if not collected or max(int(x.count_ops()) for x in collected) < LARGE:
         return equations
     import sympy
     from sympy.core.function import AppliedUndef
@@ -410,11 +410,11 @@ def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
             return equations
         inside[sympy.Symbol(name)] = part.xreplace(inside)
     equations = {key: value for key, value in equations.items() if key != "intermediates"}
-    found = [x.xreplace(inside) for x in values_in(equations) if is_sympy(x)]
+    collected = [x.xreplace(inside) for x in values_in(equations) if is_sympy(x)]
 
     plain: dict[Any, Any] = {}
     names: set[str] = set()
-    for expression in found:
+    for expression in collected:
         names |= {symbol.name for symbol in expression.atoms(sympy.Symbol)}
         for part in expression.atoms(AppliedUndef, sympy.Derivative):
             if (name := function_name(part)) is not None:
@@ -423,7 +423,7 @@ def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
     rates = {part: symbol for part, symbol in plain.items() if isinstance(part, sympy.Derivative)}
     names |= {symbol.name for symbol in plain.values()}
     free = (sympy.Symbol(f"z{k}") for k in count(1) if f"z{k}" not in names)
-    common, short = sympy.cse([x.xreplace(rates).xreplace(plain) for x in found], symbols=free, order="none")
+    common, short = sympy.cse([x.xreplace(rates).xreplace(plain) for x in collected], symbols=free, order="none")
     replaced = iter(short)
     result: dict[str, Any] = {}
     for key, value in equations.items():

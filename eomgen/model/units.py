@@ -126,10 +126,10 @@ def _factors(text: str) -> Iterator[tuple[str, float]]:
     position, sign, depth, signs = 0, 1.0, 0, [1.0]
     expect = True  # a word, rather than a mark
     while text[position:].strip():
-        found = _TOKEN.match(text, position)
-        if found is None or (found["mark"] not in (None, "(") and expect):
+        result = _TOKEN.match(text, position)
+        if result is None or (result["mark"] not in (None, "(") and expect):
             break
-        position, word, mark = found.end(), found["word"], found["mark"]
+        position, word, mark = result.end(), result["word"], result["mark"]
         if word is not None:
             power = 1.0
             raised = re.compile(r"\s*(\*\*|\^)").match(text, position)

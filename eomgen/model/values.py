@@ -76,7 +76,7 @@ class Reader:
 
     def ask(self, quantity: Named, path: str) -> None:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
-        if quantity.carried:
+        if quantity.is_reaction:
             self._ask_reaction(quantity)
             self.asked.setdefault(quantity, path)
             return
@@ -102,8 +102,8 @@ class Reader:
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
-        found = self.requirements.known([expression])
-        return None if found is None else float(found[0])
+        result = self.requirements.known([expression])
+        return None if result is None else float(result[0])
 
     def wrong(self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE") -> None:
         """Note that a value is not of a kind."""
@@ -118,23 +118,23 @@ class Reader:
 
     def type_of(self, path: str, values: Mapping[str, Any], types: Iterable[str], what: str, key: str = "type") -> str:
         """The type that an entry names, one of a table; empty where it is none, which is noted."""
-        given = values.get(key)
-        if isinstance(given, str) and given in types:
-            return given
-        if given is None:
+        raw = values.get(key)
+        if isinstance(raw, str) and raw in types:
+            return raw
+        if raw is None:
             self.faults.missing(f"{path}.{key}", f"give one of {', '.join(types)}")
         else:
-            remedy = nearest(shown(given), types, "types")
-            self.fault(f"{path}.{key}", f"no {what} of type {quoted(given)}", remedy, "EG-CHOICE")
+            remedy = nearest(shown(raw), types, "types")
+            self.fault(f"{path}.{key}", f"no {what} of type {quoted(raw)}", remedy, "EG-CHOICE")
         return ""
 
     def check_keys(self, path: str, values: Mapping[str, Any], fields: kinds.Fields) -> None:
         """Note keys that a table does not know, and required ones that are missing."""
         check_keys(path, values, fields, self.faults)
 
-    def check_names(self, path: str, given: Iterable[Any], names: Sequence[str]) -> None:
+    def check_names(self, path: str, raw: Iterable[Any], names: Sequence[str]) -> None:
         """Note names that are none of these."""
-        for name in given:
+        for name in raw:
             if name not in names:
                 remedy = nearest(str(name), names, "allowed")
                 self.fault(f"{path}.{name}", "unknown key", remedy, "EG-NAME-UNKNOWN")
@@ -152,10 +152,10 @@ class Reader:
 
         Names in ``local`` come before those of the model; with ``exclusive`` a name must not be both.
         """
-        found = self._expression(path, value, level, local, exclusive)
-        if found.value is None:
-            self.expressions.append((path, found, local or {}))
-        return found
+        result = self._expression(path, value, level, local, exclusive)
+        if result.value is None:
+            self.expressions.append((path, result, local or {}))
+        return result
 
     def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
         scope = Scope(self, path, level, local, exclusive)
@@ -245,7 +245,7 @@ class Reader:
             return Meaning("marker", place.order, "angle" if turns else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
-        if (asked := Named.parse(name)) is not None and asked.carried:
+        if (asked := Named.parse(name)) is not None and asked.is_reaction:
             return Meaning("reaction" if asked.part else "multiplier")
         if asked is not None:  # whether a force moves with velocities is known once its law is
             return Meaning("element", 1 if asked.name == "rate" else 0, "length")
@@ -281,12 +281,10 @@ class Reader:
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
         """A placement in a body from ``at`` and ``rpy``, in the axes of the place ``on``."""
         at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
-        given = [key for key in ("rpy", "axes", "matrix") if key in values]
-        if len(given) > 1:
-            self.fault(
-                f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT"
-            )
-        turn, key = self.identity, given[0] if given else ""
+        raw = [key for key in ("rpy", "axes", "matrix") if key in values]
+        if len(raw) > 1:
+            self.fault(f"{path}.{raw[1]}", f"{raw[0]} is given too", "give one of rpy, axes and matrix", "EG-CONFLICT")
+        turn, key = self.identity, raw[0] if raw else ""
         if key == "rpy":
             turn = rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"]))
         elif key:
@@ -321,12 +319,12 @@ class Reader:
 
     def moving(self, label: str) -> Marker:
         """The marker of a label in an expression; raises ExpressionError if there is none."""
-        found = self.markers.get(label)
-        if found is None and label in self.description.motions:
-            found = self.marker(label, self.description.motions[label])
-        if found is None:
+        result = self.markers.get(label)
+        if result is None and label in self.description.motions:
+            result = self.marker(label, self.description.motions[label])
+        if result is None:
             raise ExpressionError(*self.unknown_marker(label), code="EG-NAME-UNKNOWN")
-        return found
+        return result
 
     def unknown_marker(self, label: str) -> tuple[str, int, str]:
         """Message, column (none) and remedy for a marker that does not exist."""
@@ -341,12 +339,12 @@ class Reader:
     def marker(self, path: str, value: Any) -> Marker | None:
         """A marker from a reference: ``rod``, ``rod.tip``, ``ground`` or a mapping of body, at, rpy."""
         if isinstance(value, str):
-            found = self.markers.get(value)
+            result = self.markers.get(value)
             body = value.partition(".")[0]
-            if found is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
+            if result is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
                 message, _, remedy = self.unknown_marker(value)
                 self.fault(path, message, remedy, "EG-NAME-UNKNOWN")
-            return found
+            return result
         if not isinstance(value, Mapping):
             self.wrong(path, value, kinds.MarkerReference)
             return None
@@ -421,33 +419,33 @@ class Reader:
 
         None, and a fault, if there is none.
         """
-        faults, given = self.faults, name_of(value)
-        own = next((j for j in self.joints if j.entry.name == given), None)
-        home = next((j for j in self.joints if given in j.coordinates), None)
+        faults, raw = self.faults, name_of(value)
+        own = next((j for j in self.joints if j.entry.name == raw), None)
+        home = next((j for j in self.joints if raw in j.coordinates), None)
         if own is not None and home is not None and own is not home:
             remedy = "rename one of them"
-            faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
+            faults.add(path, f"{raw!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
             return None
         if own is not None and home is None and len(own.coordinates) != 1:
             names = ", ".join(own.coordinates) or "none"
-            message = f"joint {quoted(given)} has {len(own.coordinates)} coordinates"
+            message = f"joint {quoted(raw)} has {len(own.coordinates)} coordinates"
             faults.add(path, message, f"name one of them: {names}", "EG-REFERENCE")
             return None
         joint = home or own
         if joint is not None:
-            name = str(given) if home is not None else joint.coordinates[0]
+            name = str(raw) if home is not None else joint.coordinates[0]
             kind = joint.joint.coordinates[joint.coordinates.index(name)].kind
             if measure and kind != measure:
                 message = f"the coordinate {name!r} is {_A[kind]}"
                 faults.add(path, message, f"name a coordinate that is {_A[measure]}", "EG-REFERENCE")
                 return None
             return Found(name, kind, joint.entry.name)
-        if isinstance(given, str) and self.names.kinds.get(given) == "coordinate":
-            return Found(given, "angle", None)
-        if not faults.under(f"joints.{given}"):  # else the joint itself is at fault, which is noted already
+        if isinstance(raw, str) and self.names.kinds.get(raw) == "coordinate":
+            return Found(raw, "angle", None)
+        if not faults.under(f"joints.{raw}"):  # else the joint itself is at fault, which is noted already
             known = [j.entry.name for j in self.joints]
             known += [c for c in self.names.of("coordinate") if c not in known]
-            self.unknown(path, "joint", given, known, "joints and coordinates")
+            self.unknown(path, "joint", raw, known, "joints and coordinates")
         return None
 
     def contact_point(self, entry: Entry, cam: Marker) -> tuple[Marker, Expr] | None:
@@ -476,9 +474,9 @@ def numbered(word: str, count: int) -> list[str]:
     return [f"{word}_{k + 1}" for k in range(count)]
 
 
-def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
+def take_latex(reader: Reader, path: str, name: Any, raw: Any) -> None:
     """Take in the LaTeX of a name; what is no LaTeX of a symbol is a fault."""
-    text = reader.text(path, given)
+    text = reader.text(path, raw)
     if not text:
         return
     try:
@@ -493,14 +491,14 @@ def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
 
 
 def take_coordinates_latex(
-    reader: Reader, path: str, coordinates: Sequence[str], given: Any, others: Sequence[str] = ()
+    reader: Reader, path: str, coordinates: Sequence[str], raw: Any, others: Sequence[str] = ()
 ) -> None:
     """Take in the LaTeX of coordinates: a text for one, a list in their order, or a mapping of names.
 
     A mapping may hold other names too, such as those of velocities and multipliers.
     """
-    if isinstance(given, Mapping):
-        for key, text in given.items():
+    if isinstance(raw, Mapping):
+        for key, text in raw.items():
             name = name_of(key)
             if name in coordinates or name in others:
                 take_latex(reader, f"{path}.{name}", name, text)
@@ -508,16 +506,16 @@ def take_coordinates_latex(
                 kind = f"coordinates{' and velocities' * bool(others)}"
                 reader.unknown(f"{path}.{shown(name)}", "coordinate", name, [*coordinates, *others], kind)
         return
-    listed = [given] if isinstance(given, str) else items(given)
+    listed = [raw] if isinstance(raw, str) else items(raw)
     if listed is None:
-        reader.wrong(path, given, kinds.Latexes)
+        reader.wrong(path, raw, kinds.Latexes)
     elif listed and len(listed) != len(coordinates):
         message = f"{len(listed)} texts for {len(coordinates)} coordinates"
         reader.fault(path, message, f"give one for each: {', '.join(coordinates) or 'none'}", "EG-SHAPE")
     else:
         for k, (name, text) in enumerate(zip(coordinates, listed, strict=False)):
             if text is not None:
-                take_latex(reader, path if isinstance(given, str) else f"{path}[{k}]", name, text)
+                take_latex(reader, path if isinstance(raw, str) else f"{path}[{k}]", name, text)
 
 
 def give_latex(description: Description, section: str, latex: Mapping[Any, str] | None) -> None:

@@ -30,13 +30,13 @@ _ATOM = re.compile(r"[A-Za-z0-9_.]+\Z")
 def rewritten(value: Any, name: Callable[[str], str], quantity: Callable[[Named], str] = str) -> Any:
     """A value with every name and quantity (``vx(rod.tip)``, ``force(k1)``) replaced; numbers stay."""
 
-    def one(found: re.Match[str]) -> str:
-        if found["number"] is not None:
-            return found[0]
-        if found["name"] is not None:
-            return name(found[0])
-        read = Named.parse(found[0])
-        return found[0] if read is None else quantity(read)  # a fault is told where the text is read
+    def one(result: re.Match[str]) -> str:
+        if result["number"] is not None:
+            return result[0]
+        if result["name"] is not None:
+            return name(result[0])
+        read = Named.parse(result[0])
+        return result[0] if read is None else quantity(read)  # a fault is told where the text is read
 
     return _TOKEN.sub(one, value) if isinstance(value, str) else value
 
@@ -48,13 +48,13 @@ def in_brackets(text: str) -> str:
 
 def names_of(value: Any) -> set[str]:
     """Names in a text, markers aside."""
-    return {found[0] for found in _TOKEN.finditer(value) if found["name"]} if isinstance(value, str) else set()
+    return {result[0] for result in _TOKEN.finditer(value) if result["name"]} if isinstance(value, str) else set()
 
 
 def motions_of(value: Any) -> set[Named]:
     """Every motion of a marker in a text."""
     tokens = _TOKEN.finditer(value) if isinstance(value, str) else ()
-    read = (Named.parse(found[0]) for found in tokens if found["quantity"])
+    read = (Named.parse(result[0]) for result in tokens if result["quantity"])
     return {quantity for quantity in read if quantity is not None and quantity.is_motion}
 
 

@@ -231,15 +231,15 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
     description = Description(lines=dict(document.lines), problems=document.problems)
     faults = Faults(description)
 
-    def fill(given: Mapping[str, Any], start: str, target: Description) -> None:
-        for key in given:
+    def fill(raw: Mapping[str, Any], start: str, target: Description) -> None:
+        for key in raw:
             if key in SECTIONS:
-                _add_section(target, faults, start, key, given[key], origin)
+                _add_section(target, faults, start, key, raw[key], origin)
             elif key == "contacts" and not start:
-                _add_contacts(target, faults, given[key], origin)
+                _add_contacts(target, faults, raw[key], origin)
             elif key not in ("initial", "guess") or not start:
                 continue
-            elif values := faults.mapping(f"{start}{key}", given[key], "write names as keys"):
+            elif values := faults.mapping(f"{start}{key}", raw[key], "write names as keys"):
                 target.values[key] = values
 
     def open_file(name: str) -> Description | None:
@@ -276,18 +276,18 @@ def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Descrip
         chain = ", ".join(os.path.basename(one) for one in (*within[within.index(real) :], real))
         raise UsageError(f"the file {name} adds itself: {chain}", code="EG-CIRCLE")
     try:
-        found = _describe(_text_of(path), path, _Origin(origin.trusted, os.path.dirname(path), within))
+        result = _describe(_text_of(path), path, _Origin(origin.trusted, os.path.dirname(path), within))
     except ModelError as error:
         for problem in error.problems:
             faults.take(problem)
         return None
-    for problem in found.problems:
+    for problem in result.problems:
         faults.take(problem)
-    for entry in found.sections["bodies"]:  # meshes are looked up from the folder of the whole model
+    for entry in result.sections["bodies"]:  # meshes are looked up from the folder of the whole model
         for solid in entry.values.get("solids") or ():
             if isinstance(solid, dict) and isinstance(solid.get("file"), str):
                 solid["file"] = os.path.join(os.path.dirname(name), solid["file"])
-    return found
+    return result
 
 
 def _add_contacts(description: Description, faults: Faults, value: Any, origin: _Origin) -> None:
@@ -296,10 +296,10 @@ def _add_contacts(description: Description, faults: Faults, value: Any, origin: 
         if path.startswith("contacts."):
             description.lines["forces" + path.removeprefix("contacts")] = place
     forces: dict[str, Any] = {}
-    for name, given in faults.mapping("contacts", value, "write the names of the contacts as keys").items():
-        if isinstance(given, Mapping) and "type" in given:
+    for name, raw in faults.mapping("contacts", value, "write the names of the contacts as keys").items():
+        if isinstance(raw, Mapping) and "type" in raw:
             faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out", "EG-CONFLICT")
-        forces[name] = {"type": "contacts", **given} if isinstance(given, Mapping) else given
+        forces[name] = {"type": "contacts", **raw} if isinstance(raw, Mapping) else raw
     _add_section(description, faults, "", "forces", forces, origin)
 
 
@@ -324,16 +324,16 @@ def _add_section(
 ) -> None:
     """Take in the entries of a section; an empty section is one that was left out."""
     named = faults.mapping(f"{start}{section}", value, f"write the names of the {section} as keys")
-    for name, given in named.items():
-        values, place = given, f"{section}.{name}"
-        if not isinstance(given, dict):
+    for name, raw in named.items():
+        values, place = raw, f"{section}.{name}"
+        if not isinstance(raw, dict):
             key = SHORT.get(section)
-            if given is None and key == "value":
+            if raw is None and key == "value":
                 values = {}
             elif key is not None:
                 if place in description.lines:
                     description.lines[f"{place}.{key}"] = description.lines[place]
-                values = {key: given}
+                values = {key: raw}
             else:
                 faults.add(
                     f"{start}{place}", f"is not {kinds.Table.says}", "write its keys as {key: value, ...}", "EG-TYPE"
@@ -357,7 +357,7 @@ def with_named_markers(description: Description) -> Description:
     if not description.motions:
         return description
     parts = [description.values, *(entry.values for part in description.sections.values() for entry in part)]
-    uses = {name: found for name in free_names([*values_in(parts)]) if (found := Named.parse(name))}
+    uses = {name: result for name in free_names([*values_in(parts)]) if (result := Named.parse(name))}
     spoken = {label for quantity in uses.values() for label in quantity.markers}
     labels = [label for label in description.motions if label in spoken]
     if not labels:
@@ -410,8 +410,8 @@ def yaml_text(description: Description) -> str:
     SymPy expressions are written as text, and unnamed markers whose motion they use get names.  Raises UsageError for
     what has no form in a model file.
     """
-    if isinstance(given := description.values.get("equations"), Mapping):
-        values = {**description.values, "equations": with_intermediates(given)}
+    if isinstance(raw := description.values.get("equations"), Mapping):
+        values = {**description.values, "equations": with_intermediates(raw)}
         description = replace(description, values=values)
     lines = [f"# {comment_text(note)}" for note in description.notes]
     description = plain_description(description)
@@ -477,16 +477,16 @@ def _text(text: str) -> str:
     return yaml_quoted(text)
 
 
-def plain_description(given: Description) -> Description:
+def plain_description(raw: Description) -> Description:
     """A description without SymPy and arrays, in which markers that expressions speak of have names."""
-    description = with_named_markers(undotted(given))
+    description = with_named_markers(undotted(raw))
     functions = frozenset(entry.name for entry in description.sections["functions"])
     sections = {
         section: [replace(entry, values=plain(entry.values, functions)) for entry in entries]
         for section, entries in description.sections.items()
     }
-    values, origins = plain(description.values, functions), dict(given.origins)
-    return Description(values=values, sections=sections, instances=dict(given.instances), origins=origins)
+    values, origins = plain(description.values, functions), dict(raw.origins)
+    return Description(values=values, sections=sections, instances=dict(raw.instances), origins=origins)
 
 
 def plain(value: Any, functions: Names = frozenset()) -> Any:

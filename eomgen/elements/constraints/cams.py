@@ -268,9 +268,9 @@ def _cam(e: Entry) -> CamLift | None:
     if turning.name == follower.name:
         e.fault("follower", f"{follower.name!r} is the cam's own coordinate", "name another", "EG-REFERENCE")
         return None
-    for key, found in (("cam", turning), ("follower", follower)):
-        if found.kind not in ("angle", "length"):
-            message = f"the coordinate {found.name!r} is neither an angle nor a length"
+    for key, result in (("cam", turning), ("follower", follower)):
+        if result.kind not in ("angle", "length"):
+            message = f"the coordinate {result.name!r} is neither an angle nor a length"
             e.fault(
                 key,
                 message,

@@ -144,8 +144,8 @@ def _coupling(e: Entry) -> Linear | Equation | None:
     terms = e["coordinates"]
     if terms is None:
         return None
-    kind = "length" if any(found.kind == "length" for found, _ in terms) else "angle"
-    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e["offset"], kind)
+    kind = "length" if any(result.kind == "length" for result, _ in terms) else "angle"
+    return Linear(e.name, tuple((e.symbol(result), factor) for result, factor in terms), e["offset"], kind)
 
 
 def _equation(e: Entry) -> Equation | None:

@@ -106,11 +106,11 @@ def _driver(e: Entry) -> Driver | None:
         for key in ("axis", "on"):
             e.refuse(key, "only a driver of a marker takes this key")
     if "coordinate" in e.values:
-        found = e["coordinate"]
-        if found is not None and found.kind == "parameter":
-            message = f"{found.name!r} is an Euler parameter, which cannot move on its own"
+        result = e["coordinate"]
+        if result is not None and result.kind == "parameter":
+            message = f"{result.name!r} is an Euler parameter, which cannot move on its own"
             e.fault("coordinate", message, "drive an angle or markers, or use Euler angles", "EG-REFERENCE")
-        return None if found is None else CoordinateDriver(e.name, value, e.symbol(found), found.kind)
+        return None if result is None else CoordinateDriver(e.name, value, e.symbol(result), result.kind)
     if "marker" in e.values:
         marker, on, axis = e["marker"], e["on"], e["axis"]
         if marker is None or on is None or not on_two_bodies(e, "on", marker, on):

@@ -117,11 +117,11 @@ def _belt(e: Entry) -> Belt | None:
 
 
 def _rack(e: Entry) -> Rack | None:
-    pinion, travel = e["pinion"], e["rack"]
-    if pinion is None or travel is None:
+    pinion, rack_coordinate = e["pinion"], e["rack"]
+    if pinion is None or rack_coordinate is None:
         return None
-    e.require_one_carrier("", pinion, travel)
-    return Rack(e.name, e.symbol(pinion), e.symbol(travel), e["radius"], e["offset"])
+    e.require_one_carrier("", pinion, rack_coordinate)
+    return Rack(e.name, e.symbol(pinion), e.symbol(rack_coordinate), e["radius"], e["offset"])
 
 
 _JOINTS = JointPair(
@@ -207,14 +207,14 @@ class Planetary(Constraint):
     phase: Expr
 
     def drawn(self) -> list[Seen]:
-        (r_s, r_r, r_p), found = self._radii(), list[Seen]()
+        (r_s, r_r, r_p), result = self._radii(), list[Seen]()
         if self.planet is None or r_p is None:
             return []
         if r_s is not None:
-            found.append(PitchCircles(self.sun, self.planet, r_p / r_s, self.carrier))
+            result.append(PitchCircles(self.sun, self.planet, r_p / r_s, self.carrier))
         if r_r is not None:
-            found.append(PitchCircles(self.ring, self.planet, -(r_p / r_r), self.carrier))
-        return found
+            result.append(PitchCircles(self.ring, self.planet, -(r_p / r_r), self.carrier))
+        return result
 
     def _radii(self) -> tuple[Expr | None, Expr | None, Expr | None]:
         """Of sun, ring and planet, as far as they are known."""
@@ -243,12 +243,12 @@ def _planetary(e: Entry) -> Planetary | None:
     """Angles are measured from the frame; the planet's from the frame or the carrier."""
     key = "radii" if "radii" in e.values else "teeth"
     sizes = e[key]
-    found = {part: e[part] for part in ("sun", "ring", "carrier", "planet") if part in e.values}
+    result = {part: e[part] for part in ("sun", "ring", "carrier", "planet") if part in e.values}
     if sizes is not None:
         e.judge(key, WHEELS_FIT, [*sizes.values()], ([*sizes],))
-    if any(x is None for x in found.values()) or sizes is None or e.at_fault():
+    if any(x is None for x in result.values()) or sizes is None or e.at_fault():
         return None
-    parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
+    parts: dict[str, Found] = {part: x for part, x in result.items() if x is not None}
     for part in ("sun", "ring"):
         if part in parts and part not in sizes:
             e.fault(key, f"the {part} has a joint but no size", f"give {key} of the {part}", "EG-MISSING")

@@ -37,11 +37,11 @@ IN_PLACE_OF_JOINTS = (
 
 def switchable(types: Types) -> Types:
     """The types with these keys too."""
-    return {name: _with_keys(found) for name, found in types.items()}
+    return {name: _with_keys(result) for name, result in types.items()}
 
 
-def _with_keys(found: ElementType) -> ElementType:
-    return found._replace(keys=found.keys | SWITCHING)
+def _with_keys(element: ElementType) -> ElementType:
+    return element._replace(keys=element.keys | SWITCHING)
 
 
 def is_switched(values: Mapping[str, Any]) -> bool:

@@ -92,8 +92,8 @@ class Slip(NamedTuple):
         """A vector of states in ground axes, less its part along the normal."""
         zero = self.depth.graph.zero
         x, y, z = (*states, zero, zero)[:3]
-        found = vec.times(self.axes_of_states(lateral), (x, y, z))
-        return vec.sub(found, vec.scale(vec.dot(found, self.normal), self.normal))
+        result = vec.times(self.axes_of_states(lateral), (x, y, z))
+        return vec.sub(result, vec.scale(vec.dot(result, self.normal), self.normal))
 
 
 def stribeck_level(squared: Expr, dynamic: Expr, static: Expr | None, stribeck: Expr | None) -> Expr:
@@ -428,8 +428,8 @@ def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None
 
 def _require_greater(e: Entry, level: Expr, onset: Expr, static: str) -> None:
     """Require static friction that is not below sliding friction, which is itself not below 0."""
-    told = "is {1:g}, below sliding friction {0:g}", "static is the greater"
-    e.judge(static, LIMITS, [level, onset], told)
+    phrases = "is {1:g}, below sliding friction {0:g}", "static is the greater"
+    e.judge(static, LIMITS, [level, onset], phrases)
 
 
 def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:
@@ -471,14 +471,14 @@ def reaction_symbol(graph: Graph, joint: str, k: int) -> Expr:
 
 def reaction_of(symbol: str) -> tuple[str, int] | None:
     """Joint and component of such a symbol's name; None for other names."""
-    found = _SYMBOL.match(symbol)
-    return (found[1], int(found[2])) if found else None
+    result = _SYMBOL.match(symbol)
+    return (result[1], int(result[2])) if result else None
 
 
 def multiplier_of(symbol: str) -> str | None:
     """Equation, or element of one equation, of the symbol of a multiplier, ``multiplier(mesh.ratio)``; else None."""
-    found = _MULTIPLIER.match(symbol)
-    return found[1] if found else None
+    result = _MULTIPLIER.match(symbol)
+    return result[1] if result else None
 
 
 def is_reaction(symbol: str) -> bool:
@@ -493,7 +493,7 @@ def is_reaction(symbol: str) -> bool:
 class ReactionFriction(PathForce):
     """Friction by the force that the joint carries: -[(c(v) + m(v) N) tanh(v / smoothing) + viscous v].
 
-    m is the coefficient of ``carried``.  N is the size of the reaction across the joint's axis; for an angle it is
+    m is the coefficient of ``by_load``.  N is the size of the reaction across the joint's axis; for an angle it is
     times the ``radius`` of the pin, and ``thrust_radius`` times the size of the reaction along the axis is added.
     """
 
@@ -505,7 +505,7 @@ class ReactionFriction(PathForce):
     by_reaction = True
     law: Friction
     joint: str
-    carried: Friction
+    by_load: Friction
     radius: Expr | None = None
     thrust_radius: Expr | None = None
 
@@ -518,7 +518,7 @@ class ReactionFriction(PathForce):
         if self.thrust_radius is not None:
             normal = normal + self.thrust_radius * graph.apply("abs", z)
         direction = graph.apply("tanh", rate / self.law.smoothing)
-        return -(self.law.along(rate) + self.carried.level(rate * rate) * normal * direction)
+        return -(self.law.along(rate) + self.by_load.level(rate * rate) * normal * direction)
 
 
 #: Keys of friction by the joint's reaction.
@@ -548,8 +548,8 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     coefficient, onset, preload, breakaway = (
         e[key] for key in ("coefficient", "static_coefficient", "coulomb", "static")
     )
-    given = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
-    for key, value in given.items():
+    raw = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
+    for key, value in raw.items():
         if value is not None:
             e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
@@ -557,24 +557,26 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
         remedy = "give stribeck together with static_coefficient or static, or none of them"
         e.fault("stribeck", message, remedy, "EG-MISSING")
         return None
-    found = e["joint"] if path is not None else None
-    if found is None or path is None or coefficient is None:
+    result = e["joint"] if path is not None else None
+    if result is None or path is None or coefficient is None:
         return None
-    if found.joint is None:
+    if result.joint is None:
         e.fault(
             "joint",
-            f"{found.name!r} is not a coordinate of a joint, so it has no reaction",
+            f"{result.name!r} is not a coordinate of a joint, so it has no reaction",
             "give coulomb",
             "EG-REFERENCE",
         )
         return None
-    turns = found.kind == "angle"
+    turns = result.kind == "angle"
     if turns and "radius" not in e.values:
-        e.fault("radius", f"is missing, and {found.name!r} is an angle", "give the radius of the pin (m)", "EG-MISSING")
+        e.fault(
+            "radius", f"is missing, and {result.name!r} is an angle", "give the radius of the pin (m)", "EG-MISSING"
+        )
         return None
     for key in ("radius", "thrust_radius"):
         if key in e.values and not turns:
-            e.fault(key, f"has no meaning: {found.name!r} is a length", f"leave {key} out")
+            e.fault(key, f"has no meaning: {result.name!r} is a length", f"leave {key} out")
             return None
     smoothing = e.positive("smoothing")
     stribeck = e.positive("stribeck") if "stribeck" in e.values else None
@@ -584,7 +586,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
         e.name,
         path,
         dry if breakaway is None else replace(dry, static=breakaway, stribeck=stribeck),
-        found.joint,
+        result.joint,
         Friction(coefficient, smoothing, zero, onset, None if onset is None else stribeck),
         e.positive("radius") if "radius" in e.values else None,
         e.positive("thrust_radius") if "thrust_radius" in e.values else None,

@@ -290,11 +290,11 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
     for key in ELASTIC:
         if key not in e.values:
             e.missing(key, "give moduli and poisson together, two numbers each")
-    for key, found, right, rule in (
+    for key, result, right, rule in (
         ("moduli", moduli, POSITIVE, "must be greater than 0"),
         ("poisson", ratios, Allowed(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
     ):
-        for k, x in enumerate(found or ()):
+        for k, x in enumerate(result or ()):
             e.require(f"{key}[{k}]", x, right, rule)
     exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e)
     if moduli is None or ratios is None:
@@ -350,12 +350,12 @@ class JointStop(PathForce):
 
     def _depths(self, value: Expr, rate: Expr) -> list[tuple[Expr, Expr, float]]:
         """Penetration, its rate and the sense of the force, of each stop."""
-        found = []
+        result = []
         if self.lower is not None:
-            found.append((self.lower - value, -rate, 1.0))
+            result.append((self.lower - value, -rate, 1.0))
         if self.upper is not None:
-            found.append((value - self.upper, rate, -1.0))
-        return found
+            result.append((value - self.upper, rate, -1.0))
+        return result
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         total = value.graph.zero

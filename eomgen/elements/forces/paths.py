@@ -124,18 +124,18 @@ class JointCoordinate(Path):
 
 def read_coordinate(e: Entry, angle: bool = False) -> JointCoordinate | None:
     """The coordinate meant by ``joint``: of a joint of one degree, or named itself."""
-    found = e["joint"]
-    if found is None:
+    result = e["joint"]
+    if result is None:
         return None
-    if found.kind == "parameter":
+    if result.kind == "parameter":
         remedy = "give the torque as a vector on the body: body: <body>, value: [x, y, z]"
-        e.fault("joint", f"{found.name!r} is an Euler parameter, which takes no torque", remedy, "EG-REFERENCE")
+        e.fault("joint", f"{result.name!r} is an Euler parameter, which takes no torque", remedy, "EG-REFERENCE")
         return None
-    if angle and found.kind != "angle":
-        message = f"the coordinate {found.name!r} is a {found.kind}"
+    if angle and result.kind != "angle":
+        message = f"the coordinate {result.name!r} is a {result.kind}"
         e.fault("joint", message, "a torsional element needs an angle", "EG-REFERENCE")
         return None
-    return JointCoordinate(found.name)
+    return JointCoordinate(result.name)
 
 
 def read_angle(e: Entry) -> Path | None:
@@ -245,16 +245,16 @@ class Route(Path):
         return result
 
     def _pieces(self, view: View) -> list[tuple[Marker, Marker, WrapCylinder | None, Piece]]:
-        found = []
+        result = []
         last, around = self.start, None
         for stop in (*self.via, self.end):
             if isinstance(stop, WrapCylinder):
                 around = stop
                 continue
             piece = _straight(view, last, stop) if around is None else _wrap(view, last, stop, around)
-            found.append((last, stop, around, piece))
+            result.append((last, stop, around, piece))
             last, around = stop, None
-        return found
+        return result
 
 
 def _halves(

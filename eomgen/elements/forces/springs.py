@@ -557,10 +557,10 @@ class PointGravity(Force):
 
 def _point_gravity(e: Entry) -> PointGravity | None:
     center = e["center"]
-    mu, extent, found = e.positive("mu"), e["extent"], e["body"]
-    if found is None:
+    mu, extent, result = e.positive("mu"), e["extent"], e["body"]
+    if result is None:
         return None
-    index, body = found
+    index, body = result
     if center is not None and center.body == index:
         e.fault("center", f"lies on {body.name!r} itself", "give a marker of ground or of another body", "EG-REFERENCE")
     marker = Marker(index, Frame(vec.identity(e.graph), body.com), f"{body.name} at its centre of mass")

@@ -74,8 +74,8 @@ class Creep(Force):
         origin = view.position(self.track)
         under = velocity_at(view, self.track, vec.sub(vec.add(centre, arm), origin))
         slip = vec.transpose_times(axes, vec.sub(velocity_at(view, self.wheel, arm), under))
-        passing = vec.sub(view.velocity(self.wheel), velocity_at(view, self.track, vec.sub(centre, origin)))
-        rolling = vec.transpose_times(axes, passing)[0]
+        sliding = vec.sub(view.velocity(self.wheel), velocity_at(view, self.track, vec.sub(centre, origin)))
+        rolling = vec.transpose_times(axes, sliding)[0]
         turning = vec.sub(view.angular_velocity(self.wheel), view.angular_velocity(self.track))
         spin = vec.transpose_times(axes, turning)[2]
         speed = view.graph.apply("abs", rolling) if self.speed is None else self.speed
@@ -494,8 +494,8 @@ class Tyre(Force):
         push = load if whole else load - self.load_law.elastic(way.depth)
         slips = Slips(*self._slips(way), way.camber, view.graph.apply("tanh", way.forward / self.reversal))
         bears = view.graph.apply("lt", 0.0, load)
-        found = self.law.forces(slips, where(bears, load, 1.0))
-        along, across, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in found))
+        result = self.law.forces(slips, where(bears, load, 1.0))
+        along, across, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in result))
         sliding = vec.add(vec.scale(along + drag, way.along), vec.scale(across, way.across))
         lag = along * (way.arm - self.rolling_radius) + drag * way.arm - moment * way.tilt  # about the axle
         pressing = vec.scale(push, way.normal)
@@ -518,28 +518,28 @@ class Tyre(Force):
         slips = self._slips(way)
         moved = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
         turned = Slips(*slips, way.camber, graph.apply("tanh", way.forward / self.reversal))
-        carried = where(bears, load, 1.0)
-        slides = self.law.slides(turned, carried)
-        taken = self._shares(way, carried)
+        vertical = where(bears, load, 1.0)
+        slides = self.law.slides(turned, vertical)
+        taken = self._shares(way, vertical)
         rates, unwound = taken(*moved), taken(*slips)
         growth = slips[0] * rates[0] / x + slips[1] * rates[1] / y
         weight = slips[0] * unwound[0] / x + slips[1] * unwound[1] / y
         grows = where(graph.apply("lt", 0.0, weight), graph.apply("lt", 0.0, growth), 0.0)
         lost = where(slides, where(grows, growth / where(grows, weight, 1.0), 0.0), 0.0)
-        found = [
+        result = [
             where(bears, rate - lost * back, -off / length * deflection)
             for rate, back, deflection, length in zip(rates, unwound, (u, v), (x, y), strict=True)
         ]
-        return tuple(found)
+        return tuple(result)
 
     def _shares(self, way: _WheelMotion, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
         """Rates of the deflections of the motion that the tyre takes up: of a tread beside the rest of a carcass."""
         (u, v), (x, y), graph = self.deflections, self.relaxation, load.graph
         held = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
-        found = None if (y - x).is_zero else self.law.gradients(held, load)
-        if found is None:
+        result = None if (y - x).is_zero else self.law.gradients(held, load)
+        if result is None:
             return lambda along, across: (along, across)
-        around, outwards = found
+        around, outwards = result
         size, tread = held.size(), graph.apply("min", x, y)
         some = graph.apply("lt", 0.0, size)
         c, s = (where(some, one / where(some, size, 1.0), 0.0) for one in (held.along, held.across))
