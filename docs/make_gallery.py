@@ -92,7 +92,7 @@ def draw(shown: Shown) -> Path:
     moment = round(MOMENTS.get(file.stem, AT) * (len(motion.t) - 1))
     if not shown.options.trace:  # its surroundings alone, however far the mechanism goes
         one, inputs = slice(moment, moment + 1), None if motion.u is None else motion.u[:, moment : moment + 1]
-        motion = motion._replace(t=motion.t[one], x=motion.x[:, one], u=inputs, words=motion.words[one])
+        motion = motion._replace(t=motion.t[one], x=motion.x[:, one], u=inputs, captions=motion.captions[one])
         moment = 0
     scene = moving_scene(module, motion, False, False, shown.options.trace)
     image = Frames.of(scene, motion, (), STILL).image(moment)

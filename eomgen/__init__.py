@@ -93,7 +93,7 @@ __all__ = [
 ]
 
 
-def _late(name: str) -> Any:
+def _lazy(name: str) -> Any:
     """Load a public name on first use (PEP 562)."""
     if name in _MODULES:
         return import_module(_MODULES[name], __name__)
@@ -112,7 +112,7 @@ def _late(name: str) -> Any:
 
 
 if not TYPE_CHECKING:  # type checkers know all names
-    __getattr__ = _late
+    __getattr__ = _lazy
 
 
 def __dir__() -> list[str]:

@@ -191,17 +191,17 @@ class AssemblyFailure(NamedTuple):
 
     def message(self) -> str:
         """What failed, and what to do."""
-        given = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
+        raw = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
         if self.flipped:
             return (
-                f"the loops close only with the axes of a joint flipped{self._with(given)}; "
+                f"the loops close only with the axes of a joint flipped{self._with(raw)}; "
                 "give initial values nearer to the wanted position"
             )
         gaps = "the largest gaps are " + ", ".join(f"{label} {gap:.3g}" for label, gap in self.open_rows())
         contradiction = self._contradiction()
         if contradiction:
             return contradiction
-        if not given:
+        if not raw:
             tried = f"({self.restarts + 1} starts tried)"
             return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
         free = ClosureSystem(self.system.position, self.system.scales, np.ones_like(self.system.free))
@@ -212,18 +212,18 @@ class AssemblyFailure(NamedTuple):
                 break
         else:
             return (
-                f"the loops do not close{self._with(given)}, nor with these values left free "
+                f"the loops do not close{self._with(raw)}, nor with these values left free "
                 f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
             )
         near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
-        if len(given) > dof:
+        if len(raw) > dof:
             return (
-                f"the given values {', '.join(given)} are inconsistent: {len(given)} values for {dof} "
+                f"the given values {', '.join(raw)} are inconsistent: {len(raw)} values for {dof} "
                 f"degree{'s' if dof != 1 else ''} of freedom, and with all of them held {gaps}; "
                 f"give fewer, or consistent ones such as {', '.join(near)}"
             )
-        return f"the loops cannot close{self._with(given)}: {gaps}; a closed position nearby has {', '.join(near)}"
+        return f"the loops cannot close{self._with(raw)}: {gaps}; a closed position nearby has {', '.join(near)}"
 
     def _contradiction(self) -> str:
         """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
@@ -257,8 +257,8 @@ class AssemblyFailure(NamedTuple):
             return f"{away}: give a better one, or check the dimensions"
         return "check the dimensions, or give a better guess"
 
-    def _with(self, given: list[str]) -> str:
-        return f" with {', '.join(given)}" if given else ""
+    def _with(self, raw: list[str]) -> str:
+        return f" with {', '.join(raw)}" if raw else ""
 
     def _given(self, q: Array, y: Array) -> list[str]:
         names = self.names or [f"q[{i}]" for i in range(len(q))]
@@ -269,20 +269,20 @@ class AssemblyFailure(NamedTuple):
     def open_rows(self) -> list[tuple[str, float]]:
         """The three rows that stay open the most: label and gap."""
         C = self.system.position(self.best)[0]
-        e, found = self.system.scales.residual(C), list(C)
+        e, result = self.system.scales.residual(C), list(C)
         labels = list(self.labels) or [f"C[{i}]" for i in range(len(C))]
         if self.system.equations:
             y = self.system.equations.difference(self.system.equations.evaluate(self.best)[0])
             e = np.concatenate([e, y / self.system.equations.scales])
-            found += list(y)
+            result += list(y)
             labels += list(self.system.equations.names)
         worst = np.argsort(-np.abs(e), kind="stable")[:3].tolist()
         order = [i for i in worst if not abs(e[i]) <= CONTRADICTION] or worst[:1]
-        return [(labels[i], abs(float(found[i]))) for i in order]
+        return [(labels[i], abs(float(result[i]))) for i in order]
 
 
 def describe_contradiction(
-    given: Mapping[str, float], e: Array, row_scales: Array, labels: Sequence[str], limit: float, J: Array
+    raw: Mapping[str, float], e: Array, row_scales: Array, labels: Sequence[str], limit: float, J: Array
 ) -> str:
     """Why velocities with the rates to be held, by name, cannot be assembled.
 
@@ -292,9 +292,9 @@ def describe_contradiction(
     order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= limit]
     dof = J.shape[1] - rank(J).rank
     where = ", ".join(f"{labels[i]} {abs(e[i] * row_scales[i]):.3g}/s" for i in order)
-    values = ", ".join(f"{name} = {value:.6g}" for name, value in given.items())
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in raw.items())
     return (
-        f"{f'the given velocities {values}' if given else 'the driven constraints'} are inconsistent with {dof} "
+        f"{f'the raw velocities {values}' if raw else 'the driven constraints'} are inconsistent with {dof} "
         f"degree{'s' if dof != 1 else ''} of freedom at this position: the largest residuals are {where}; give fewer "
         "or other velocities"
     )
@@ -458,7 +458,7 @@ ROUGH = 30  #: steps that turn what is not guessed
 def close_nearest(
     system: ConstraintSystem,
     start: Array,
-    given: Mapping[str, float],
+    raw: Mapping[str, float],
     guess: Mapping[str, float],
     adjust: Callable[[Array], Array] | None = None,
 ) -> Assembly | None:
@@ -469,10 +469,10 @@ def close_nearest(
     nobody gives, such as those of contact points.  The distance of the result is the largest of the guessed
     coordinates.
     """
-    rough, scales = {name: value for name, value in guess.items() if name not in given}, system.scales
-    aim, cut = system.with_values(start, {**given, **rough}), system.wanted(rough)
+    rough, scales = {name: value for name, value in guess.items() if name not in raw}, system.scales
+    aim, cut = system.with_values(start, {**raw, **rough}), system.wanted(rough)
     guessed = np.unique(scales.velocities(system.indices(rough)))  # velocities that move coordinates of the tree
-    free, held = system.closure(given), system.closure({**given, **rough})
+    free, held = system.closure(raw), system.closure({**raw, **rough})
 
     def distances(q: Array) -> Array:
         """Scaled distances of a position from the guessed values."""
@@ -482,7 +482,7 @@ def close_nearest(
     def attempt(place: Array, count: int, first: ClosureSystem | None) -> Assembly | None:
         if first is not None:
             place = close(first, place, steps=ROUGH)[0]
-        q, residual = close(free, system.with_values(place if adjust is None else adjust(place), given))
+        q, residual = close(free, system.with_values(place if adjust is None else adjust(place), raw))
         if not closed(residual) or not system.aligned(q):
             return None
         return Assembly(q, residual, count, float(np.linalg.norm(distances(q))))
@@ -495,18 +495,18 @@ def close_nearest(
     for count, (place, enough) in enumerate(places, 1):
         if best is not None and best.distance <= enough:
             break
-        found = attempt(place, count, held)
-        if found is not None and (best is None or _nearer(found, best, free)):
-            best = found
+        result = attempt(place, count, held)
+        if result is not None and (best is None or _nearer(result, best, free)):
+            best = result
     return best and best._replace(distance=largest(distances(best.q)))
 
 
-def _nearer(found: Assembly, best: Assembly, free: ClosureSystem) -> bool:
+def _nearer(result: Assembly, best: Assembly, free: ClosureSystem) -> bool:
     """Whether a position is nearer to the guess than the best one, by more than what moves along a branch."""
     J = free.evaluate(best.q)[1]
     if rank(J).rank < int(free.free.sum()):  # the nearest point of a branch is found to its curvature only
-        return best.distance > BESIDE and found.distance < 0.5 * best.distance
-    return found.distance < best.distance - MEASURED
+        return best.distance > BESIDE and result.distance < 0.5 * best.distance
+    return result.distance < best.distance - MEASURED
 
 
 def differences(system: ConstraintSystem, q: Array, guess: Mapping[str, float]) -> tuple[tuple[str, float, float], ...]:
@@ -568,13 +568,13 @@ def assemble_velocity(
     else:
         return v
 
-    given = {names[i] if names else f"v[{i}]": x[i] for i in held}
+    raw = {names[i] if names else f"v[{i}]": x[i] for i in held}
     row_scales, all_labels = scales.c, list(labels) or [f"C[{i}]" for i in range(len(C_t))]
     if equations is not None:
         values = equations.values[(slice(None), *k)]
-        given |= dict(zip(equations.names, values, strict=True))
+        raw |= dict(zip(equations.names, values, strict=True))
         row_scales, all_labels = np.concatenate([row_scales, equations.scales]), [*all_labels, *equations.names]
     raise AssemblyError(
-        describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]),
+        describe_contradiction(raw, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]),
         code="EG-CONTRADICTION",
     )

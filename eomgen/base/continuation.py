@@ -77,13 +77,13 @@ class StraightPath(NamedTuple):
 
     def tangent(self, s: float, q: Array) -> Tangent:
         """The direction at a position of the path."""
-        found: Tangent = self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
-        return found
+        result: Tangent = self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
+        return result
 
     def solve(self, s: float, guess: Array) -> Point | None:
         """The point next to a guess."""
-        found = self.driven.solve(*self.at(s), self.t1, self.y1, guess)
-        return None if found is None else Point(s, *found)
+        result = self.driven.solve(*self.at(s), self.t1, self.y1, guess)
+        return None if result is None else Point(s, *result)
 
 
 def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
@@ -144,18 +144,18 @@ class Continuation:
             rate = largest(here.tangent.rate / self.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)
-            found = self.forward(-1, h, end if h == left else here.s + h)
-            if found is None:
+            result = self.forward(-1, h, end if h == left else here.s + h)
+            if result is None:
                 self.step = 0.5 * h
                 if self.step > BLOCKED * max(1.0, abs(here.s)):
                     continue
-                found = self._extrapolate()
-                if found is None:
+                result = self._extrapolate()
+                if result is None:
                     self.blocked = True
                     return False
-                self.leaps.append((here, found))
-                self.step = found.s - here.s
-            self.points.append(found)
+                self.leaps.append((here, result))
+                self.step = result.s - here.s
+            self.points.append(result)
         return self.points[-1].s >= end
 
     def reach(self, end: float, steps: int = STEPS) -> Point | None:
@@ -177,18 +177,18 @@ class Continuation:
         ahead = self.scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / self.scales.q)
         if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
             return None
-        found = self.curve.solve(s, ahead)
-        if found is None:
+        result = self.curve.solve(s, ahead)
+        if result is None:
             return None
-        off = largest(self.scales.distance(found.q, ahead))
-        move = largest(self.scales.distance(found.q, here.q))
-        turn = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
+        off = largest(self.scales.distance(result.q, ahead))
+        move = largest(self.scales.distance(result.q, here.q))
+        turn = h * largest((result.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
         worst = largest(np.array([off / max(OFF * move, UNJUDGED), turn / max(TURNED * move, UNJUDGED)]))
         if not (worst <= 1.0 and move <= JUMP):
             return None
         if h >= 0.999 * self.step:
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
-        return found
+        return result
 
     def _extrapolate(self) -> Point | None:
         """A point behind a singular position, as far from it as one before it, that continues the motion smoothly."""
@@ -197,9 +197,9 @@ class Continuation:
             away = (k for k in range(-2, -len(self.points) - 1, -1) if self._moved(k) >= size)
             if (k := next(away, None)) is not None:
                 gap = here.s - self.points[k].s
-                found = self.forward(k, 2.0 * gap, here.s + gap)
-                if found is not None and largest(self.points[k].tangent.rate / self.scales.q) > 0.0:
-                    return found
+                result = self.forward(k, 2.0 * gap, here.s + gap)
+                if result is not None and largest(self.points[k].tangent.rate / self.scales.q) > 0.0:
+                    return result
         return None
 
     def _moved(self, k: int) -> float:
@@ -249,10 +249,10 @@ class HeldPath:
         equations = self.equations and self.equations._replace(values=self.equations.values + (1.0 - s) * self.gap)
         system = ClosureSystem(self._at(s).position, self.scales, self.free, equations)
         for damping in (0.0, DAMPING):
-            found, residual = close(system, q, steps=NEWTON, damping=damping)
+            result, residual = close(system, q, steps=NEWTON, damping=damping)
             if closed(residual):
-                found[self.held] = q[self.held]  # Euler parameters are normalised at each step
-                return Point(s, found, self.tangent(s, found))
+                result[self.held] = q[self.held]  # Euler parameters are normalised at each step
+                return Point(s, result, self.tangent(s, result))
         return None
 
     def tangent(self, s: float, q: Array) -> Tangent:
@@ -284,9 +284,9 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
         raise AssemblyError(f"the path from the reference position is too long ({path.length:.3g} rad or lengths)")
     timed = path.end != system.t
     continuation = Continuation(path, start, fewest=FEWEST if timed else 1)
-    found = continuation.reach(1.0, TRIALS)
-    if found is not None:
-        return found.q
+    result = continuation.reach(1.0, TRIALS)
+    if result is not None:
+        return result.q
     last = continuation.points[-1]
     if timed:
         t = system.t + last.s * (path.end - system.t)
@@ -330,10 +330,10 @@ def find_least(value: Callable[[float], float], left: float, right: float, width
             break
         low = abs(at - left) > abs(right - at)
         t = at + GOLDEN * ((left if low else right) - at)
-        found = value(t)
-        if found < best:
+        result = value(t)
+        if result < best:
             left, right = (left, at) if low else (at, right)
-            best, at = found, t
+            best, at = result, t
         else:
             left, right = (t, right) if low else (left, t)
     return at

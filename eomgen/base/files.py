@@ -23,7 +23,7 @@ from .texts import shown
 # -- names -------------------------------------------------------------------------------------------------------------
 
 
-def as_path(what: str, given: Any) -> Path:
+def as_path(what: str, raw: Any) -> Path:
     """A path of a text or path.
 
     Raises
@@ -31,26 +31,26 @@ def as_path(what: str, given: Any) -> Path:
     UsageError
         It is something else (bytes too), empty, or holds what no name can: a NUL, half of a surrogate pair.
     """
-    return Path(as_name(what, given))
+    return Path(as_name(what, raw))
 
 
-def as_name(what: str, given: Any) -> str:
+def as_name(what: str, raw: Any) -> str:
     """The same as text, as it was written.
 
     Raises
     ------
     UsageError
     """
-    name = usable_name(given)
+    name = usable_name(raw)
     if name is None:
-        raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {shown(given)}")
+        raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {shown(raw)}")
     return name
 
 
-def usable_name(given: Any) -> str | None:
+def usable_name(raw: Any) -> str | None:
     """The text of a path; None where it is none."""
     try:
-        name = os.fspath(given)
+        name = os.fspath(raw)
         usable = isinstance(name, str) and name and b"\0" not in os.fsencode(name)
     except Exception:  # of an object's own __fspath__ too
         return None
@@ -226,8 +226,8 @@ def refuse_link(path: Path) -> None:
     """
     if not path.is_symlink():
         return
-    found = _status(path)
-    if found is not None and not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+    result = _status(path)
+    if result is not None and not (stat.S_ISREG(result.st_mode) or stat.S_ISDIR(result.st_mode)):
         return
     raise bad_file(
         f"{path} is a symbolic link to {os.readlink(path)}, and eomgen does not write through links; name that "
@@ -281,8 +281,8 @@ def keep_module(name: str, module: Any) -> Any:
 
 def find_module(name: str) -> Any:
     """What is loaded under a name, by eomgen or by Python's import; None if there is none."""
-    found = LOADED.get(name)
-    return sys.modules.get(name) if found is None else found
+    result = LOADED.get(name)
+    return sys.modules.get(name) if result is None else result
 
 
 # -- what eomgen ships: inside the package where installed, beside it in a clone --------------------------------------
@@ -303,16 +303,16 @@ def example_files() -> dict[str, Path]:
 
     Those in the folder ``large`` take seconds to compile, or move far where a centimetre is much.
     """
-    found = {}
+    result = {}
     folder = shipped("examples")
     for file in sorted([*folder.iterdir(), *(folder / "large").iterdir()], key=lambda f: f.name):
         if file.name.endswith(".yaml"):
-            found[file.name.removesuffix(".yaml")] = file
+            result[file.name.removesuffix(".yaml")] = file
         elif file.name.endswith(".urdf") or (file.name.endswith(".py") and not file.name.startswith("_")):
-            found[file.name] = file
-    return found
+            result[file.name] = file
+    return result
 
 
-def find_example(name: str, found: dict[str, Path]) -> Path | None:
+def find_example(name: str, files: dict[str, Path]) -> Path | None:
     """The file of an example, which may be called with or without its suffix."""
-    return found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
+    return files.get(name) or files.get(name.removesuffix(".yaml")) or files.get(f"{name}.urdf")

@@ -55,8 +55,8 @@ _PLACE = re.compile(r"(v?[xyz])\((\w+(?:\.\w+)*)\)")
 
 def place_of_marker(name: object) -> tuple[str, str] | None:
     """``x`` or ``vx`` and the marker of a name such as ``x(rod.tip)``; None for other names."""
-    found = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
-    return (found[1], found[2]) if found else None
+    match = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
+    return (match[1], match[2]) if match else None
 
 
 def acceleration_name(velocity: str) -> str:

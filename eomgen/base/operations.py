@@ -139,7 +139,7 @@ def function(
     """A row of a function that C, SymPy, mpmath and model files know by its name, unless ``more`` says otherwise."""
     places = ", ".join(["{}"] * len(slopes))
     sympy = more.get("sympy", name)
-    given: dict[str, Any] = {
+    raw: dict[str, Any] = {
         "c": f"each_{name}({places})",
         "numpy": f"np.{getattr(array, '__name__', name)}({places})",
         "recurrence": lambda g, y, *x: (tuple(slope(g, y, *x) for slope in slopes), None),
@@ -148,14 +148,14 @@ def function(
         "word": name,
         "digits": name,
     }
-    return Operation(name, FUNCTION, value, array, arity=len(slopes), slopes=slopes, rates=rates, **(given | more))
+    return Operation(name, FUNCTION, value, array, arity=len(slopes), slopes=slopes, rates=rates, **(raw | more))
 
 
 def choice(name: str, value: Callable[..., float], array: Callable[..., Any], c: str, **more: Any) -> Operation:
     """A row of a choice, which does not round; one operand unless ``more`` says otherwise."""
     numpy = f"np.{name if name in ('abs', 'sign') else getattr(array, '__name__', name)}{c[c.index('(') :]}"
-    given: dict[str, Any] = {"numpy": numpy, "word": name, "exact": True}
-    return Operation(name, CHOICE, value, array, c, **(given | more))
+    raw: dict[str, Any] = {"numpy": numpy, "word": name, "exact": True}
+    return Operation(name, CHOICE, value, array, c, **(raw | more))
 
 
 def condition(

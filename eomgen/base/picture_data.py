@@ -78,23 +78,23 @@ def read_picture(metadata: Mapping[str, Any], p: Any) -> PictureData:
             return values[x["at"]] if x.keys() == {"at"} else {key: plain(one) for key, one in x.items()}
         return [plain(one) for one in x] if isinstance(x, list) else x
 
-    def frame(given: Mapping[str, Any]) -> PlacedFrame:
-        return PlacedFrame(given["body"], np.array(plain(given["rotation"])), np.array(plain(given["position"])))
+    def frame(raw: Mapping[str, Any]) -> PlacedFrame:
+        return PlacedFrame(raw["body"], np.array(plain(raw["rotation"])), np.array(plain(raw["position"])))
 
     def along(point: Sequence[Any]) -> Callable[..., Array]:
         """Points (n, 3) at values of what runs."""
 
         def points(s0: Array, s1: Array | float = 0.0) -> Array:
-            found = np.empty((len(s0), 3))
+            result = np.empty((len(s0), 3))
             for axis, x in enumerate(point):
                 if isinstance(x, dict) and "samples" in x:
                     at = np.linspace(x["low"], x["high"], len(x["samples"]))
-                    found[:, axis] = np.interp(s0, at, x["samples"])
+                    result[:, axis] = np.interp(s0, at, x["samples"])
                 elif isinstance(x, dict):
-                    found[:, axis] = play_arrays(tape, p, (s0, s1))[x["at"]]
+                    result[:, axis] = play_arrays(tape, p, (s0, s1))[x["at"]]
                 else:
-                    found[:, axis] = x
-            return found
+                    result[:, axis] = x
+            return result
 
         return points
 

@@ -128,10 +128,10 @@ MARGIN = 0.06  #: around what is drawn (inch)
 SHOWN = 72  #: dots in which this inch is shown: sharp on fine screens, and small
 
 
-def image_html(data: bytes, kind: str, width: int | None = None, words: str = "picture") -> str:
-    """An image that needs no file, ``width`` dots of the page wide; ``words`` for those who do not see it."""
+def image_html(data: bytes, kind: str, width: int | None = None, alternative: str = "picture") -> str:
+    """An image that needs no file, ``width`` dots of the page wide; ``alternative`` for those who do not see it."""
     size = f" width='{width}'" if width else ""
-    size += f" alt='{html_text(words)}'"
+    size += f" alt='{html_text(alternative)}'"
     return f"<img{size} style='max-width:100%;height:auto' src='data:image/{kind};base64,{b64encode(data).decode()}'>"
 
 

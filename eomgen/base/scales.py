@@ -238,9 +238,9 @@ class Scales(NamedTuple):
         if self.space is None:
             return chosen
         space = self.space
-        found = [int(space.plain_q[np.searchsorted(space.plain_v, k)]) for k in chosen if k in space.plain_v]
-        found += [k for i, j in space.quaternion_slots if j in chosen for k in range(i, i + 4)]
-        return np.array(found, dtype=np.intp)
+        result = [int(space.plain_q[np.searchsorted(space.plain_v, k)]) for k in chosen if k in space.plain_v]
+        result += [k for i, j in space.quaternion_slots if j in chosen for k in range(i, i + 4)]
+        return np.array(result, dtype=np.intp)
 
     def velocities(self, coordinates: Sequence[int] | Indices) -> Indices:
         """The velocities that move these coordinates; all three for one Euler parameter."""
@@ -248,9 +248,9 @@ class Scales(NamedTuple):
         if self.space is None:
             return chosen
         space = self.space
-        found = [int(space.plain_v[np.searchsorted(space.plain_q, k)]) for k in chosen if k in space.plain_q]
-        found += [k for i, j in space.quaternion_slots if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
-        return np.array(found, dtype=np.intp)
+        result = [int(space.plain_v[np.searchsorted(space.plain_q, k)]) for k in chosen if k in space.plain_q]
+        result += [k for i, j in space.quaternion_slots if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
+        return np.array(result, dtype=np.intp)
 
 
 # -- the least changes that give constraint rows what they ask for -----------------------------------------------------

@@ -55,12 +55,12 @@ def html_table(title: str, facts: Iterable[tuple[str, str]], doc: str = "") -> s
     return f"<b>{html_text(title)}</b>{f'<p>{html_text(doc)}</p>' if doc else ''}<table>{rows}</table>"
 
 
-def shown(given: Any) -> str:
+def shown(raw: Any) -> str:
     """What was given, in one line of a message."""
     try:
-        text = " ".join(repr(given).split())
+        text = " ".join(repr(raw).split())
     except Exception:  # its own __repr__, or an integer of thousands of digits
-        return f"an object of type {type(given).__name__}, which cannot be shown"
+        return f"an object of type {type(raw).__name__}, which cannot be shown"
     return text if len(text) <= 80 else f"{text[:80]}..."
 
 

@@ -82,27 +82,27 @@ def judge_range(values: Any, low: Any, high: Any, above: bool, below: bool, reme
 MOST = 10**15  #: all whole numbers up to here are doubles, and their products with sizes of models no infinities
 
 
-def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -> int:
+def read_count(what: str, raw: Any, least: int = 0, most: int | None = None) -> int:
     """A whole number within limits.
 
     Raises
     ------
     UsageError
     """
-    found = as_count(given)
-    if found is None or found < least or found > (MOST if most is None else most):
-        endless = most is None and (found is None or found < least)
+    result = as_count(raw)
+    if result is None or result < least or result > (MOST if most is None else most):
+        endless = most is None and (result is None or result < least)
         limits = f"of at least {least}" if endless else f"from {least} to {MOST if most is None else most}"
-        raise off_range(f"{what} must be a whole number {limits}, not {shown(given)}")
-    return found
+        raise off_range(f"{what} must be a whole number {limits}, not {shown(raw)}")
+    return result
 
 
-def as_count(given: Any) -> int | None:
+def as_count(raw: Any) -> int | None:
     """A whole number of Python, NumPy or SymPy; None if it is none, as True and 2.0 are."""
-    if isinstance(given, (bool, float)):
+    if isinstance(raw, (bool, float)):
         return None
     try:
-        return index(given)
+        return index(raw)
     except Exception:  # of an object's own __index__ too
         return None
 
@@ -125,14 +125,14 @@ def judge_rising(values: Any) -> list[Flaw]:
 def judge_outline(values: Any, convex: bool, sense: int) -> list[Flaw]:
     """The rule of x and y of all corners, which run counterclockwise (1) or clockwise (-1) at the declared values."""
     numbers = [float(x) for x in values]
-    found = sense_of_outline(list(zip(numbers[::2], numbers[1::2], strict=True)), convex)
-    if isinstance(found, Flaw):
-        return [found]
-    if found == sense:
+    result = sense_of_outline(list(zip(numbers[::2], numbers[1::2], strict=True)), convex)
+    if isinstance(result, Flaw):
+        return [result]
+    if result == sense:
         return []
-    words = {1: "counterclockwise", -1: "clockwise"}
-    message = f"runs {words[found]}, and {words[sense]} at the declared values"
-    return [Flaw("", message, f"give corners that run {words[sense]}")]
+    orders = {1: "counterclockwise", -1: "clockwise"}
+    message = f"runs {orders[result]}, and {orders[sense]} at the declared values"
+    return [Flaw("", message, f"give corners that run {orders[sense]}")]
 
 
 def sense_of_outline(points: Sequence[Point], convex: bool) -> int | Flaw:
@@ -360,16 +360,16 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
     known = [np.isfinite(tensor).all() for tensor in tensors]
     scales = inertia_scales(
         [mass if math.isfinite(mass) else 0.0 for mass in masses],
-        [tensor if told else np.zeros((3, 3)) for tensor, told in zip(tensors, known, strict=True)],
+        [tensor if complete else np.zeros((3, 3)) for tensor, complete in zip(tensors, known, strict=True)],
         longest_within(points),
     )
-    found: list[Flaw] = []
-    for (name, _, _, judged), tensor, told, line, scale in zip(bodies, tensors, known, axes, scales, strict=True):
-        if judged and told:
+    result: list[Flaw] = []
+    for (name, _, _, judged), tensor, complete, line, scale in zip(bodies, tensors, known, axes, scales, strict=True):
+        if judged and complete:
             plane = None if line is None or not np.isfinite(line).all() else line.tolist()
             if fault := fault_of_inertia(tensor, plane, scale):
-                found.append(Flaw(f".{name}.inertia", *fault))
-    return found
+                result.append(Flaw(f".{name}.inertia", *fault))
+    return result
 
 
 def turn_points() -> Array:
@@ -379,11 +379,11 @@ def turn_points() -> Array:
 
 def judge_turn(values: Any) -> list[Flaw]:
     """A profile and its slope over a turn, at :func:`turn_points`: what it is elsewhere is judged elsewhere."""
-    found = np.asarray(values, dtype=float)
-    if not np.isfinite(found).all():
+    result = np.asarray(values, dtype=float)
+    if not np.isfinite(result).all():
         return []
-    rounding = LAW * float(np.abs(found[0]).max())
-    for what, f, size in (("value", found[0], np.ptp(found[0])), ("slope", found[1], np.abs(found[1]).max())):
+    rounding = LAW * float(np.abs(result[0]).max())
+    for what, f, size in (("value", result[0], np.ptp(result[0])), ("slope", result[1], np.abs(result[1]).max())):
         first, last = (0.0 if abs(x) < ZERO * size else float(x) for x in f[:2])
         if abs(last - first) > CLOSING * float(size) + rounding:
             message = f"does not close after a turn: its {what} is {first:.6g} at theta = 0 and {last:.6g} at 2 pi"
@@ -401,14 +401,14 @@ def spread_normals(count: int = NORMALS) -> Array:
 
 def judge_support(values: Any) -> list[Flaw]:
     """A support, its slopes and second derivatives (13, count) at :func:`spread_normals`: whether it is convex."""
-    normals, found = spread_normals(), np.asarray(values, dtype=float)
-    usable = np.isfinite(found).all(axis=0)  # a formula such as that of a disc has no curvature at its poles
-    normals, found = normals[:, usable], found[:, usable]
+    normals, result = spread_normals(), np.asarray(values, dtype=float)
+    usable = np.isfinite(result).all(axis=0)  # a formula such as that of a disc has no curvature at its poles
+    normals, result = normals[:, usable], result[:, usable]
     if not usable.any():
         message = "is not a number, or has no slopes, whatever the normal is"
         return [Flaw("", message, "give the distance in metres")]
-    radii = radii_of_curvature(normals, found)
-    size = np.abs(found[:4]).sum(axis=0).max()
+    radii = radii_of_curvature(normals, result)
+    size = np.abs(result[:4]).sum(axis=0).max()
     least, most = radii[0].argmin(), radii[1].argmin()
     hollow = radii[0, least] < -SHARP * size
     if not hollow and radii[1, most] > SHARP * size:
@@ -424,9 +424,9 @@ def judge_support(values: Any) -> list[Flaw]:
     return [Flaw("", f"{what} where the outward normal is [{at}]", remedy)]
 
 
-def radii_of_curvature(normals: Array, found: Array) -> Array:
+def radii_of_curvature(normals: Array, contour: Array) -> Array:
     """The smaller and the larger radius (2, count), of values, slopes and second derivatives (13, count)."""
-    n, (f, slopes, bends) = normals.T, (found[0], found[1:4].T, found[4:].T.reshape(-1, 3, 3))
+    n, (f, slopes, bends) = normals.T, (contour[0], contour[1:4].T, contour[4:].T.reshape(-1, 3, 3))
     flat = np.eye(3) - n[:, :, None] * n[:, None, :]
     bent = flat @ bends @ flat + (f - (slopes * n).sum(axis=1))[:, None, None] * flat
     twice, trace = (bent * bent).sum(axis=(1, 2)), np.trace(bent, axis1=1, axis2=2)

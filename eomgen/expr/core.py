@@ -66,13 +66,13 @@ class Graph:
 
     def __deepcopy__(self, memo: dict[int, object]) -> Graph:
         """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
-        twin = memo[id(self)] = Graph.__new__(Graph)
-        twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
-        twin.marks, twin.n_passes, twin.reached = list(self.marks), self.n_passes, {}
-        twin.roots = None
-        twin.calls, twin.functions = dict(self.calls), dict(self.functions)
-        twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
-        return twin
+        copied = memo[id(self)] = Graph.__new__(Graph)
+        copied.nodes, copied._ids = list(self.nodes), dict(self._ids)
+        copied.marks, copied.n_passes, copied.reached = list(self.marks), self.n_passes, {}
+        copied.roots = None
+        copied.calls, copied.functions = dict(self.calls), dict(self.functions)
+        copied.zero, copied.one = Expr(copied, self.zero.id), Expr(copied, self.one.id)
+        return copied
 
     # -- leaves ---------------------------------------------------------------------------------------------------
     def constant(self, value: float) -> Expr:
@@ -613,15 +613,15 @@ class _Copies:
 
     def _each(self, parts: Any) -> list[Any]:
         """Expressions here, most of which are zero in large sparse matrices."""
-        graph = twin = zero = None
+        graph = copied = zero = None
         result = []
         for x in parts:
             if type(x) is Expr:
                 if x.graph is not graph:
                     graph = x.graph
-                    twin = self.of(graph)
-                    zero = twin.zero
-                result.append(zero if x.id == zero.id else Expr(twin, x.id))  # type: ignore[union-attr, arg-type]
+                    copied = self.of(graph)
+                    zero = copied.zero
+                result.append(zero if x.id == zero.id else Expr(copied, x.id))  # type: ignore[union-attr, arg-type]
             else:
                 result.append(self.of(x))
         return result

@@ -163,7 +163,7 @@ def build(description: Description) -> Mechanism:
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(a): (a.name, a.of) for a in reader.asked if not a.part and not a.is_reaction}
+        element_quantities={str(a): (a.name, a.of) for a in reader.requested if not a.part and not a.is_reaction}
         | state_rates,
         wrench_quantities=exerted,
         reaction_quantities=reactions,
@@ -244,9 +244,9 @@ def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntr
 
 def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
     """Note centres of mass and momenta asked of a mechanism without mass."""
-    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
-    if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
-        what = ", ".join(name.removesuffix("()") for name in asked)
+    requested = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
+    if requested and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
+        what = ", ".join(name.removesuffix("()") for name in requested)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
         reader.fault("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
@@ -254,20 +254,22 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
 def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, ReactionQuantity]]:
     """The parts of what force elements exert on bodies, and of reactions and multipliers, that expressions speak of."""
     exerted, reactions = dict[str, WrenchQuantity](), dict[str, ReactionQuantity]()
-    for asked, path in reader.asked.items():
-        axes = reader.moving(asked.axes) if asked.axes else None
-        if asked.is_reaction:
-            reactions[str(asked)] = ReactionQuantity(asked.of, asked.part, axes, path)
-        elif asked.on:
-            exerted[str(asked)] = WrenchQuantity(asked.of, asked.part, reader.moving(asked.on), axes, path)
+    for requested, path in reader.requested.items():
+        axes = reader.moving(requested.axes) if requested.axes else None
+        if requested.is_reaction:
+            reactions[str(requested)] = ReactionQuantity(requested.of, requested.part, axes, path)
+        elif requested.on:
+            exerted[str(requested)] = WrenchQuantity(
+                requested.of, requested.part, reader.moving(requested.on), axes, path
+            )
     return exerted, reactions
 
 
 def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for asked, path in reader.asked.items():
-        quantity, name, on = asked.name, asked.of, asked.on
+    for requested, path in reader.requested.items():
+        quantity, name, on = requested.name, requested.of, requested.on
         if name in known and known[name].is_rigid and not on:
             fault = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"

@@ -149,7 +149,9 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 result |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
         result[name] = Known(quantity.dimension)
-    result |= {str(asked): Known(asked.dimension) for asked in reader.asked if asked.dimension is not None}
+    result |= {
+        str(requested): Known(requested.dimension) for requested in reader.requested if requested.dimension is not None
+    }
     return result | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

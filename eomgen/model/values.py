@@ -60,7 +60,7 @@ class Reader:
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}  # by name, the index
         self.markers: dict[str, Marker] = {}  # named ones (``rod.tip``) and the bodies' own frames (``rod``)
         self.quantities: dict[str, Quantity] = {}  # motions of markers that expressions use
-        self.asked: dict[Named, str] = {}  # what force elements do, and where that is used first
+        self.requested: dict[Named, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
         self.requirements = Requirements(faults)  # with the declared values of parameters
@@ -78,7 +78,7 @@ class Reader:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
         if quantity.is_reaction:
             self._ask_reaction(quantity)
-            self.asked.setdefault(quantity, path)
+            self.requested.setdefault(quantity, path)
             return
         names = [str(entry.name) for entry in self.description.sections["forces"]]
         if quantity.of not in names:
@@ -88,7 +88,7 @@ class Reader:
         for label in (quantity.on, quantity.axes):
             if label:
                 self.moving(label)
-        self.asked.setdefault(quantity, path)
+        self.requested.setdefault(quantity, path)
 
     def _ask_reaction(self, quantity: Named) -> None:
         """Refuse the reaction of an unknown joint, or the multiplier of an unknown element."""
@@ -245,10 +245,10 @@ class Reader:
             return Meaning("marker", place.order, "angle" if turns else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
-        if (asked := Named.parse(name)) is not None and asked.is_reaction:
-            return Meaning("reaction" if asked.part else "multiplier")
-        if asked is not None:  # whether a force moves with velocities is known once its law is
-            return Meaning("element", 1 if asked.name == "rate" else 0, "length")
+        if (requested := Named.parse(name)) is not None and requested.is_reaction:
+            return Meaning("reaction" if requested.part else "multiplier")
+        if requested is not None:  # whether a force moves with velocities is known once its law is
+            return Meaning("element", 1 if requested.name == "rate" else 0, "length")
         if kind not in _LEVELS:
             return Meaning(kind)
         level = _LEVELS[kind]

@@ -59,7 +59,7 @@ def require_steps(name: str, step: float, start: float, end: float) -> None:
         )
 
 
-def as_real(given: Any) -> Array | None:
+def as_real(raw: Any) -> Array | None:
     """What is given as an array of floats (float64), itself if it is one; None if these are no real numbers.
 
     Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
@@ -67,16 +67,16 @@ def as_real(given: Any) -> Array | None:
     convert, whatever it raises.  The compiled layer has the same rule in C, eomgen/native/_numbers.pxi.
     """
     try:
-        if type(given) is np.ndarray:
-            if given.dtype == np.float64:
-                return given
-            if given.dtype.kind in "biuf" and given.itemsize <= 8:
-                return given.astype(float)
-        elif type(given) in (list, tuple) and PLAIN.issuperset(map(type, given)):
-            return np.array(given, dtype=float)
-        elif has_masked(given):
+        if type(raw) is np.ndarray:
+            if raw.dtype == np.float64:
+                return raw
+            if raw.dtype.kind in "biuf" and raw.itemsize <= 8:
+                return raw.astype(float)
+        elif type(raw) in (list, tuple) and PLAIN.issuperset(map(type, raw)):
+            return np.array(raw, dtype=float)
+        elif has_masked(raw):
             return None
-        array = np.asarray(given)
+        array = np.asarray(raw)
         kind = array.dtype.kind
         if kind not in "biufO":
             return None
@@ -90,36 +90,36 @@ def as_real(given: Any) -> Array | None:
         return None
 
 
-def has_masked(given: Any, depth: int = 0) -> bool:
+def has_masked(raw: Any, depth: int = 0) -> bool:
     """Whether NumPy would read the value under a masked entry, or NaN, in an array or in lists of these."""
-    if isinstance(given, np.ma.MaskedArray):
-        return bool(np.ma.is_masked(given))
-    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
+    if isinstance(raw, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(raw))
+    if not isinstance(raw, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, raw)):
         return False
-    return any(has_masked(one, depth + 1) for one in given)
+    return any(has_masked(one, depth + 1) for one in raw)
 
 
-def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
+def read_numbers(what: str, raw: Any, width: float = 1.0) -> Array:
     """Real numbers as an array of floats, refused where `width` numbers for each column (n, k) would not fit.
 
     Raises
     ------
     UsageError
     """
-    shape = np.shape(given) if isinstance(given, np.ndarray) else ()
+    shape = np.shape(raw) if isinstance(raw, np.ndarray) else ()
     if len(shape) > 1:
         require_size(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
-    return _floats(what, given, f"{what} must hold real numbers")
+    return _floats(what, raw, f"{what} must hold real numbers")
 
 
-def read_vector(what: str, given: Any, n: int, error: Callable[[str], Exception] = ill_shaped) -> Array:
+def read_vector(what: str, raw: Any, n: int, error: Callable[[str], Exception] = ill_shaped) -> Array:
     """An array of n floats."""
-    found = as_real(given)
-    if found is None:
-        raise error(f"{what} must hold real numbers, ({n},), not {shown(given)}")
-    if found.shape != (n,):
-        raise error(f"{what} must have shape ({n},), not {found.shape}")
-    return found
+    result = as_real(raw)
+    if result is None:
+        raise error(f"{what} must hold real numbers, ({n},), not {shown(raw)}")
+    if result.shape != (n,):
+        raise error(f"{what} must have shape ({n},), not {result.shape}")
+    return result
 
 
 def fitting(
@@ -127,8 +127,8 @@ def fitting(
 ) -> Array:
     """The array that takes a result, if it can."""
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64:
-        given = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
-        raise error(f"{what} must be a float64 array of shape {shape}, not {given}")
+        raw = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
+        raise error(f"{what} must be a float64 array of shape {shape}, not {raw}")
     if not out.flags.writeable:
         raise error(f"{what} is read-only")
     if out.size and any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
@@ -136,7 +136,7 @@ def fitting(
     return out
 
 
-def read_times(what: str, given: Any, per_time: int) -> Array:
+def read_times(what: str, raw: Any, per_time: int) -> Array:
     """Times as an array of floats (n,), refused where a row of `per_time` numbers for each would not fit.
 
     Raises
@@ -144,47 +144,47 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
     UsageError
     """
     try:
-        length = len(given)
+        length = len(raw)
     except Exception:  # one number, or what is no list of times
         length = 0
     require_size(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
-    return np.array(_floats(what, given, f"{what} must be a list of times in seconds"))
+    return np.array(_floats(what, raw, f"{what} must be a list of times in seconds"))
 
 
-def read_number(what: str, given: Any) -> float:
+def read_number(what: str, raw: Any) -> float:
     """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
 
     Raises
     ------
     UsageError
     """
-    return read_plain(what, read_text(what, given) if isinstance(given, str) else given)
+    return read_plain(what, read_text(what, raw) if isinstance(raw, str) else raw)
 
 
-def read_plain(what: str, given: Any) -> float:
+def read_plain(what: str, raw: Any) -> float:
     """One finite real number, as compiled code takes it, which reads no texts."""
-    if type(given) is float:
-        result = given
+    if type(raw) is float:
+        result = raw
     else:
-        found = as_real(given)
-        if found is None or found.ndim:
-            raise no_number(f"{what} must be a number, not {shown(given)}")
-        result = float(found)
+        collected = as_real(raw)
+        if collected is None or collected.ndim:
+            raise no_number(f"{what} must be a number, not {shown(raw)}")
+        result = float(collected)
     if not isfinite(result):
         raise no_number(f"{what} must be finite, not {result}")
     return result
 
 
-def read_text(what: str, given: str) -> float:
+def read_text(what: str, raw: str) -> float:
     """The value of an expression of numbers as text: ``"10*pi/180"``."""
     try:
         from ..model.expressions import constant
     except ImportError:
-        raise no_number(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
-    return constant(given, what)
+        raise no_number(f"{what} must be a number, not {raw!r}; only eomgen itself reads texts") from None
+    return constant(raw, what)
 
 
-def with_numbers(what: str, given: Any, depth: int = 0) -> Any:
+def with_numbers(what: str, raw: Any, depth: int = 0) -> Any:
     """Lists and tuples of numbers with the values of the texts in them; anything else as it is.
 
     Raises
@@ -192,37 +192,37 @@ def with_numbers(what: str, given: Any, depth: int = 0) -> Any:
     UsageError
         A text that is no number.
     """
-    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
-        return given
-    return [read_text(what, one) if isinstance(one, str) else with_numbers(what, one, depth + 1) for one in given]
+    if not isinstance(raw, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, raw)):
+        return raw
+    return [read_text(what, one) if isinstance(one, str) else with_numbers(what, one, depth + 1) for one in raw]
 
 
-def read_flag(what: str, given: Any) -> bool:
+def read_flag(what: str, raw: Any) -> bool:
     """True or False."""
-    if not isinstance(given, (bool, np.bool_)):
-        raise ill_typed(f"{what} must be True or False, not {shown(given)}")
-    return bool(given)
+    if not isinstance(raw, (bool, np.bool_)):
+        raise ill_typed(f"{what} must be True or False, not {shown(raw)}")
+    return bool(raw)
 
 
-def _floats(what: str, given: Any, wanted: str) -> Array:
-    found = as_real(with_numbers(what, given))
-    if found is None:
-        raise ill_typed(f"{wanted}, not {shown(given)}")
-    return found
+def _floats(what: str, raw: Any, wanted: str) -> Array:
+    result = as_real(with_numbers(what, raw))
+    if result is None:
+        raise ill_typed(f"{wanted}, not {shown(raw)}")
+    return result
 
 
-def read_axis(label: str, given: Any) -> Array:
+def read_axis(label: str, raw: Any) -> Array:
     """Values of one axis from (low, high, count) or from the values themselves."""
     what = f"{label}: give (low, high, count) or two or more rising or falling values"
-    if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
-        count = read_count(f"{label}: the third of (low, high, count)", given[2], 2, 10_000_000)
-        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
-    values = as_real(given)
+    if isinstance(raw, tuple) and len(raw) == 3 and as_count(raw[2]) is not None:
+        count = read_count(f"{label}: the third of (low, high, count)", raw[2], 2, 10_000_000)
+        raw = np.linspace(read_number(what, raw[0]), read_number(what, raw[1]), count)
+    values = as_real(raw)
     if values is None:
-        raise ill_typed(f"{what}, not {shown(given)}")
+        raise ill_typed(f"{what}, not {shown(raw)}")
     steps = np.diff(values) if values.ndim == 1 else np.empty(0)
     if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise ill_typed(f"{what}, not {shown(given)}")
+        raise ill_typed(f"{what}, not {shown(raw)}")
     return values
 
 
@@ -239,13 +239,13 @@ class UnknownNameError(UsageError, KeyError, code="EG-NAME-UNKNOWN"):
         return str(self.args[0]) if self.args else ""
 
 
-def without_dots(given: Mapping[Any, Any], instances: Mapping[str, str]) -> dict[Any, Any]:
+def without_dots(raw: Mapping[Any, Any], instances: Mapping[str, str]) -> dict[Any, Any]:
     """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``, which must not be given beside it."""
-    found = {plain_name(name, instances): value for name, value in given.items()}
-    if len(found) < len(given):
-        twice = [name for name in given if plain_name(name, instances) != name and plain_name(name, instances) in given]
+    result = {plain_name(name, instances): value for name, value in raw.items()}
+    if len(result) < len(raw):
+        twice = [name for name in raw if plain_name(name, instances) != name and plain_name(name, instances) in raw]
         raise at_odds(f"{', '.join(map(repr, twice))} is given under both of its names; give it once")
-    return found
+    return result
 
 
 def plain_name(name: object, instances: Mapping[str, str]) -> Any:
@@ -283,32 +283,30 @@ def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
 
 
-def check_names(
-    what: str, given: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()
-) -> None:
+def check_names(what: str, raw: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()) -> None:
     """Raise :class:`UnknownNameError` for the first name not allowed; `further` ones are suggested too."""
-    for name in given:
+    for name in raw:
         if name not in allowed:
             raise unknown(what, name, [*allowed, *further])
 
 
-def read_names(what: str, given: Any) -> tuple[str, ...]:
+def read_names(what: str, raw: Any) -> tuple[str, ...]:
     """One name or several as a tuple of texts."""
-    if isinstance(given, str):
-        return (given,)
+    if isinstance(raw, str):
+        return (raw,)
     try:
-        names = tuple(given)
+        names = tuple(raw)
     except TypeError:
         names = (None,)
     if not all(isinstance(name, str) for name in names):
-        raise ill_typed(f"{what} must be a name or a list of names, not {shown(given)}")
+        raise ill_typed(f"{what} must be a name or a list of names, not {shown(raw)}")
     return names
 
 
-def require_mapping(what: str, given: Any) -> None:
+def require_mapping(what: str, raw: Any) -> None:
     """Refuse what does not give values by name."""
-    if not isinstance(given, Mapping):
-        raise ill_typed(f"{what} must be a mapping of names to values, not {shown(given)}")
+    if not isinstance(raw, Mapping):
+        raise ill_typed(f"{what} must be a mapping of names to values, not {shown(raw)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
@@ -331,9 +329,9 @@ def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
     try:
         taken.bind(0.0, None)
     except TypeError:
-        given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
+        raw = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
         remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
-        raise ill_typed(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None
+        raise ill_typed(f"{label} must be callable as f(t, x), and {raw} is not; {remedy}") from None
 
 
 # -- names of arguments ------------------------------------------------------------------------------------------------
@@ -352,13 +350,13 @@ def both_names(function: Function) -> Function:
     place = {name: k for k, name in enumerate(taken)}
 
     @wraps(function)
-    def call(*args, **given):  # type: ignore[no-untyped-def]
-        for other in others.keys() & given.keys() if given else ():
-            if others[other] in given or place[others[other]] < len(args):
+    def call(*args, **raw):  # type: ignore[no-untyped-def]
+        for other in others.keys() & raw.keys() if raw else ():
+            if others[other] in raw or place[others[other]] < len(args):
                 raise at_odds(f"{others[other]} and {other} are the same argument; give one of them")
-            given[others[other]] = given.pop(other)
+            raw[others[other]] = raw.pop(other)
         try:
-            return function(*args, **given)
+            return function(*args, **raw)
         except TypeError as error:
             _, own, fault = str(error).partition(f"{function.__qualname__}()")
             if not own:
@@ -378,23 +376,23 @@ def plain_names(function: Function) -> Function:
     """
 
     @wraps(function)
-    def call(model, *args, **given):  # type: ignore[no-untyped-def]
+    def call(model, *args, **raw):  # type: ignore[no-untyped-def]
         layout = model.layout
         if layout.instances:
             args = tuple(_plain(layout, value) for value in args)
-            given = _plain(layout, given)
-        return function(model, *args, **given)
+            raw = _plain(layout, raw)
+        return function(model, *args, **raw)
 
     return call  # type: ignore[return-value]
 
 
 def _plain(layout: Any, value: Any) -> Any:
     if isinstance(value, str):
-        found = layout.plain(value)
-        return found if found in layout.names or found.partition(".")[0] in layout.bodies else value
+        result = layout.plain(value)
+        return result if result in layout.names or result.partition(".")[0] in layout.bodies else value
     if isinstance(value, dict):
-        found = {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
-        return found if len(found) == len(value) else value  # a name given twice is told where it is read
+        result = {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
+        return result if len(result) == len(value) else value  # a name given twice is told where it is read
     if type(value) in (list, tuple) and any(isinstance(x, str | dict | tuple) for x in value):
         return type(value)(_plain(layout, x) for x in value)
     return value

@@ -59,12 +59,12 @@ def scaled_jacobians(module: BoundModel, t: Array, x: Array, u: Array | None = N
 def singular_values(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
     """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
     block = max(1, ENTRIES // (module.layout.n_c * module.layout.n_v))
-    found = []
+    result = []
     for k in range(0, len(t), block):
         p = slice(k, k + block)
         J = scaled_jacobians(module, t[p], x[:, p], None if u is None else u[:, p])
-        found.append(algebra.singular_values(J))
-    values = np.concatenate(found)
+        result.append(algebra.singular_values(J))
+    values = np.concatenate(result)
     return np.asarray(values / np.maximum(values[:, :1], TINY))
 
 
@@ -79,12 +79,12 @@ def find_change_points(module: BoundModel, t: Array, x: Array, u: Array) -> list
     ends = [0, *(np.flatnonzero(np.diff(t) == 0.0) + 1).tolist(), len(t)]
     looks = [Looks(module, t[a:b], x[:, a:b], u[:, a:b]) for a, b in pairwise(ends) if b - a > 1]
     largest = max((look.least.max() for look in looks), default=0.0)
-    found: list[ChangePoint] = []
+    result: list[ChangePoint] = []
     for k, look in enumerate(looks):
         if k and looks[k - 1].times[-1] == look.times[0] and look.continues(looks[k - 1]):
-            found.append(look.at_start())
-        found += look.find(DIP * largest)
-    return found
+            result.append(look.at_start())
+        result += look.find(DIP * largest)
+    return result
 
 
 class StatesBetween:
@@ -170,15 +170,15 @@ class Looks:
         """The change points where the smallest singular value falls below a limit, in order."""
         padded = np.concatenate([[np.inf], self.least, [np.inf]])
         dips = np.flatnonzero((self.least <= padded[:-2]) & (self.least <= padded[2:]) & (self.least < limit))
-        found: list[ChangePoint] = []
+        result: list[ChangePoint] = []
         for k in dips.tolist():
             first, last = self.times[max(k - 1, 0)], self.times[min(k + 1, len(self.times) - 1)]
             point = self._closest(float(first), float(last))
-            if point is None or (found and abs(point.time - found[-1].time) <= SAME * abs(last - first)):
+            if point is None or (result and abs(point.time - result[-1].time) <= SAME * abs(last - first)):
                 continue
-            if self._crossed(point.time, found[-1].time if found else None):
-                found.append(point)
-        return found
+            if self._crossed(point.time, result[-1].time if result else None):
+                result.append(point)
+        return result
 
     def _crossed(self, time: float, before: float | None) -> bool:
         """Whether the run comes to a change point from farther away, the one before too, and leaves it again."""

@@ -89,11 +89,11 @@ class Residuals(NamedTuple):
     correction_velocity: float = 0.0  #: largest change of a velocity
 
     @classmethod
-    def of(cls, given: Residuals | Mapping[str, float] | Callable[[], Residuals]) -> Residuals:
+    def of(cls, raw: Residuals | Mapping[str, float] | Callable[[], Residuals]) -> Residuals:
         """Residuals as a run has them: themselves, by name, or a function that evaluates them."""
-        if isinstance(given, Residuals):
-            return given
-        return given() if callable(given) else cls(**given)
+        if isinstance(raw, Residuals):
+            return raw
+        return raw() if callable(raw) else cls(**raw)
 
 
 # -- columns -----------------------------------------------------------------------------------------------------------
@@ -182,17 +182,17 @@ class Columns:
             y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_loop_coordinates, -1)
 
-    def _unwrapped(self, found: Array, angles: Array) -> Array:
+    def _unwrapped(self, result: Array, angles: Array) -> Array:
         """Angles of cut joints (k, n_t), whose turns count along the steps of the run, whatever times are stored."""
         passed = self._passed() if len(angles) else None
         if passed is None:
-            return np.unwrap(found, axis=-1)
+            return np.unwrap(result, axis=-1)
         t, x, u, order = passed
         n = self.module.layout.n_q
         kernel = self.module.kernels.loop_coordinates
         between = kernel(x[:n], x[n:], np.zeros_like(x[n:]), u=u if u.size else None, t=t)[0, angles]
         turned = np.empty((len(angles), len(order)))
-        turned[:, order] = np.unwrap(np.concatenate([between, found], axis=-1)[:, order], axis=-1)
+        turned[:, order] = np.unwrap(np.concatenate([between, result], axis=-1)[:, order], axis=-1)
         return turned[:, len(t) :]
 
     def _passed(self) -> tuple[Array, Array, Array, Indices] | None:

@@ -148,10 +148,10 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
                 f"{model.name!r} has {', '.join(model.x_names)}: give the module that it was made with"
             )
         return model.bind(p=trajectory.metadata.get("parameters"))
-    found: BoundModel | None = getattr(trajectory.columns, "module", None)
-    if found is None:
+    result: BoundModel | None = getattr(trajectory.columns, "module", None)
+    if result is None:
         raise incomplete(f"{purpose} needs the model, which a saved trajectory does not contain; give model=module")
-    return found
+    return result
 
 
 def poses(trajectory: Any, model: BoundModel | None = None) -> Array:
@@ -172,8 +172,8 @@ def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Arr
         if frame.body < 0:
             return np.repeat(frame.position[:, None], len(trajectory.t), axis=1)
         pose = every[frame.body]
-        found: Array = np.einsum("ijk,j->ik", pose[:3, :3], frame.position) + pose[:3, 3]
-        return found
+        result: Array = np.einsum("ijk,j->ik", pose[:3, :3], frame.position) + pose[:3, 3]
+        return result
     if name not in module.body_names:
         raise unknown("marker or body", name, (*data.markers, *module.body_names))
     return every[module.body_names.index(name), :3, 3]
@@ -344,8 +344,8 @@ def _calls(module: BoundModel) -> str:
 
 
 def _is_call(kind: type, name: str) -> bool:
-    found = inspect.getattr_static(kind, name)
-    return not isinstance(found, property) and (hasattr(found, "__get__") or callable(found))
+    result = inspect.getattr_static(kind, name)
+    return not isinstance(result, property) and (hasattr(result, "__get__") or callable(result))
 
 
 def _arguments(kernel: Kernel) -> str:

@@ -128,10 +128,10 @@ class Fail:
         self.kernels = kernels
         self.layout: Layout = kernels.layout
 
-    def vector(self, label: str, given: Any, bound: Array) -> Any:
+    def vector(self, label: str, raw: Any, bound: Array) -> Any:
         """The p or u of a call, as an array where it is given by name; the others are as bound."""
         what, names = ("parameter", self.layout.p) if label == "p" else ("input", self.layout.u)
-        return self.layout.values(what, names, given, bound) if isinstance(given, Mapping) else given
+        return self.layout.values(what, names, raw, bound) if isinstance(raw, Mapping) else raw
 
     def trouble(self, x: Array, t: float = 0.0, p: Own = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
@@ -147,14 +147,14 @@ class Fail:
         at, blame = place(names, x), ""
         if not np.isfinite(x).all() and names:
             bad = ~np.isfinite(x)
-            given = place([n for n, fault in zip(names, bad, strict=True) if fault], x[bad])
-            at, blame = "", f": {given[2:]} {'is' if bad.sum() == 1 else 'are'} given"
+            raw = place([n for n, fault in zip(names, bad, strict=True) if fault], x[bad])
+            at, blame = "", f": {raw[2:]} {'is' if bad.sum() == 1 else 'are'} given"
             remedy = "check the state given"
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
-        elif status == 2 and (idle := self.layout.info.no_inertia):
-            what, remedy = f"the model is for kinematics only: {idle}", "give those bodies mass or inertia"
+        elif status == 2 and (massless := self.layout.info.no_inertia):
+            what, remedy = f"the model is for kinematics only: {massless}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
@@ -169,11 +169,11 @@ class Fail:
             what = "the constraints are singular here, and the mechanism has no degree of freedom"
             remedy = "start a little away from this position, or change the dimensions"
         elif names or not self.layout.n_x:
-            if status == 5 and (found := self._diagnose(1, t, x, p, u)):
+            if status == 5 and (result := self._diagnose(1, t, x, p, u)):
                 status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
             else:
-                found = self._diagnose(status, t, x, p, u)
-            blame = f": {found}" if found else ""
+                result = self._diagnose(status, t, x, p, u)
+            blame = f": {result}" if result else ""
         if status == 1 and name == "jacobian" and not blame:
             remedy += ", or a root of 0, which has no derivative"
         error = STATUS.get(status, EvaluationError)

@@ -74,20 +74,20 @@ def _content(cell: Any) -> Any:
 
 def _attributes(value: Any) -> dict[str, Any]:
     """What an object holds, by name."""
-    found = dict(getattr(value, "__dict__", {}))
+    result = dict(getattr(value, "__dict__", {}))
     kind = type(value)
     if isinstance(value, type):
-        return found
+        return result
     for base in kind.__mro__:
         slots = vars(base).get("__slots__", ())
         for slot in (slots,) if isinstance(slots, str) else tuple(slots):
             name = f"_{base.__name__.lstrip('_')}{slot}" if slot[:2] == "__" and slot[-2:] != "__" else slot
             if name not in ("__dict__", "__weakref__") and hasattr(value, name):
-                found.setdefault(name, getattr(value, name))
+                result.setdefault(name, getattr(value, name))
     if any(getattr(kind, way) is not getattr(object, way) for way in ("__reduce__", "__reduce_ex__", "__getstate__")):
         with suppress(Exception):  # whatever its type does; it need not know how
-            found["pickled"] = list(value.__reduce_ex__(2)[1:3])
-    return found
+            result["pickled"] = list(value.__reduce_ex__(2)[1:3])
+    return result
 
 
 def code_digest(module: BoundModel) -> str:
@@ -132,10 +132,10 @@ def origin(module: BoundModel) -> dict[str, Any]:
 
 def inputs_of(module: BoundModel, forcing: Forcing) -> dict[str, Any]:
     """Every input of a run as it was given: a number, a table, a text, or the name and digest of a function."""
-    found: dict[str, Any] = dict(zip(module.u_names, module.u.tolist(), strict=True))
+    result: dict[str, Any] = dict(zip(module.u_names, module.u.tolist(), strict=True))
     for name, value in forcing.values.items():
-        found[name] = spell_input(value)
-    return found
+        result[name] = spell_input(value)
+    return result
 
 
 def spell_input(value: Any) -> Any:

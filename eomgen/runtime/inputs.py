@@ -215,8 +215,8 @@ class OfTime:
     def derivative(self) -> Any:
         """The rate, as the object says it; None where it says none."""
         derivative = getattr(self.function, "derivative", None)
-        found = derivative() if callable(derivative) else None
-        return of_time(found, True) if callable(found) else found
+        result = derivative() if callable(derivative) else None
+        return of_time(result, True) if callable(result) else result
 
 
 def of_time(function: Callable[..., Any], rate: bool = False) -> Callable[..., Any]:
@@ -231,8 +231,12 @@ def of_time(function: Callable[..., Any], rate: bool = False) -> Callable[..., A
         taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
     except (TypeError, ValueError):
         return function
-    alone = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
-    return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function
+    only_argument = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
+    return (
+        OfTime(function)
+        if only_argument or (len(taken) > 1 and isinstance(taken[1].default, int | float))
+        else function
+    )
 
 
 def read_text(layout: Layout, text: str, what: str) -> Expression:
@@ -309,15 +313,15 @@ class Forcing:
     unsettled: frozenset[str] = frozenset()  #: numbers that are given later, for each run of an ensemble
 
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
-        given = {} if inputs is None else inputs
-        require_mapping("inputs", given)
-        given = without_dots(given, layout.instances)
-        check_names("input", given, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
+        raw = {} if inputs is None else inputs
+        require_mapping("inputs", raw)
+        raw = without_dots(raw, layout.instances)
+        check_names("input", raw, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
         self.layout = layout
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
         self.formulas: dict[int, Expression] = {}
-        values = self.values = {name: self._read(name, value) for name, value in given.items()}
+        values = self.values = {name: self._read(name, value) for name, value in raw.items()}
         self.derived = fill_rates(layout, values, derive) if layout.input_rates else {}
         values |= {name: value for name, (_, _, value) in self.derived.items()}
         for name, tape in layout.signals.items():
@@ -357,8 +361,8 @@ class Forcing:
                 return Signal(*value)
             except UsageError as error:
                 raise UsageError(f"input {name}: {error}", code=error.code) from None
-        found = as_real(value)
-        if found is None or found.ndim:
+        result = as_real(value)
+        if result is None or result.ndim:
             raise ill_typed(
                 f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
                 f"f(t, x), not {shown(value)}"
@@ -444,9 +448,9 @@ class Forcing:
 
     def _one_number(self, index: int, t: float, value: Any) -> float:
         """What is no float as one, if it is a number: an integer, a NumPy scalar, an array of shape ()."""
-        found = as_real(value)
-        if found is not None and not found.ndim:
-            return float(found)
+        result = as_real(value)
+        if result is not None and not result.ndim:
+            return float(result)
         many = isinstance(value, np.ndarray) and value.ndim
         returned = f"an array of shape {value.shape}" if many else shown(value)
         raise ill_shaped(
@@ -456,8 +460,8 @@ class Forcing:
 
     def sample(self, t: Array, x: Array) -> Array:
         """u (n_u, k) at times (k,) and states (n_x, k)."""
-        if self.formulas and (found := self._sample_texts(t)) is not None:
-            return found
+        if self.formulas and (result := self._sample_texts(t)) is not None:
+            return result
         u = np.repeat(self.base[:, None], len(t), axis=1)
         tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Table)}
         for j in range(len(t) if len(self.varying) > len(tables) else 0):
@@ -491,12 +495,12 @@ class Forcing:
             return []
         low, high = min(start, end), max(start, end)
 
-        def found(jumps: bool) -> list[float]:
+        def times_of(jumps: bool) -> list[float]:
             tables = (s for s in self.varying.values() if isinstance(s, Table))
             signals = (s for s in tables if (s.order == 0) == jumps)
             return sorted({float(t) for signal in signals for t in signal.kinks() if low < t < high})
 
-        jumps, bends = found(True), found(False)
+        jumps, bends = times_of(True), times_of(False)
         every = sorted({*jumps, *bends}, reverse=end < start)
         return every if every_jump or len(every) <= KINKS else every[:: -(-len(every) // KINKS)]
 
@@ -563,29 +567,29 @@ def rate_places(layout: Layout) -> dict[int, int]:
 
 
 def fill_rates(
-    layout: Layout, given: Mapping[str, Any], derive: Callable[[str, str, Any], Any]
+    layout: Layout, raw: Mapping[str, Any], derive: Callable[[str, str, Any], Any]
 ) -> dict[str, tuple[str, int, Any]]:
     """Rates that follow from inputs given by name: name -> (the input they are of, how many times it is derived,
     value).
     """
-    found: dict[str, tuple[str, int, Any]] = {}
+    result: dict[str, tuple[str, int, Any]] = {}
     signals = layout.signals
     for first, rates in layout.input_rates.items():
-        last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
-        led = first in given or first in signals or first not in layout.u
+        last, order, value, at = (first, 0, raw[first], 0) if first in raw else ("", 0, None, 0)
+        led = first in raw or first in signals or first not in layout.u
         for rate, times in rates:
             led = led or rate in signals
-            if rate in given:
-                if not led and not (isinstance(given[rate], int | float) and given[rate] == 0):
+            if rate in raw:
+                if not led and not (isinstance(raw[rate], int | float) and raw[rate] == 0):
                     raise incomplete(f"input {rate} is the rate of {first}, which is constant; give {first} too")
                 led = True
-                last, order, value, at = rate, times, given[rate], times
+                last, order, value, at = rate, times, raw[rate], times
             elif last:
                 for _ in range(times - at):
                     value = derive(last, rate, value)
                 at = times
-                found[rate] = last, times - order, value
-    return found
+                result[rate] = last, times - order, value
+    return result
 
 
 def derive(name: str, rate: str, value: Any) -> Any:
@@ -595,9 +599,9 @@ def derive(name: str, rate: str, value: Any) -> Any:
     if isinstance(value, Expression) and value.rate is not None:
         return value.rate(name, rate)
     derivative = getattr(value, "derivative", None)
-    found = derivative() if callable(derivative) else None
-    if found is not None:
-        return of_time(found, True) if callable(found) else read_number(f"derivative of input {name}", found)
+    result = derivative() if callable(derivative) else None
+    if result is not None:
+        return of_time(result, True) if callable(result) else read_number(f"derivative of input {name}", result)
     raise cannot(
         f"input {name}: the equations need its rate {rate}, and the rate of a function is not known; give {rate} too, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"
@@ -616,12 +620,12 @@ def require_smooth(forcing: Forcing, start: float, end: float) -> None:
         table: Any = forcing.values[name]
         if not hasattr(table, "jumps"):
             continue
-        found = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
-        if found:
+        jumps = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
+        if jumps:
             what = "its value" if times == 1 else "its slope" if times == 2 else f"its derivative {times - 1}"
             raise UsageError(
                 f"input {name}: the equations need {rate}, but {what} jumps in the {table.interpolation} table at "
-                f't = {found[0]:.6g} s (an impact); give Signal(times, values, "cubic") over the whole run, a text, or '
+                f't = {jumps[0]:.6g} s (an impact); give Signal(times, values, "cubic") over the whole run, a text, or '
                 f"{rate} too",
                 code="EG-JUMP",
             )
@@ -733,9 +737,9 @@ def require_agreement(forcing: Forcing, start: float, end: float) -> None:
                 if f is None or g is None:
                     continue
                 table = any(hasattr(values[n], "times") for n in (name, rate))
-                found = find_contradiction(f, g, start, end, CONTRADICTS_TABLE if table else CONTRADICTS)
-                if found is not None:
-                    t, changes, says = found
+                result = find_contradiction(f, g, start, end, CONTRADICTS_TABLE if table else CONTRADICTS)
+                if result is not None:
+                    t, changes, says = result
                     raise untrue(
                         f"input {rate} is not the rate of {name}: at t = {t:.6g} s {name} changes by {changes:.6g} per "
                         f"second, but {rate} is {says:.6g}; leave {rate} out if {name} is a number, a table or a "

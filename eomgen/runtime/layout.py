@@ -154,14 +154,14 @@ class ModelInfo:
 
     def to_dict(self) -> dict[str, Any]:
         """What model.json holds."""
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         for name in type(self).__annotations__:
-            value, usual = getattr(self, name), getattr(type(self), name, None)
+            value, default = getattr(self, name), getattr(type(self), name, None)
             if name == "sizes":
-                found |= value._asdict()
-            elif not hasattr(type(self), name) or name in ALWAYS or (value != usual and (value or usual)):
-                found[name] = value
-        return found
+                result |= value._asdict()
+            elif not hasattr(type(self), name) or name in ALWAYS or (value != default and (value or default)):
+                result[name] = value
+        return result
 
 
 # -- rules -------------------------------------------------------------------------------------------------------------
@@ -199,8 +199,8 @@ def _to_look_at(rule: str, data: Sequence[Any], tape: Any, p: Array) -> Iterator
         yield k, values[:, k]
 
 
-def _rows(found: Sequence[Any], count: int) -> Array:
-    return np.array([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in found])
+def _rows(result: Sequence[Any], count: int) -> Array:
+    return np.array([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in result])
 
 
 # -- allowed parameters ------------------------------------------------------------------------------------------------
@@ -216,34 +216,34 @@ def require_allowed(info: ModelInfo, p: Array) -> None:
         wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
         if len(wrong):
             flaws = judge_range(columns[k, wrong[:1]], *data)
-            problems += told(info, path, flaws, [k], p, wrong.tolist())
+            problems += faults(info, path, flaws, [k], p, wrong.tolist())
     for path, flaws, used, runs in broken_rules(info.rules, columns):
-        problems += told(info, path, flaws, used, p, runs)
+        problems += faults(info, path, flaws, used, p, runs)
     if problems:
         raise ParameterError(list(dict.fromkeys(problems)))
 
 
 def bounds_of(info: ModelInfo) -> dict[str, tuple[float, float]]:
     """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
-    found: dict[str, tuple[float, float]] = {}
+    result: dict[str, tuple[float, float]] = {}
     for k, _, low, high, *_ in info.ranges:
-        least, most = found.get(info.p_names[k], (-np.inf, np.inf))
+        least, most = result.get(info.p_names[k], (-np.inf, np.inf))
         least = least if low is None else max(least, low)
-        found[info.p_names[k]] = (least, most if high is None else min(most, high))
-    return found
+        result[info.p_names[k]] = (least, most if high is None else min(most, high))
+    return result
 
 
-def told(
+def faults(
     info: ModelInfo, path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
 ) -> list[Problem]:
     """Flaws of the first of the runs that break a rule, with the values of the parameters that it depends on."""
     names, values = info.p_names, p.reshape(len(p), -1)[:, runs[0]]
-    given = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
+    raw = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
     where = ""
     if p.ndim > 1:
         where = f" in run {runs[0]}" + f" and {len(runs) - 1} more" * (len(runs) > 1)
     return [
-        Problem(path + flaw.key, f"{flaw.message} with {given}{where}", flaw.remedy, code="EG-RANGE") for flaw in flaws
+        Problem(path + flaw.key, f"{flaw.message} with {raw}{where}", flaw.remedy, code="EG-RANGE") for flaw in flaws
     ]
 
 
@@ -286,12 +286,12 @@ class Layout:
         self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])
-        given = info.coordinate_of  # given equations name their velocities as they like
-        if given is not None:
-            self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, given, strict=True))
+        raw = info.coordinate_of  # given equations name their velocities as they like
+        if raw is not None:
+            self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, raw, strict=True))
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
-        self.general_rates = given is not None and list(given) != list(range(self.n_q))
+        self.general_rates = raw is not None and list(raw) != list(range(self.n_q))
         self.energy_known = info.energy_known
         #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
         #: itself, or stands in the equations by its rates only.
@@ -340,19 +340,19 @@ class Layout:
         s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
         if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
             return self
-        found = copy(self)
-        usual = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
-        lengths = [*s_q[self.velocity_lengths], *s_c[usual]]
-        found.length = float(lengths[0]) if lengths else self.length
+        result = copy(self)
+        default = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
+        lengths = [*s_q[self.velocity_lengths], *s_c[default]]
+        result.length = float(lengths[0]) if lengths else self.length
         if not lengths and self.scales.groups is not None and (self.scales.groups > 0).any():
             gap = int(np.argmax(self.scales.groups > 0))  # of a large loop, which grows with its links
-            found.length = float(self.length * s_c[gap] / self.scales.c[gap])
-        found.scales = self.scales._replace(q=s_q, c=s_c)
-        found.place_scales = found.scales
+            result.length = float(self.length * s_c[gap] / self.scales.c[gap])
+        result.scales = self.scales._replace(q=s_q, c=s_c)
+        result.place_scales = result.scales
         if self.general_rates:
-            found.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), found.length)
-        found.loop_scales = np.where(self.loop_lengths, found.length, 1.0)
-        return found
+            result.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), result.length)
+        result.loop_scales = np.where(self.loop_lengths, result.length, 1.0)
+        return result
 
     def without_signals(self, u: object) -> Layout:
         """The same where inputs that are bound, those of a mapping or all of an array, have no declared signals."""
@@ -360,9 +360,9 @@ class Layout:
             return self
         bound = set(without_dots(u, self.instances) if isinstance(u, Mapping) else self.u)
         bound |= {rate for name in bound for rate, _ in self.input_rates.get(name, ())}
-        found = copy(self)
-        found.signals = {name: tape for name, tape in self.signals.items() if name not in bound}
-        return found
+        result = copy(self)
+        result.signals = {name: tape for name, tape in self.signals.items() if name not in bound}
+        return result
 
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom."""
@@ -411,18 +411,18 @@ class Layout:
         """A name as the model has it: ``leg1_hip`` for ``leg1.hip`` of an instance of a component."""
         return plain_name(name, self.instances)
 
-    def values(self, what: str, names: Sequence[str], given: object, current: Array) -> Array:
+    def values(self, what: str, names: Sequence[str], raw: object, current: Array) -> Array:
         """A full vector from a mapping of names (the others keep their current values) or from an array."""
-        if given is None:
+        if raw is None:
             return current
-        if isinstance(given, Mapping):
-            given = without_dots(given, self.instances)
-            check_names(what, given, names)
+        if isinstance(raw, Mapping):
+            raw = without_dots(raw, self.instances)
+            check_names(what, raw, names)
             result = np.array(current, dtype=float)
-            for name, value in given.items():
+            for name, value in raw.items():
                 result[names.index(name)] = read_number(f"{what} {name}", value)
         else:
-            result = read_numbers(f"the {what}s", given)
+            result = read_numbers(f"the {what}s", raw)
         if result.shape != (len(names),):
             raise ill_shaped(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
         if what == "parameter":
@@ -433,18 +433,18 @@ class Layout:
         """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost."""
         if p.ndim > 1:
             return require_allowed(self.info, p)
-        given = p.tobytes()
-        if given != self._allowed:
+        raw = p.tobytes()
+        if raw != self._allowed:
             require_allowed(self.info, p)
-            self._allowed = given
+            self._allowed = raw
 
 
 def _table(rows: Sequence[Sequence[int]], n: int) -> Any:
     """Which of n columns each row names (m, n)."""
-    found = np.zeros((len(rows), n), dtype=bool)
-    for own, columns in zip(found, rows, strict=True):
+    result = np.zeros((len(rows), n), dtype=bool)
+    for own, columns in zip(result, rows, strict=True):
         own[list(columns)] = True
-    return found
+    return result
 
 
 # -- initial values that follow from parameters ------------------------------------------------------------------------
@@ -505,7 +505,7 @@ def values_at(layout: Layout, p: Array) -> dict[str, Any]:
 def start_slopes(layout: Layout, p: Array) -> dict[str, Array]:
     """Derivatives (n_p,) of the initial values that follow from parameters, by name, at parameters (n_p,)."""
     places, tape = layout.info.start_slopes
-    found: dict[str, Array] = {}
+    result: dict[str, Array] = {}
     for (name, k), slope in zip(places, play_arrays(tape, p, NO_STATE), strict=True):
-        found.setdefault(name, np.zeros(len(p)))[k] = slope
-    return found
+        result.setdefault(name, np.zeros(len(p)))[k] = slope
+    return result

@@ -69,19 +69,19 @@ class DependentMotion:
     def solve(self, t: float, y: Array, t1: float, y1: Array, guess: Array) -> tuple[Array, Tangent] | None:
         """The position next to a guess by one Newton iteration of the kernel, and its direction at this time."""
         n_q, n = len(guess), len(self.scales.q)
-        found = self._kinematics(t, y, y1, guess)
-        if not np.isfinite(found).all():
-            self.failed = found
+        result = self._kinematics(t, y, y1, guess)
+        if not np.isfinite(result).all():
+            self.failed = result
             return None
-        q, v = found[:n_q], found[n_q : n_q + n]
+        q, v = result[:n_q], result[n_q : n_q + n]
         if self.drifts:  # the time stands still here
             v = v - self._kinematics(t, y, np.zeros_like(y1), q)[n_q : n_q + n]
         return q, Tangent(v)
 
     def tangent(self, t: float, q: Array, t1: float, y1: Array) -> Tangent:
         """The direction at a position."""
-        found = self.solve(t, q[self.layout.independent_q], t1, y1, q)
-        return Tangent(np.zeros_like(self.scales.q)) if found is None else found[1]
+        result = self.solve(t, q[self.layout.independent_q], t1, y1, q)
+        return Tangent(np.zeros_like(self.scales.q)) if result is None else result[1]
 
     def _kinematics(self, t: float, y: Array, rate: Array, guess: Array) -> Array:
         rest = np.zeros(self.layout.n_states)  # states stand still
@@ -104,10 +104,10 @@ class DependentMotion:
         y1 = (target - origin) / (length or 1.0)
         own, way = self._way(start, y1, t)
         self._go_on(way, target, length)
-        found = way.reach(length)
-        if found is None:
+        result = way.reach(length)
+        if result is None:
             raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, own.failed))
-        return found.q
+        return result.q
 
     def follow_all(self, start: Array, targets: Array) -> list[Array]:
         """The same for columns of targets (n_dof, k), at t = 0.
@@ -131,8 +131,8 @@ class DependentMotion:
                 self._go_on(way, targets[:, chosen[0]], np.floor(way.points[-1].s) + 1.0)
             guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
             x = np.concatenate([targets[:, chosen], np.zeros((2 * self.layout.n_dof, len(chosen))), guesses])
-            found = self.kernel(x, t=0.0)[:n_q]
-            for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
+            collected = self.kernel(x, t=0.0)[:n_q]
+            for j, q, guess in zip(chosen, collected.T, guesses.T, strict=True):
                 near = np.abs(self.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
                 result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
         return list(result.T)
@@ -161,11 +161,11 @@ class DependentMotion:
             ", "
         )
 
-    def _blocked(self, target: Array, found: Array) -> EvaluationError:
+    def _blocked(self, target: Array, result: Array) -> EvaluationError:
         """Why the step to independent values failed."""
-        if np.isfinite(found).all() or self.kernel.failure is None:
-            words = f"the position {self._place(target)} lies on another branch, or too near to a dead centre"
-            return ProjectionError(words, 0.0, target)
+        if np.isfinite(result).all() or self.kernel.failure is None:
+            message = f"the position {self._place(target)} lies on another branch, or too near to a dead centre"
+            return ProjectionError(message, 0.0, target)
         status, t, x = self.kernel.failure
         error = self.fail.exception("kinematics", status, t, x)
         return type(error)(f"{self._place(target)}: {error}", t, target)
@@ -177,7 +177,7 @@ class DependentMotion:
 def motions(
     path: DependentMotion,
     reference: Callable[[float], Array],
-    given: Sequence[ArrayLike | None],
+    raw: Sequence[ArrayLike | None],
     guess: Array | None,
     t: Array,
 ) -> tuple[Array, Array, Array]:
@@ -189,7 +189,7 @@ def motions(
     layout = path.layout
     n_q, n, size = layout.n_q, layout.n_v, len(layout.independent_q)
     labels, width = ("q_i", "v_i", "a_i"), n_q + 2 * n
-    arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, given, strict=True)]
+    arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, raw, strict=True)]
     columns = max((part.shape[1:] for part in arrays if part is not None), key=len, default=())
     parts = []
     for name, part in zip(labels, arrays, strict=True):

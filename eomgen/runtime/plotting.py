@@ -45,8 +45,8 @@ def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Arr
         straight: Array = x[:, k] + s * (x[:, k + 1] - x[:, k])
         return straight
     cubic = cubic_piece(x[:, k], x[:, k + 1], h * slopes[:, k], h * slopes[:, k + 1], s)
-    gone, told = x[:, k + 1] - x[:, k], 0.5 * h * (slopes[:, k] + slopes[:, k + 1])
-    far = abs(gone - told) > APART * (abs(gone) + 0.5 * abs(h) * (abs(slopes[:, k]) + abs(slopes[:, k + 1])))
+    gone, predicted = x[:, k + 1] - x[:, k], 0.5 * h * (slopes[:, k] + slopes[:, k + 1])
+    far = abs(gone - predicted) > APART * (abs(gone) + 0.5 * abs(h) * (abs(slopes[:, k]) + abs(slopes[:, k + 1])))
     return np.where(far, x[:, k] + s * gone, cubic)
 
 
@@ -133,11 +133,11 @@ def _between_steps(
         own = [n for n in names if n in ENERGIES and n not in layout.x + layout.loops + layout.y + layout.u]
         try:
             columns = _columns_at(trajectory, module, times)
-            found = {name: columns[name] if name != "t" else times for name in names if name not in own}
+            result = {name: columns[name] if name != "t" else times for name in names if name not in own}
             three = refined_energies(trajectory, times, columns) if energies or own else None
             if three is not None:
-                found |= {name: three[ENERGIES.index(name)] for name in own}
-            return times, found, three
+                result |= {name: three[ENERGIES.index(name)] for name in own}
+            return times, result, three
         except EvaluationError:  # the cubic left what the model allows: its steps are drawn
             pass
     return t, {name: trajectory[name] for name in names}, trajectory.energies if energies else None
@@ -189,17 +189,17 @@ def plot(
 
 def choose(
     trajectory: Any,
-    given: Sequence[str | Sequence[str]],
+    raw: Sequence[str | Sequence[str]],
     x: str | None,
     y: str | Sequence[str] | None,
     kind: str,
 ) -> tuple[list[Curves], str]:
     """Panels of what is asked for, and the label of their horizontal axis."""
     known = ("t", *trajectory.names)
-    asked = [one for name in given for one in read_names("a column", name)]  # a list of names is taken too
+    requested = [one for name in raw for one in read_names("a column", name)]  # a list of names is taken too
     instances = trajectory.metadata.get("instances", {})
     names: tuple[str, ...] = tuple(
-        plain_name(name, instances) for name in (*asked, *(() if y is None else read_names("y", y)))
+        plain_name(name, instances) for name in (*requested, *(() if y is None else read_names("y", y)))
     )
     x = plain_name(x, instances)
     for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
@@ -297,8 +297,8 @@ def printed_names(metadata: Mapping[str, Any], form: str = "mathtext") -> Callab
     if known is None:
         with suppress(ModuleNotFoundError):
             notation = import_module("..expr.notation", __package__).Notation.of(metadata)
-            found: Callable[[str], str] = getattr(notation, form)
-            return found
+            result: Callable[[str], str] = getattr(notation, form)
+            return result
         known = {form: {}}
     return lambda name: str(known[form].get(name, html_text(name) if form == "html" else name))
 
@@ -384,11 +384,11 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
     position = np.abs(module.kernels.constraints(x[: module.n_q], t=t, u=u)).max(axis=0, initial=0.0)
     velocity = np.abs(module.kernels.velocity_constraints(x, t=t, u=u)).max(axis=0, initial=0.0)
     panels = []
-    for name, found, raw in (
+    for name, result, raw in (
         ("residual (m, rad)", position, trajectory.residuals.raw_position),
         ("of velocities (m/s, rad/s)", velocity, trajectory.residuals.raw_velocity),
     ):
-        shown = np.maximum(found, np.finfo(float).eps)  # a logarithm has no 0
+        shown = np.maximum(result, np.finfo(float).eps)  # a logarithm has no 0
         curves = [("stored states", t, shown)]
         if raw > 0.0:
             curves.append(("raw, largest", t, np.full(len(t), raw)))

@@ -18,7 +18,7 @@ class Call(Protocol):
 
     failure: tuple[int, float, Array] | None  #: with NaN for failures: (status, t, x) of the last one
 
-    def __call__(self, *args: Any, **given: Any) -> Array: ...
+    def __call__(self, *args: Any, **raw: Any) -> Array: ...
 
 
 class Timed(Protocol):

@@ -96,23 +96,23 @@ def require_support(layout: Layout, call: str, name: str = "") -> None:
     """Refuse a model of a kind that the table excludes from a call, which may go by another name in the message."""
     for kind in EXCLUDED[call]:
         if names := KINDS[kind].names(layout):
-            told = KINDS[kind].message.format(call=name or call, model=layout.name, names=", ".join(names))
-            raise UnavailableError(told)
+            message = KINDS[kind].message.format(call=name or call, model=layout.name, names=", ".join(names))
+            raise UnavailableError(message)
 
 
 def require_switched(layout: Layout, states: Array) -> None:
     """Refuse first-order states (n_s,) that are neither 0 nor 1 where they say whether a constraint is closed."""
-    given = dict(zip(layout.states, states, strict=True))
+    raw = dict(zip(layout.states, states, strict=True))
     for name, state in layout.switches.items():
-        if (value := given[state]) not in (0.0, 1.0):
+        if (value := raw[state]) not in (0.0, 1.0):
             raise no_choice(f"{state} is 1 while {name} is closed and 0 while it is open, not {value:g}")
 
 
 def refuse_closed(layout: Layout, states: Array, what: str) -> None:
     """Refuse first-order states (n_s,) with which constraints that close and open are closed."""
     require_switched(layout, states)
-    given = dict(zip(layout.states, states, strict=True))
-    names = [name for name, state in layout.switches.items() if given[state] > 0.5]
+    raw = dict(zip(layout.states, states, strict=True))
+    names = [name for name, state in layout.switches.items() if raw[state] > 0.5]
     if names:
         first = layout.switches[names[0]]
         raise UnavailableError(

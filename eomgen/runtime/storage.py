@@ -44,12 +44,12 @@ def sealed(arrays: Mapping[str, Any], key: str = "") -> dict[str, Any]:
 
 
 def _seal(arrays: Mapping[str, Any], key: str) -> str:
-    found = hashlib.sha256(key.encode())
+    result = hashlib.sha256(key.encode())
     for name in sorted(arrays):
         array = np.asarray(arrays[name])
-        found.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode("utf-8", "surrogatepass"))
-        found.update(array.tobytes())
-    return found.hexdigest()
+        result.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode("utf-8", "surrogatepass"))
+        result.update(array.tobytes())
+    return result.hexdigest()
 
 
 def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str, Any]:
@@ -59,14 +59,14 @@ def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str,
     """
     with open_plain(path) as file:
         try:
-            found = _read(file, path.stat().st_size, compressed)
+            result = _read(file, path.stat().st_size, compressed)
         except Exception as error:  # whatever zipfile, zlib and NumPy's parser of headers raise
             raise ValueError(str(error) or type(error).__name__) from None
-    if SEAL not in found:
+    if SEAL not in result:
         raise ValueError("it has no seal, which is another format, as that of earlier versions")
-    if str(found.pop(SEAL)) != _seal(found, key):
+    if str(result.pop(SEAL)) != _seal(result, key):
         raise ValueError("its arrays differ from those that eomgen wrote")
-    return found
+    return result
 
 
 def _read(file: BinaryIO, own: int, compressed: bool) -> dict[str, Any]:
@@ -199,8 +199,8 @@ def dataset(trajectory: Any) -> xarray.Dataset:
         of = np.reshape(x, (len(metadata["x_names"]), -1))
         variables[states] = ((state, each), of, {"long_name": f"states at {name}"})
         coordinates[state] = (state, np.array(metadata["x_names"], dtype=object))
-    words = {"model": trajectory.name, "metadata": json.dumps(metadata)}
-    made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
+    texts = {"model": trajectory.name, "metadata": json.dumps(metadata)}
+    made: xarray.Dataset = xr.Dataset(variables, coordinates, texts)
     return made
 
 

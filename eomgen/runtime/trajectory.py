@@ -102,7 +102,7 @@ class Trajectory:
     ) -> None:
         self.t, self.x, self.names = t, x, columns.names
         self.columns = columns  #: where the columns come from: the module's calls, or the arrays of a file
-        self._told, self._described = header, described
+        self._shared_header, self._described = header, described
         self._times, self._states, self._sample, self._again = t_events, x_events, sample, again
 
     @classmethod
@@ -112,7 +112,9 @@ class Trajectory:
         vars(run).update(zip(cls.BESIDES, besides, strict=True))
         return run
 
-    _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
+    _header = cached_property[dict[str, Any]](
+        lambda self: self._shared_header() if callable(self._shared_header) else self._shared_header
+    )
     units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
     t_events = cached_property[Named](lambda self: Named.of(self._times, self._header | self._described()))
     x_events = cached_property[Named](lambda self: Named.of(self._states, self._header | self._described()))
@@ -293,8 +295,8 @@ class Trajectory:
         columns: Any = self.columns
         if not hasattr(type(columns), "change_points"):
             raise cannot("change points need the model: use the trajectory of simulate, not one read from a file")
-        found: list[ChangePoint] = columns.change_points
-        return found
+        result: list[ChangePoint] = columns.change_points
+        return result
 
     @property
     def energy_drift(self) -> float:
@@ -480,9 +482,9 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except FileNotFoundError:
         raise
     except BROKEN as error:
-        told = f"a {source.suffix} is for other programs; load the .npz of the run"
-        told = told if source.suffix in RUNS[1:] else str(error)
-        raise bad_data(f"{source} is not a trajectory saved by eomgen: {told}") from None
+        message = f"a {source.suffix} is for other programs; load the .npz of the run"
+        message = message if source.suffix in RUNS[1:] else str(error)
+        raise bad_data(f"{source} is not a trajectory saved by eomgen: {message}") from None
     return Trajectory(t, x, columns, header, t_events, x_events)
 
 
@@ -495,10 +497,10 @@ Span: TypeAlias = float | str | Sequence[float | str] | None
 Start: TypeAlias = Mapping[str, float | str] | ArrayLike | Trajectory | None
 
 
-def last_state(given: Any, names: Sequence[str]) -> Any:
+def last_state(raw: Any, names: Sequence[str]) -> Any:
     """The last state (n_x,) of a run; anything else as it is."""
-    if not isinstance(given, Trajectory):
-        return given
-    if tuple(given.x_names) != tuple(names):
-        raise ill_shaped(f"initial: the run has states {', '.join(given.x_names)}; the model has {', '.join(names)}")
-    return given.x[:, -1]
+    if not isinstance(raw, Trajectory):
+        return raw
+    if tuple(raw.x_names) != tuple(names):
+        raise ill_shaped(f"initial: the run has states {', '.join(raw.x_names)}; the model has {', '.join(names)}")
+    return raw.x[:, -1]

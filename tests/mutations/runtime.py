@@ -56,7 +56,7 @@ FAULTS = (
     ),
     Fault(
         "event-direction-scipy", "RunEvent.__init__",
-        "int(np.sign(given))",
+        "int(np.sign(raw))",
         "0",
         "the direction of an event is ignored",
         "tests/runs/test_events.py::test_texts_functions_and_mappings[DOP853-numpy]",

@@ -72,7 +72,7 @@ class Device(Protocol):
     def get(self, array: DeviceArray) -> Array:
         """A copy on the host."""
 
-    def view(self, given: Any) -> DeviceArray | None:
+    def view(self, raw: Any) -> DeviceArray | None:
         """An array of another library without a copy; None if it does not lie on this device."""
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
@@ -115,7 +115,7 @@ def compile_with_log(
     program = _done(nvrtc, nvrtc.nvrtcCreateProgram(text.encode(), b"model.cu", 0, [], []))
     try:
         (status,) = nvrtc.nvrtcCompileProgram(program, len(flags), [flag.encode() for flag in flags])
-        log = _room(_done(nvrtc, nvrtc.nvrtcGetProgramLogSize(program)))
+        log = _buffer(_done(nvrtc, nvrtc.nvrtcGetProgramLogSize(program)))
         _done(nvrtc, nvrtc.nvrtcGetProgramLog(program, log))
         said = log.decode(errors="replace").strip("\0 \n")
         if int(status) != 0:
@@ -126,7 +126,7 @@ def compile_with_log(
             else (nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX)
         )
         length = _done(nvrtc, sizes(program))
-        code = _room(length)
+        code = _buffer(length)
         _done(nvrtc, gets(program, code))
         return code[:length], said
     finally:
@@ -154,7 +154,7 @@ def load_nvrtc() -> Any:
     return nvrtc
 
 
-def _room(length: int) -> bytes:
+def _buffer(length: int) -> bytes:
     """Bytes that NVRTC writes into.  Python has each single byte only once, for everybody: so never one alone."""
     return bytes(length + 1)
 
@@ -212,37 +212,37 @@ class CudaDevice:
     def put(self, array: Array) -> DeviceArray:
         """A copy of an array of the host."""
         source = np.ascontiguousarray(array)
-        found = self.empty(source.shape, source.dtype)
+        result = self.empty(source.shape, source.dtype)
         if source.nbytes:
-            self._buffer(found).copy_from(self._host(source), stream=self.stream)
+            self._buffer(result).copy_from(self._host(source), stream=self.stream)
             self.stream.sync()  # the array may change afterwards
-        return found
+        return result
 
     def get(self, array: DeviceArray) -> Array:
         """A copy on the host."""
-        found = np.empty(array.shape, array.dtype)
-        if found.nbytes:
-            self._host(found).copy_from(self._buffer(array), stream=self.stream)
+        result = np.empty(array.shape, array.dtype)
+        if result.nbytes:
+            self._host(result).copy_from(self._buffer(array), stream=self.stream)
         self.stream.sync()
-        return found
+        return result
 
-    def view(self, given: Any) -> DeviceArray | None:
+    def view(self, raw: Any) -> DeviceArray | None:
         """An array of another library that lies on this GPU."""
-        if isinstance(given, DeviceArray):
-            return given
-        told = getattr(given, "__cuda_array_interface__", None)
-        if told is not None:
-            pointer, shape = read_interface(told)
-            if told.get("stream") not in (None, 1):
+        if isinstance(raw, DeviceArray):
+            return raw
+        interface = getattr(raw, "__cuda_array_interface__", None)
+        if interface is not None:
+            pointer, shape = read_interface(interface)
+            if interface.get("stream") not in (None, 1):
                 self.device.sync()  # until what the other library has under way is done
-            return DeviceArray(self, pointer, shape, np.float64, given)
-        if not hasattr(given, "__dlpack_device__") or given.__dlpack_device__()[0] == HOST:
+            return DeviceArray(self, pointer, shape, np.float64, raw)
+        if not hasattr(raw, "__dlpack_device__") or raw.__dlpack_device__()[0] == HOST:
             return None
         from cuda.core.utils import StridedMemoryView
 
-        found = StridedMemoryView.from_any_interface(given, stream_ptr=int(self.stream.handle))
-        require_plain(found.shape, found.dtype, found.strides)
-        return DeviceArray(self, int(found.ptr), found.shape, np.float64, (given, found))
+        result = StridedMemoryView.from_any_interface(raw, stream_ptr=int(self.stream.handle))
+        require_plain(result.shape, result.dtype, result.strides)
+        return DeviceArray(self, int(result.ptr), result.shape, np.float64, (raw, result))
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
         """A kernel as ``launch(count, *arguments)``; texts are compiled once."""
@@ -274,7 +274,7 @@ def choose_threads(count: int, processors: int) -> int:
     return int(min(MOST, WARP * max(1, warps // (4 * processors))))
 
 
-def read_interface(told: Mapping[str, Any]) -> tuple[int, tuple[int, ...]]:
+def read_interface(interface: Mapping[str, Any]) -> tuple[int, tuple[int, ...]]:
     """Pointer and shape of a ``__cuda_array_interface__``.
 
     Raises
@@ -282,10 +282,10 @@ def read_interface(told: Mapping[str, Any]) -> tuple[int, tuple[int, ...]]:
     UsageError
         See :func:`require_plain`.
     """
-    shape, dtype = tuple(told["shape"]), np.dtype(told["typestr"])
-    strides = told.get("strides")
+    shape, dtype = tuple(interface["shape"]), np.dtype(interface["typestr"])
+    strides = interface.get("strides")
     require_plain(shape, dtype, None if strides is None else [step // dtype.itemsize for step in strides])
-    return int(told["data"][0]), shape
+    return int(interface["data"][0]), shape
 
 
 def require_plain(shape: Sequence[int], dtype: Any, strides: Sequence[int] | None) -> None:

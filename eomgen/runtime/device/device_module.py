@@ -70,41 +70,41 @@ class DeviceFunctions:
             self._kernels[name] = self.device.kernel(self.text, f"{self.name}_{name}", macros)
         return self._kernels[name]
 
-    def columns(self, label: str, given: Any, length: int, count: int | None = None) -> tuple[DeviceArray, int | None]:
+    def columns(self, label: str, raw: Any, length: int, count: int | None = None) -> tuple[DeviceArray, int | None]:
         """Numbers (length,) or (length, k) on the device, and k, or None where they are one column."""
-        found: DeviceArray | Array | None = self.device.view(given)
-        if found is None:
+        result: DeviceArray | Array | None = self.device.view(raw)
+        if result is None:
             try:
-                found = np.asarray(given, dtype=float)
+                result = np.asarray(raw, dtype=float)
             except (TypeError, ValueError):
-                raise ill_typed(f"{label} must be an array of numbers, not {type(given).__name__}") from None
-        shape = tuple(found.shape)
+                raise ill_typed(f"{label} must be an array of numbers, not {type(raw).__name__}") from None
+        shape = tuple(result.shape)
         if len(shape) not in (1, 2) or shape[0] != length or (len(shape) == 2 and count not in (None, 1, shape[1])):
             wanted = f"({length},) or ({length}, {'k' if count in (None, 1) else count})"
             raise ill_shaped(f"{label} must have shape {wanted}, not {shape}")
-        on_device = found if isinstance(found, DeviceArray) else self.device.put(found)
+        on_device = result if isinstance(result, DeviceArray) else self.device.put(result)
         return on_device, shape[1] if len(shape) == 2 else None
 
-    def kept(self, label: str, given: Array) -> DeviceArray:
+    def kept(self, label: str, raw: Array) -> DeviceArray:
         """Numbers on the device; those of the last call where they are the same."""
-        told, found = self._there.get(label, (None, None))
-        if found is None or told != given.tobytes():
-            found = self.device.put(given)
-            self._there[label] = (given.tobytes(), found)
-        return found
+        signature, result = self._there.get(label, (None, None))
+        if result is None or signature != raw.tobytes():
+            result = self.device.put(raw)
+            self._there[label] = (raw.tobytes(), result)
+        return result
 
     def constants(self, p: Any, count: int) -> tuple[DeviceArray, bool]:
         """What kernels take in place of parameters, and whether each state has its own."""
         if p is None and self._constants is not None:
             return self._constants, False
-        given, each = self.columns("p", self.p if p is None else p, self.n_p, count)
+        raw, each = self.columns("p", self.p if p is None else p, self.n_p, count)
         columns = 1 if each is None else each
-        found = self.device.empty((self.facts["n_const"], columns), np.float64)
+        result = self.device.empty((self.facts["n_const"], columns), np.float64)
         if columns:
-            self.kernel("constants")(columns, given, found)
+            self.kernel("constants")(columns, raw, result)
         if p is None:
-            self._constants = found
-        return found, each is not None
+            self._constants = result
+        return result, each is not None
 
 
 class BatchCall:
@@ -117,16 +117,16 @@ class BatchCall:
         labels = [port for port, _ in ports]
         self.labels = ["t", *labels, "p", "u"] if name in TIMED_ON_DEVICE else [*labels, "p", "u", "t"]
 
-    def __call__(self, *given: Any, status: bool = False, **named: Any) -> Any:
+    def __call__(self, *raw: Any, status: bool = False, **named: Any) -> Any:
         """Evaluate at one state or many."""
         module, device = self.module, self.module.device
-        values = self._values(given, named)
-        found, count, batch = [], 1, False
+        values = self._values(raw, named)
+        collected, count, batch = [], 1, False
         for port, length in self.ports:
             array, each = module.columns(port, values[port], length, count if batch else None)
-            found.append((array, each))
+            collected.append((array, each))
             count, batch = (count, batch) if each is None else (each, True)
-        if any((1 if each is None else each) != count for _, each in found):
+        if any((1 if each is None else each) != count for _, each in collected):
             raise ill_shaped(f"{' and '.join(port for port, _ in self.ports)} must have the same number of columns")
         t, each_t = self._times(values["t"], count)
         given_u = module.kept("u", module.u) if values["u"] is None else values["u"]
@@ -139,7 +139,7 @@ class BatchCall:
         launch = module.kernel(f"{self.name}_batch", self.name)
         flags = [np.int64(each) for each in (each_t, each_u is not None, each_c)]
         if count:
-            launch(count, t, flags[0], *(array for array, _ in found), u, flags[1], c, flags[2], result, codes)
+            launch(count, t, flags[0], *(array for array, _ in collected), u, flags[1], c, flags[2], result, codes)
         shape = (*self.shape, count) if batch else self.shape
         on_device = any(device.view(values[port]) is not None for port, _ in self.ports)
         results = result.reshaped(shape) if on_device else result.numpy().reshape(shape)
@@ -148,21 +148,21 @@ class BatchCall:
         codes = codes.reshaped((count,) if batch else ())
         return results, codes if on_device else codes.numpy()
 
-    def _values(self, given: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
+    def _values(self, raw: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
         unknown = [name for name in named if name not in self.labels]
-        twice = [name for name in self.labels[: len(given)] if name in named]
-        if unknown or twice or len(given) > len(self.labels):
+        twice = [name for name in self.labels[: len(raw)] if name in named]
+        if unknown or twice or len(raw) > len(self.labels):
             raise no_such(f"{self.name} takes {', '.join(self.labels)} and status, each once")
-        values = {"t": 0.0, "p": None, "u": None, **dict(zip(self.labels, given, strict=False)), **named}
+        values = {"t": 0.0, "p": None, "u": None, **dict(zip(self.labels, raw, strict=False)), **named}
         missing = [name for name in self.labels if name not in values]
         if missing:
             raise incomplete(f"{self.name} needs {', '.join(missing)}")
         return values
 
-    def _times(self, given: Any, count: int) -> tuple[DeviceArray, bool]:
-        there = self.module.device.view(given)
+    def _times(self, raw: Any, count: int) -> tuple[DeviceArray, bool]:
+        there = self.module.device.view(raw)
         if there is None:
-            array = np.asarray(given, dtype=float)
+            array = np.asarray(raw, dtype=float)
             there = self.module.kept("t", array) if array.ndim == 0 else self.module.device.put(array)
         if there.shape not in ((), (1,), (count,)):
             raise ill_shaped(f"t must be a number or of shape ({count},), not {there.shape}")
@@ -233,21 +233,21 @@ def carry_out(
         device.put(times), np.int64(len(times)), *(made[name] for name in results),
         *((made["notes"], np.int64(kept), made["noted"]) if events else ()),
     )  # fmt: skip
-    found = {name: made[name].numpy() for name in shapes if name != "times"}
-    steps, rejected, evaluations = found["counts"]
-    x = _projected(module, found["x"], found["t"], p, u)
+    result = {name: made[name].numpy() for name in shapes if name != "times"}
+    steps, rejected, evaluations = result["counts"]
+    x = _projected(module, result["x"], result["t"], p, u)
     samples = None
     if t_eval is not None:
-        samples = np.ascontiguousarray(found["samples"].transpose(2, 1, 0))
+        samples = np.ascontiguousarray(result["samples"].transpose(2, 1, 0))
         every = np.broadcast_to(times[:, None], samples.shape[1:])
         samples = _projected(module, samples, every, p, u)
     notes = None
     if events:
-        notes = np.ascontiguousarray(found["notes"].transpose(2, 1, 0))
+        notes = np.ascontiguousarray(result["notes"].transpose(2, 1, 0))
         notes[2:] = _projected(module, notes[2:], notes[1], p, u)
     return RunBlock(
-        x, found["t"], samples, found["status"], found["failure"], found["failure_time"], steps, rejected,
-        evaluations, found["noted"] if events else np.zeros(count, dtype=np.int64), notes,
+        x, result["t"], samples, result["status"], result["failure"], result["failure_time"], steps, rejected,
+        evaluations, result["noted"] if events else np.zeros(count, dtype=np.int64), notes,
     )  # fmt: skip
 
 
@@ -256,15 +256,15 @@ def _projected(module: DeviceFunctions, x: Array, t: Array, p: Any, u: Any) -> A
     if "project" not in module.facts["kernels"] or not x.size:
         return x
     flat = np.ascontiguousarray(x.reshape(x.shape[0], -1))
-    repeated = [None if given is None else _repeated(module, given, flat.shape[1] // x.shape[-1]) for given in (p, u)]
-    found = module.call("project")(flat, *repeated, t=np.ascontiguousarray(t).ravel())
-    return np.asarray(found).reshape(x.shape)
+    repeated = [None if raw is None else _repeated(module, raw, flat.shape[1] // x.shape[-1]) for raw in (p, u)]
+    result = module.call("project")(flat, *repeated, t=np.ascontiguousarray(t).ravel())
+    return np.asarray(result).reshape(x.shape)
 
 
-def _repeated(module: DeviceFunctions, given: Any, times: int) -> Any:
+def _repeated(module: DeviceFunctions, raw: Any, times: int) -> Any:
     """Parameters of k runs for as many states of each."""
-    there = module.device.view(given)
-    array = np.asarray(given, dtype=float) if there is None else there.numpy()
+    there = module.device.view(raw)
+    array = np.asarray(raw, dtype=float) if there is None else there.numpy()
     return np.tile(array, (1, times)) if array.ndim == 2 else array
 
 

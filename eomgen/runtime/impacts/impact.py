@@ -137,16 +137,16 @@ class Gaps:
 def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     """The rate of an input that varies, by its place in u."""
     name, value = forcing.names[index], forcing.formulas.get(index, forcing.varying[index])
-    words = f"input {name} depends on the state, and so does its rate, which an impact changes"
+    message = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
-        raise cannot(words)
+        raise cannot(message)
     known = value.rate if isinstance(value, Expression) else getattr(value, "derivative", lambda: None)()
     if known is not None:
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
         rate = rate.function(forcing.parameters) if isinstance(rate, Expression) else rate
         return float(rate(t, x) if callable(rate) else rate)
     if any(forcing(t, x + move)[index] != forcing(t, x)[index] for move in ELSEWHERE * np.eye(len(x))):
-        raise cannot(words)
+        raise cannot(message)
     return float(drift(lambda time: forcing(time, x)[[index]], t)[0])
 
 
@@ -280,15 +280,15 @@ def describe_negative_gaps(
     """Says which gaps of a model's events are negative where a run begins, where bodies go on through each other."""
     values = module.kernels.kernel("events", nan=True)(t, x, u=forcing(t, x) if forcing else None)
     limit = BEYOND * max(1.0, module.layout.length)
-    found = [
+    result = [
         f"{event['name']} is {value:.6g}"
         for event, value in zip(events, values.tolist(), strict=True)
         if event.get("restitution") is not None and value < -limit
     ]
-    if not found:
+    if not result:
         return ""
     return (
-        f"the gap of event {', '.join(found)} at the start: an impact comes where it falls to 0 from above, so until "
+        f"the gap of event {', '.join(result)} at the start: an impact comes where it falls to 0 from above, so until "
         "it has been positive the bodies move through each other; give a start where the gap is open"
     )
 

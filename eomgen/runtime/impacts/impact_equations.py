@@ -98,8 +98,8 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
             break
         wanted = _need(now, e, floor) if k else wanted
         involved = live & (now <= floor)
-        found = _least_change(free[:, involved], wanted[involved]) if k < ROUNDS else None
-        if found is None:  # what is left after ever smaller impacts at one instant is plastic
+        result = _least_change(free[:, involved], wanted[involved]) if k < ROUNDS else None
+        if result is None:  # what is left after ever smaller impacts at one instant is plastic
             if k == 0 or -now.min() > ENDLESS * fastest:
                 jammed = ", ".join(str(name) for name, one in zip(names, involved, strict=False) if one)
                 raise untrue(
@@ -107,8 +107,8 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
                     "solution; give them restitution 0"
                 )
             involved, wanted, k = live, -now, ROUNDS
-            found = _least_change(free[:, involved], wanted[involved])
-        z, g = found or (np.zeros(len(H)), np.zeros(int(involved.sum())))
+            result = _least_change(free[:, involved], wanted[involved])
+        z, g = result or (np.zeros(len(H)), np.zeros(int(involved.sum())))
         impulses[involved] += g
         change = change + z
         now = rates[:count] + gaps.T @ change
@@ -194,13 +194,13 @@ def impulses_in_space(W: Array, c: Array, mu: float, tolerance: float) -> Array 
 
     Of several those that take most energy from the velocities c (3,), which they change by W (3, 3).
     """
-    found = [-algebra.lstsq(W, c)]
+    result = [-algebra.lstsq(W, c)]
     for a in _angles(W, c, mu).tolist():
         w = np.array([1.0, -mu * np.cos(a), -mu * np.sin(a)])
         gives = float(W[0] @ w)
         if gives * -c[0] > 0.0:
-            found.append(-c[0] / gives * w)
-    fit = [P for P in found if _residual(W, c, mu, P) <= tolerance]
+            result.append(-c[0] / gives * w)
+    fit = [P for P in result if _residual(W, c, mu, P) <= tolerance]
     return min(fit, key=lambda P: float(P @ (c + 0.5 * W @ P))) if fit else None
 
 
@@ -272,18 +272,18 @@ def strike(
     W = H[:, used].T @ H[:, used]
     rough = sorted(i for group in _coupled(W, k, owner) if np.isin(owner, group).any() for i in group)
     smooth = [i for i in range(k) if i not in rough]
-    found, change = np.zeros(len(rates)), np.zeros(len(H))
+    result, change = np.zeros(len(rates)), np.zeros(len(H))
     if smooth:
         named = [names[i] for i in smooth]
-        found[smooth], change = collide(H[:, smooth], rates[smooth], e[smooth], rest[smooth], named)
+        result[smooth], change = collide(H[:, smooth], rates[smooth], e[smooth], rest[smooth], named)
     if rough:
         of = np.flatnonzero(np.isin(owner, rough))
         places = [*rough, *(k + of).tolist()]
         every = [used[i] for i in places]
-        given = rates[every], e[rough], rest[every], mu[rough], np.searchsorted(rough, owner[of])
-        found[every] = strike_rough(solve, W[np.ix_(places, places)], *given, [names[i] for i in rough])
-        change = change + H[:, every] @ found[every]
-    return found, change
+        raw = rates[every], e[rough], rest[every], mu[rough], np.searchsorted(rough, owner[of])
+        result[every] = strike_rough(solve, W[np.ix_(places, places)], *raw, [names[i] for i in rough])
+        change = change + H[:, every] @ result[every]
+    return result, change
 
 
 def strike_rough(
@@ -299,7 +299,7 @@ def strike_rough(
     """
     k = len(e)
     rates = np.where(np.abs(rates) <= rest, 0.0, rates)
-    found = np.zeros(len(rates))
+    result = np.zeros(len(rates))
     for group in _coupled(W, k, owner):
         if not (rates[group] < 0.0).any():
             continue
@@ -307,10 +307,10 @@ def strike_rough(
         every = [j for own in places for j in own]
         if len(group) == 1 and len(every) <= 2:
             i = group[0]
-            found[every] = _in_the_plane(W[np.ix_(every, every)], rates[every], rest[i], mu[i], e[i], names[i])
+            result[every] = _in_the_plane(W[np.ix_(every, every)], rates[every], rest[i], mu[i], e[i], names[i])
         else:
-            found[every] = _together(solve, W, rates, places, mu[group], e[group], [names[i] for i in group])
-    return found
+            result[every] = _together(solve, W, rates, places, mu[group], e[group], [names[i] for i in group])
+    return result
 
 
 def _coupled(W: Array, k: int, owner: NDArray[np.int64]) -> list[list[int]]:

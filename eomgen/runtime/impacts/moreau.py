@@ -112,8 +112,8 @@ class ColumnsWithForces(Columns):
         if name not in self._own:
             return super().__getitem__(name)
         what, contacts = self._own[name]
-        found: Array = getattr(self.forces, what)(contacts)
-        return found
+        result: Array = getattr(self.forces, what)(contacts)
+        return result
 
 
 # -- mean forces -------------------------------------------------------------------------------------------------------
@@ -203,15 +203,15 @@ class ContactForces:
         mine = np.array([one == body for one in self._bodies])
         if contacts is not None:
             mine &= np.array([name == contacts for name, _ in self._shapes])
-        found = np.zeros((6, len(kept)))
+        result = np.zeros((6, len(kept)))
         for k, rows in enumerate(kept):
             first, second = rows[:, 0].astype(int), rows[:, 1].astype(int)
             force = forces_on_second(rows)
             part = (mine[second] * 1.0 - mine[first] * 1.0)[:, None] * np.concatenate(
                 [force, np.cross(rows[:, 8:11], force)], axis=1
             )
-            found[:, k] = part.sum(axis=0)
-        return found[:, self._steps] if len(kept) else np.zeros((6, len(self.t)))
+            result[:, k] = part.sum(axis=0)
+        return result[:, self._steps] if len(kept) else np.zeros((6, len(self.t)))
 
     def at(self, t: float) -> list[ContactForce]:
         """All contacts of the step that ends at a time, or has it within.
@@ -225,14 +225,14 @@ class ContactForces:
         if not len(kept) or not self.t[0] <= time <= self._ends[-1]:
             raise off_range(f"t must be a time of the run, from {self.t[0]:.6g} to {self.t[-1]:.6g} s, not {time:.6g}")
         rows = kept[min(int(np.searchsorted(self._ends, time)), len(kept) - 1)]
-        found = []
+        result = []
         for row, force in zip(rows, forces_on_second(rows), strict=True):
             first, second = int(row[0]), int(row[1])
             (name, one), (_, other) = self._shapes[first], self._shapes[second]
             ends = self._bodies[first], self._bodies[second]
             across = float(np.hypot(row[12], row[13]))
-            found.append(ContactForce(name, one, other, *ends, row[8:11], row[2:5], force, float(row[11]), across))
-        return found
+            result.append(ContactForce(name, one, other, *ends, row[8:11], row[2:5], force, float(row[11]), across))
+        return result
 
     def _single(self) -> Sequence[Array]:
         if self._kept is None:
@@ -422,18 +422,18 @@ def step_rigidly(
 ) -> RigidRun:
     """The motion of a mechanism whose contacts between groups are rigid."""
     _require_it(module, method)
-    given = {key: value for key, value in options.items() if value is not None and value is not False}
-    check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))
+    raw = {key: value for key, value in options.items() if value is not None and value is not False}
+    check_names("option of method moreau", raw, OWN, ("method", "step", "t_eval", "progress"))
     if step is None:
         raise incomplete("method moreau needs step=, the size of its steps (s), for example step=1e-3")
     h = check_step("step", step)
-    tolerance = read_number("contact_tolerance", given.get("contact_tolerance", SOLVED))
+    tolerance = read_number("contact_tolerance", raw.get("contact_tolerance", SOLVED))
     if not tolerance > 0.0:
         raise off_range(f"contact_tolerance must be greater than 0, not {tolerance:.6g}")
-    iterations = as_count(given.get("contact_iterations", ITERATIONS))
+    iterations = as_count(raw.get("contact_iterations", ITERATIONS))
     if iterations is None or iterations < 1:
-        raise off_range(f"contact_iterations must be a whole number from 1, not {given['contact_iterations']}")
-    keep = given.get("contact_forces", False)
+        raise off_range(f"contact_iterations must be a whole number from 1, not {raw['contact_iterations']}")
+    keep = raw.get("contact_forces", False)
     if keep is not True and keep is not False:
         raise ill_typed(f"contact_forces must be True or False, not {shown(keep)}")
     bound, forcing, start, end = set_up(module, span, parameters, inputs)
@@ -446,10 +446,10 @@ def step_rigidly(
     require_size("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
     x = np.array(find_state(bound, initial, start, forcing))
     steps = RigidSteps(bound, forcing, tolerance, iterations)
-    found = deep_start(bound, start, x, forcing(start, x) if forcing else None)
-    if found is not None:
+    result = deep_start(bound, start, x, forcing(start, x) if forcing else None)
+    if result is not None:
         raise untrue(
-            f"{module.name} starts with shapes inside each other; {found}. Rigid shapes cannot: change the initial "
+            f"{module.name} starts with shapes inside each other; {result}. Rigid shapes cannot: change the initial "
             "values, or put only shapes into groups that are apart"
         )
     watch = watch_run(start, end, progress)
@@ -490,13 +490,13 @@ def step_rigidly(
         )
     counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken, **met}
     ends = (start, end)
-    told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
+    stored_times, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
     dense = partial(_between, times, states)
-    solution = Solution(told, found_states, [], [], dense, 0, "The end of the span is reached.", counts, ends)
-    asked = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
-    run = record(bound, forcing, solution, NAME, asked)
+    solution = Solution(stored_times, found_states, [], [], dense, 0, "The end of the span is reached.", counts, ends)
+    settings = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
+    run = record(bound, forcing, solution, NAME, settings)
     info = module.info
-    forces = ContactForces(info.rigid_contacts, info.contact_shapes, told, times[1:], sums.sums, sums.kept)
+    forces = ContactForces(info.rigid_contacts, info.contact_shapes, stored_times, times[1:], sums.sums, sums.kept)
     return RigidRun.beside(run, forces)
 
 
@@ -527,8 +527,8 @@ def _require_it(module: BoundModel, method: Any) -> None:
     """Refuse another method for a model with rigid contacts."""
     if not isinstance(method, str) or method != NAME:
         names = module.info.rigid_only
-        told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
+        stored_times = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
         raise cannot(
             f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "
-            f"method='moreau' and step={told}, or choose another normal_law"
+            f"method='moreau' and step={stored_times}, or choose another normal_law"
         )

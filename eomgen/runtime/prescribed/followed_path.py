@@ -141,8 +141,8 @@ class DrivenCoordinates:
         n_q, n = layout.n_q, layout.n_v
         if self.direct:
             assert self._kinematics is not None
-            found = self._kinematics(np.concatenate([self.prescribed_values(q, t), y1, y2, q]), t=t)
-            return found[n_q : n_q + n], found[n_q + n :]
+            result = self._kinematics(np.concatenate([self.prescribed_values(q, t), y1, y2, q]), t=t)
+            return result[n_q : n_q + n], result[n_q + n :]
         K = self.matrix(q, t)
         v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
         a = self._some_acceleration(t, q, v)
@@ -156,9 +156,9 @@ class DrivenCoordinates:
     def motions(self, t: Array, y: Array, y1: Array, y2: Array, guesses: Array) -> tuple[Array, Array, Array]:
         """q, v, a (n, k) of many points from guesses (n_q, k); NaN where none is found.  For ``direct`` only."""
         assert self._kinematics is not None
-        found = self._kinematics(np.concatenate([y, y1, y2, guesses]), t=t)
+        result = self._kinematics(np.concatenate([y, y1, y2, guesses]), t=t)
         n_q, n = self.layout.n_q, self.layout.n_v
-        return found[:n_q], found[n_q : n_q + n], found[n_q + n :]
+        return result[:n_q], result[n_q : n_q + n], result[n_q + n :]
 
     def _some_acceleration(self, t: float, q: Array, v: Array) -> Array:
         """An acceleration that fits the constraints, whatever the led coordinates do."""
@@ -267,10 +267,10 @@ def build_interpolant(
     for part in (-2.0, -1.0, 1.0, 2.0):
         s = middle + part * reach
         guess = rough.at(s)[0] if rough.covers(s) else _guess_along(continuation, rough, s)
-        found = None if guess is None else continuation.curve.solve(s, guess)
-        if found is None:
+        result = None if guess is None else continuation.curve.solve(s, guess)
+        if result is None:
             return None
-        supports.append(found)
+        supports.append(result)
     interpolant = ChangePointInterpolant(supports, scales)
     for near in (before, after):  # one branch, or several?
         if interpolant.covers(near.s) and largest(scales.distance(interpolant.at(near.s)[0], near.q)) > ASTRAY_ACROSS:
@@ -389,10 +389,10 @@ def find_stop(path: DrivenPath, last: Point) -> Point:
 
     for h in LEAPS:
         if (end := rate(h)) < 0.0 < direction[-1]:
-            found = ahead(find_root(rate, 0.0, h, float(direction[-1]), end))
+            result = ahead(find_root(rate, 0.0, h, float(direction[-1]), end))
             length = max(abs(path.t1), largest(path.y1 / path.driven.led_scales))  # scaled, of a step of 1 in s
-            if found is not None and abs(found[0] - last.s) * length < UNJUDGED:
-                s, q, _ = found
+            if result is not None and abs(result[0] - last.s) * length < UNJUDGED:
+                s, q, _ = result
                 return Point(s, q, path.tangent(s, q))
     return last
 
@@ -414,11 +414,11 @@ def find_change_points(
             here = find_singular(continuation, before, points[k + 2])
         if here is not None:
             crossings.append(here)
-    found = []
+    result = []
     for interpolant, middle in crossings:
         q = interpolant.at(middle)[0]
-        found.append(name_singular(path.driven, "change point", path.at(middle)[0], q, path.tangent(middle, q)))
-    return crossings, found
+        result.append(name_singular(path.driven, "change point", path.at(middle)[0], q, path.tangent(middle, q)))
+    return crossings, result
 
 
 def _dips(points: Sequence[Point]) -> bool:
@@ -502,8 +502,8 @@ class FollowedPath:
                     odd |= (interpolant.supports[1].s < s) & (s < interpolant.supports[2].s)
                 odd |= s >= self._edge
         for j in np.flatnonzero(odd):
-            found = q[:, j], v[:, j], a[:, j]
-            q[:, j], v[:, j], a[:, j] = self._one(float(s[j]), guesses[:, j], y1[:, j], y2[:, j], found)
+            result = q[:, j], v[:, j], a[:, j]
+            q[:, j], v[:, j], a[:, j] = self._one(float(s[j]), guesses[:, j], y1[:, j], y2[:, j], result)
         return q, v, a
 
     @property
@@ -524,9 +524,9 @@ class FollowedPath:
         return points[k - 1], points[k]
 
     def _one(
-        self, s: float, guess: Array, y1: Array, y2: Array, found: tuple[Array, Array, Array]
+        self, s: float, guess: Array, y1: Array, y2: Array, result: tuple[Array, Array, Array]
     ) -> tuple[Array, Array, Array]:
-        """The motion at one parameter; ``found`` is that of the compiled kernel, if it leads the same coordinates."""
+        """The motion at one parameter; ``result`` is that of the compiled kernel, if it leads the same coordinates."""
         driven, scales = self.driven, self.driven.scales
         if self.stop is not None and s >= self._edge:
             nothing = np.full(len(scales.q), np.nan)
@@ -535,7 +535,7 @@ class FollowedPath:
         interpolant = next((b for b, _ in self.interpolants if b.supports[1].s < s < b.supports[2].s), None)
         if interpolant is not None and driven.tangent(t, interpolant.at(s)[0], 0.0, self.path.y1).quality < POOR:
             return self._interpolated(interpolant, s, y1, y2)
-        q, v, a = found
+        q, v, a = result
         if not driven.direct or not np.isfinite(q).all() or largest(scales.distance(q, guess)) > ASTRAY:
             q = self._closer(s, guess)
             v, a = driven.motion(t, q, y1, y2)
@@ -544,9 +544,9 @@ class FollowedPath:
     def _closer(self, s: float, guess: Array) -> Array:
         """The position next to a guess, followed to from the nearest point if Newton's iteration goes astray."""
         driven, scales = self.driven, self.driven.scales
-        found = driven.position(*self.path.at(s), guess)
-        if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
-            return found
+        result = driven.position(*self.path.at(s), guess)
+        if result is not None and largest(scales.distance(result, guess)) <= ASTRAY:
+            return result
         before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
         t, y = self.path.at(before.s)
         short = DrivenContinuation(self.path._replace(t=t, y=y), before.q)

@@ -132,7 +132,7 @@ class KinematicAnalysis(Trajectory):
             raise cannot(f"{name!r} has no rate among the columns")
         if len(self.t) < 2 or not np.diff(self.t).any():
             raise cannot("the time is constant in this range, so there are no rates; give t together with the values")
-        y, rate, found = self[name], self[name + "_dot"], []
+        y, rate, result = self[name], self[name + "_dot"], []
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):
             h = self.t[k + 1] - self.t[k]  # 0 where a time stands twice
             d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
@@ -143,8 +143,8 @@ class KinematicAnalysis(Trajectory):
             ]
             if inside:
                 x = min(inside, key=lambda r: abs(r - d0 / (d0 - d1)) if d0 != d1 else r)
-                found.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))
-        return list(dict.fromkeys(found))
+                result.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))
+        return list(dict.fromkeys(result))
 
     def __repr__(self) -> str:
         over = (
@@ -162,7 +162,7 @@ def keep(
     driven: DrivenCoordinates,
     t: Array,
     parts: Sequence[tuple[Array, Array, Array]],
-    found: Sequence[Singular],
+    result: Sequence[Singular],
     stop: Singular | None,
     asked: int,
     led: tuple[str, ...],
@@ -185,10 +185,10 @@ def keep(
     columns = MotionColumns(module, t, x, u, a, passed)
     span = [float(t[0]), float(t[-1])] if t.size else []
     status, message = (0, "the whole range") if stop is None else (-1, f"{len(t)} of {asked} points: {stop}")
-    more = {"led": list(led), "singular": [str(s) for s in found]}
+    more = {"led": list(led), "singular": [str(s) for s in result]}
     known = header_of(module.layout, METHOD, {}, (), residuals(module, t, x), status, message, more, span)
     complete = {**describe(module), **known, **(header or {})}
-    return KinematicAnalysis.of((t, x, columns, complete, *rest), a, list(found), stop, led)
+    return KinematicAnalysis.of((t, x, columns, complete, *rest), a, list(result), stop, led)
 
 
 def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
@@ -254,10 +254,10 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
             return t0, Initial(module.kernels, t0).assembled({})
     here = Initial(module.kernels, t0)
     if isinstance(initial, Mapping):
-        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
-        if given.rates:
-            raise ill_placed(f"initial takes positions only, not {', '.join(given.rates)}")
-        return t0, here.assembled(given.positions)
+        raw = here.sort({name: read_number(name, value) for name, value in initial.items()})
+        if raw.rates:
+            raise ill_placed(f"initial takes positions only, not {', '.join(raw.rates)}")
+        return t0, here.assembled(raw.positions)
     q = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if q.shape == (layout.n_x,):
         q = q[: layout.n_q]
@@ -379,15 +379,15 @@ def follow_drivers(
                 "too to integrate it"
             )
     motion = _follow(bound, initial, forcing, start, end)
-    found, _, raised = integrate(
+    result, _, raised = integrate(
         bound, forcing, [start, end], motion.state(start), partial(_Steps, motion), stored, False, {}, watched,
         rates=motion.rates,
     )  # fmt: skip
     if raised is not None:
         raise raised
-    ends = [start, float(found.t[-1]) if found.t.size else start]
-    header = {"status": found.status, "message": found.message, "span": ends, "event_names": list(watched.names)}
-    return motion.keep(found.t, found.t_events, found.x_events, header)
+    ends = [start, float(result.t[-1]) if result.t.size else start]
+    header = {"status": result.status, "message": result.message, "span": ends, "event_names": list(watched.names)}
+    return motion.keep(result.t, result.t_events, result.x_events, header)
 
 
 def _moved_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:

@@ -45,14 +45,14 @@ EVERY = 0.2  #: seconds between updates
 STRIDE = 64  #: calls between looks at the clock
 
 
-_asked: list[Any] = [None, False]  #: stderr at the last run, and whether it is a terminal
+_terminal: list[Any] = [None, False]  #: stderr at the last run, and whether it is a terminal
 
 
 class Progress:
-    """Shows how far a run has come in simulated time, in ``words``, once it has taken ``patience`` seconds."""
+    """Shows how far a run has come in simulated time, in ``form``, once it has taken ``patience`` seconds."""
 
-    def __init__(self, start: float, end: float, patience: float = PATIENCE, words: str = "t = {:.4g} s") -> None:
-        self.words = words
+    def __init__(self, start: float, end: float, patience: float = PATIENCE, form: str = "t = {:.4g} s") -> None:
+        self.form = form
         self.start, self.length = start, end - start
         self.next = perf_counter() + patience
         self.calls = 0
@@ -77,12 +77,12 @@ class Progress:
         if self.bar is None and self.page is None and not self.plain:
             self._open()
         if self.plain:
-            sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  {self.words.format(t)} ")
+            sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  {self.form.format(t)} ")
             sys.stderr.flush()
         elif self.page is not None:
-            self.page.update(_Bar(part, self.words.format(t)))
+            self.page.update(_Bar(part, self.form.format(t)))
         else:
-            self.bar.update(self.task, completed=part, description=self.words.format(t))
+            self.bar.update(self.task, completed=part, description=self.form.format(t))
 
     def close(self) -> None:
         """Clean up."""
@@ -126,16 +126,16 @@ def waiting(what: str) -> Iterator[None]:
 class _Bar:
     """A bar as notebooks show it; nothing without a part."""
 
-    def __init__(self, part: float | None, words: str) -> None:
-        self.part, self.words = part, words
+    def __init__(self, part: float | None, form: str) -> None:
+        self.part, self.form = part, form
 
     def __repr__(self) -> str:
-        return "" if self.part is None else f"simulating: {100 * self.part:3.0f} %  {self.words}"
+        return "" if self.part is None else f"simulating: {100 * self.part:3.0f} %  {self.form}"
 
     def _repr_html_(self) -> str:
         if self.part is None:
             return ""
-        return f"simulating <progress value='{self.part:.4f}' max='1'></progress> {100 * self.part:.0f} % {self.words}"
+        return f"simulating <progress value='{self.part:.4f}' max='1'></progress> {100 * self.part:.0f} % {self.form}"
 
 
 def in_notebook() -> bool:
@@ -151,9 +151,9 @@ def wanted(progress: bool | None) -> bool:
     """Whether to watch a run: as asked, or when stderr is a terminal or this is a notebook."""
     if progress is not None:
         return read_flag("progress", progress)
-    if _asked[0] is not sys.stderr:  # to ask takes as long as the start of a short run
-        _asked[:] = sys.stderr, sys.stderr.isatty()
-    return _asked[1] or in_notebook()
+    if _terminal[0] is not sys.stderr:  # to ask takes as long as the start of a short run
+        _terminal[:] = sys.stderr, sys.stderr.isatty()
+    return _terminal[1] or in_notebook()
 
 
 # -- steps that lead nowhere -------------------------------------------------------------------------------------------
@@ -283,7 +283,7 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
     The changes tried are no less than the absolute tolerance, nor than the motion of ten steps.
     """
     t, x = crawl.t, crawl.x
-    found, words = 0.0, ""
+    result, form = 0.0, ""
     sizes = np.fmax(np.broadcast_to(atol, x.shape), 10.0 * crawl.step * np.abs(np.array(rhs(t, x))))
     sizes = np.fmax(sizes, NOTICED * np.abs(x))
     for j, size in enumerate(sizes):
@@ -295,10 +295,10 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
             continue
         slope = change / (2 * size)
         i = int(slope.argmax())
-        if slope[i] * crawl.step > max(found * crawl.step, STEEP):
-            found = slope[i]
-            words = f"the rate of {names[i]} changes by {change[i]:.3g} where {names[j]} changes by {2 * size:.1g}"
-    return words
+        if slope[i] * crawl.step > max(result * crawl.step, STEEP):
+            result = slope[i]
+            form = f"the rate of {names[i]} changes by {change[i]:.3g} where {names[j]} changes by {2 * size:.1g}"
+    return form
 
 
 # -- the end of such a run ---------------------------------------------------------------------------------------------
@@ -349,11 +349,11 @@ class Run:
         if watch is None:
             return call
 
-        def told(t: float, x: Array) -> Array:
+        def reported(t: float, x: Array) -> Array:
             watch(t)
             return call(t, x)
 
-        return told
+        return reported
 
     def begin(self, start: float, end: float, x: Array, longest: float, kept: int) -> None:
         """Take what the check of steps that lead nowhere begins with."""
@@ -419,7 +419,7 @@ class Run:
             f"of {crawl.step:.1e} s on average it makes no progress{steep and ': '}{steep}; {REMEDY}"
         )
 
-    def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
+    def ended(self, t: float, end: float, method: str, form: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
         cause = self.cause()
         trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
@@ -429,7 +429,7 @@ class Run:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {self.forcing.lapse}")
         if cause is None:
             return SimulationError(
-                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try Radau, other "
+                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {form} Try Radau, other "
                 "tolerances, or look for a motion that grows without bound."
             )
         when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"

@@ -57,11 +57,11 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
     The span (s) is the longest first step; ``checked`` options have been checked and completed already.
     """
     check_names("option of simulate", options, OPTIONS)
-    given = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
-    limits = {"max_step": given.get("max_step", inf), "first_step": given.get("first_step", 0.0)}
+    raw = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
+    limits = {"max_step": raw.get("max_step", inf), "first_step": raw.get("first_step", 0.0)}
     atol = np.empty(n)
-    atol[:] = given["atol"]
-    return {"rtol": require_one(given["rtol"]), "atol": atol, **limits}
+    atol[:] = raw["atol"]
+    return {"rtol": require_one(raw["rtol"]), "atol": atol, **limits}
 
 
 # -- classes of solvers ------------------------------------------------------------------------------------------------

@@ -84,10 +84,10 @@ class Dae:
         """[y; y'] of all rows, the redundant ones 0."""
         result = np.zeros(2 * self._n_full + len(more))
         for start, part, label in ((0, y, "y"), (self._n_full, yp, "yp")):
-            given = read_numbers(label, part)
-            if given.shape != (self.n_y,):
-                raise ill_shaped(f"{label} must have shape ({self.n_y},), not {given.shape}")
-            result[start + self._unknowns] = given
+            raw = read_numbers(label, part)
+            if raw.shape != (self.n_y,):
+                raise ill_shaped(f"{label} must have shape ({self.n_y},), not {raw.shape}")
+            result[start + self._unknowns] = raw
         result[2 * self._n_full :] = more
         return result
 
@@ -234,16 +234,16 @@ class _Steps:
         """Take one; what is wrong where it fails."""
         self.t_old = self.t
         for _ in range(2):  # one call tells again where it was, after times before have been asked for
-            found = self.solver.step(self.t_bound, method="onestep", tstop=self.t_bound)
-            self.nfev, self.njev = int(found.nfev), int(found.njev)
-            if not found.success:
+            result = self.solver.step(self.t_bound, method="onestep", tstop=self.t_bound)
+            self.nfev, self.njev = int(result.nfev), int(result.njev)
+            if not result.success:
                 self.status = "failed"
-                return str(found.message)
-            if float(found.t) != self.t:
+                return str(result.message)
+            if float(result.t) != self.t:
                 break
         else:
             raise SimulationError(f"IDA makes no progress at t = {self.t:.6g} s")
-        self.t, self.y = float(found.t), np.array(found.y[: self.n_x])
+        self.t, self.y = float(result.t), np.array(result.y[: self.n_x])
         self.status = "finished" if self.t == self.t_bound else "running"
         return None
 

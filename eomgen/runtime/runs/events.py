@@ -79,20 +79,20 @@ class RunEvent:
         self.function, self.action = function, action
         self.name = name or str(getattr(function, "__name__", type(function).__name__))
         self.terminal = _times(self.name, getattr(function, "terminal", None) if terminal is None else terminal)
-        given = getattr(function, "direction", 0) if direction is None else direction
-        self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
+        raw = getattr(function, "direction", 0) if direction is None else direction
+        self.direction = int(np.sign(raw)) if raw != UNWATCHED or direction is None else UNWATCHED
 
     def __call__(self, t: float, x: Array, for_slope: bool = False) -> float:
         """The value of the user's function at time t and state x."""
         value = self.function(t, x)
-        found: Any = as_real(value)
-        if found is None or found.ndim or not (for_slope or isfinite(found)):
-            text = shown(value if found is None or found.ndim else float(found))
+        result: Any = as_real(value)
+        if result is None or result.ndim or not (for_slope or isfinite(result)):
+            text = shown(value if result is None or result.ndim else float(result))
             raise no_number(
                 f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
             )
-        return float(found)
+        return float(result)
 
 
 class Events:
@@ -104,7 +104,7 @@ class Events:
         None watches all of the model.  Those of the model that reset the state are watched always.
     """
 
-    def __init__(self, layout: Layout, given: Any) -> None:
+    def __init__(self, layout: Layout, raw: Any) -> None:
         self.layout = layout
         self.declared = layout.info.events
         self.over = False  #: whether the last reset ended the run
@@ -112,11 +112,11 @@ class Events:
         self.model: list[RunEvent] = []
         self.formulas: list[tuple[RunEvent, Expression]] = []
         self.functions: list[RunEvent] = []
-        if given is None and not self.declared:
+        if raw is None and not self.declared:
             return
         known = [str(event["name"]) for event in self.declared]
-        chosen = set(known) if given is None else set()
-        for name, one in _listed(given):
+        chosen = set(known) if raw is None else set()
+        for name, one in _listed(raw):
             if isinstance(one, str) and one in known and name is None:
                 chosen.add(one)
             elif isinstance(one, str | Mapping):
@@ -205,22 +205,22 @@ def crowd_of(actions: Sequence[int]) -> int:
     return max(CROWD, 2 * sum(action in (RESET, WAIT) for action in actions))
 
 
-def _listed(given: Any) -> list[tuple[str | None, Any]]:
-    if given is None:
+def _listed(raw: Any) -> list[tuple[str | None, Any]]:
+    if raw is None:
         return []
-    if isinstance(given, Mapping):
-        return [(str(name), one) for name, one in given.items()]
-    if isinstance(given, Sequence) and not isinstance(given, str):
-        return [(None, one) for one in given]
-    return [(None, given)]
+    if isinstance(raw, Mapping):
+        return [(str(name), one) for name, one in raw.items()]
+    if isinstance(raw, Sequence) and not isinstance(raw, str):
+        return [(None, one) for one in raw]
+    return [(None, raw)]
 
 
 _INSTANCE = re.compile(r"\b[A-Za-z_]\w*\.")  #: before a dot, also a word of Python
 
 
-def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[RunEvent, Expression]:
+def _of_text(layout: Layout, raw: Any, name: str | None) -> tuple[RunEvent, Expression]:
     """An event by its text, or by a mapping with the keys of a model file."""
-    options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
+    options: dict[str, Any] = {"expression": raw} if isinstance(raw, str) else dict(raw)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
     text = options.get("expression")
     if not isinstance(text, str):
@@ -243,16 +243,16 @@ def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
     return RunEvent(None, str(event["name"]), int(event.get("terminal") or 0), direction, action)
 
 
-def _times(name: str, given: Any) -> int:
+def _times(name: str, raw: Any) -> int:
     """At which time an event ends the run: 0 for never."""
-    plain = given is None or isinstance(given, (bool, np.bool_)) or (isinstance(given, float) and given.is_integer())
-    found = int(given or 0) if plain else as_count(given)
-    if found is None or found < 0:
+    plain = raw is None or isinstance(raw, (bool, np.bool_)) or (isinstance(raw, float) and raw.is_integer())
+    result = int(raw or 0) if plain else as_count(raw)
+    if result is None or result < 0:
         raise off_range(
             f"event {name}: terminal must be true, false, or the number of events that ends the run (1, 2, ...), "
-            f"not {shown(given)}"
+            f"not {shown(raw)}"
         )
-    return found
+    return result
 
 
 _SILENT: ContextVar[bool] = ContextVar("events_silent", default=False)
@@ -304,11 +304,11 @@ def at_next_samples(
     if not clocks:
         return x
     values = module.kernels.events
-    found = np.array(x, dtype=float)
+    result = np.array(x, dtype=float)
     for clock in clocks:
         event, place = int(clock["event"]), int(clock["counter"])
-        states, first = ", ".join(clock["states"]), np.where(np.arange(len(found)) == place, 0.0, found)
-        late, period = _lateness(values, t, found, event, place)[0], _lateness(values, 0.0, first, event, place)[1]
+        states, first = ", ".join(clock["states"]), np.where(np.arange(len(result)) == place, 0.0, result)
+        lag, period = _lateness(values, t, result, event, place)[0], _lateness(values, 0.0, first, event, place)[1]
         if not period > 0.0:
             raise off_range(f"the period of {states} is {period:.6g} s; give a positive time between samples")
         start, end = span or (t, t)
@@ -323,25 +323,25 @@ def at_next_samples(
                 f"the period of {states}, {period:g} s, is lost in rounding at times near {latest:g} s; begin the run "
                 "nearer to t = 0"
             )
-        if not abs(found[place] - round(found[place])) < WHOLE:
+        if not abs(result[place] - round(result[place])) < WHOLE:
             name = module.x_names[place]
-            raise off_range(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
-        if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
-            found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
-            earlier = found.copy()
+            raise off_range(f"{name} counts samples, so it must be a whole number, not {result[place]:.9g}")
+        if lag > 0.0 or (result[place] >= 1.0 and lag < -period - instant(t)):
+            result[place] = max(result[place] + ceil((lag - instant(t)) / period), 0.0)
+            earlier = result.copy()
             earlier[place] -= 1.0
-            while found[place] >= 1.0 and _lateness(values, t, earlier, event, place)[0] <= instant(t):
-                found[place], earlier[place] = earlier[place], earlier[place] - 1.0  # the period has been rounded
-        while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
-            found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
-    return found
+            while result[place] >= 1.0 and _lateness(values, t, earlier, event, place)[0] <= instant(t):
+                result[place], earlier[place] = earlier[place], earlier[place] - 1.0  # the period has been rounded
+        while (lag := _lateness(values, t, result, event, place)[0]) > 0.0:  # rounding: its time is this one
+            result[place] = max(np.nextafter(result[place], np.inf), result[place] + lag / period)
+    return result
 
 
 def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[float, float]:
     """How long ago the next time of a clock was (s), and its period (s)."""
-    late, ahead = float(values(t, x)[event]), np.array(x)
+    lag, ahead = float(values(t, x)[event]), np.array(x)
     ahead[place] += 1.0
-    return late, late - float(values(t, ahead)[event])
+    return lag, lag - float(values(t, ahead)[event])
 
 
 def require_forward(module: BoundModel, start: float, end: float) -> None:
@@ -378,13 +378,13 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
         or "held_errors" not in module.kernels.core.names
     ):
         return
-    found = module.kernels.held_errors(t, x)
+    result = module.kernels.held_errors(t, x)
     fast = max(1.0, layout.scales.speed(x[layout.n_q :]))
     for k, (label, state, kind) in enumerate(rows):
         size, unit = (layout.length, "m") if kind == "length" else (1.0, "rad")
         for value, limit, what, per in (
-            (found[2 * k], MEASURED * size, "is off by", ""),
-            (found[2 * k + 1], MEASURED * size * fast, "changes by", "/s"),
+            (result[2 * k], MEASURED * size, "is off by", ""),
+            (result[2 * k + 1], MEASURED * size * fast, "changes by", "/s"),
         ):
             if not abs(value) <= limit and state not in (initial or ()):
                 name = label.partition(".")[0]
@@ -410,18 +410,18 @@ class Controller:
     def __call__(self, t: float, x: Array) -> float:
         """The new value; a SimulationError if it is no finite number."""
         try:
-            given = self.function(t, x.copy())
+            raw = self.function(t, x.copy())
         except Exception as error:
             error.add_note(f"raised by the controller of {self.name}, called as f({t:.6g}, x)")
             raise
-        found = as_real(given)
-        if found is None or found.ndim or not np.isfinite(found):
+        result = as_real(raw)
+        if result is None or result.ndim or not np.isfinite(result):
             raise SimulationError(
-                f"the controller of {self.name} must return one finite number, but returned {shown(given)} "
+                f"the controller of {self.name} must return one finite number, but returned {shown(raw)} "
                 f"at t = {t:.6g} s",
                 code="EG-NUMBER",
             )
-        return float(found)
+        return float(result)
 
 
 class ControlledEvents(Events):
@@ -430,11 +430,11 @@ class ControlledEvents(Events):
     Refuses a name that is no sampled state without a law, and what is no function f(t, x).
     """
 
-    def __init__(self, layout: Layout, given: Any, controllers: Any) -> None:
-        found = _by_event(layout, controllers)
-        super().__init__(layout, given)
-        self.controllers = found
-        for i in found:
+    def __init__(self, layout: Layout, raw: Any, controllers: Any) -> None:
+        result = _by_event(layout, controllers)
+        super().__init__(layout, raw)
+        self.controllers = result
+        for i in result:
             self.model[i].action = WAIT  # compiled loops ask Python there
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
@@ -452,10 +452,10 @@ class ControlledEvents(Events):
         return super().reset(module, forcing, t, after, gaps)
 
 
-def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:
+def _by_event(layout: Layout, raw: Any) -> dict[int, list[Controller]]:
     """Controllers by the event at which they act, in the order of renewal."""
-    require_mapping("controllers", given)
-    wanted: Mapping[str, Any] = without_dots(given, layout.instances)
+    require_mapping("controllers", raw)
+    wanted: Mapping[str, Any] = without_dots(raw, layout.instances)
     clocks = layout.info.clocks
     taken = [name for clock in clocks for name in clock["open"]]
     if wanted and not taken:
@@ -468,9 +468,9 @@ def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:
         if not callable(function):
             raise ill_typed(f"the controller of {name} must be a function f(t, x), not {shown(function)}")
         require_time_and_state(f"the controller of {name}", function)
-    found: dict[int, list[Controller]] = {}
+    result: dict[int, list[Controller]] = {}
     for clock in clocks:
         own = [Controller(n, layout.x.index(n), wanted[n]) for n in clock["open"] if n in wanted]
         if own:
-            found[int(clock["event"])] = own
-    return found
+            result[int(clock["event"])] = own
+    return result

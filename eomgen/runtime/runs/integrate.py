@@ -261,8 +261,8 @@ def record(
     """
     residuals, x = project(module, solution.t, solution.x, forcing)
     described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
-    found = solution[5:9]  # status, message, counts and ends: not the states before projection, which take much memory
-    header: Any = partial(header_of, module.layout, method, options, event_names, residuals, *found)
+    result = solution[5:9]  # status, message, counts and ends: not the states before projection, which take much memory
+    header: Any = partial(header_of, module.layout, method, options, event_names, residuals, *result)
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described, header = described().copy, header()
@@ -276,13 +276,13 @@ def record(
     events: list[Array] = []
     if solution.t_events:
         happened = zip(solution.t_events, solution.x_events, strict=True)
-        events += [project(module, t, found, forcing)[1] for t, found in happened]
+        events += [project(module, t, result, forcing)[1] for t, result in happened]
     sample: Callable[[Array], Trajectory] | None = None
     if (dense := solution.dense) is not None:
 
         def sample(t: Array) -> Trajectory:
-            found, states = project(module, t, dense(t), forcing)
-            head = described() | (header() if callable(header) else header) | {"residuals": found}
+            result, states = project(module, t, dense(t), forcing)
+            head = described() | (header() if callable(header) else header) | {"residuals": result}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states), steps), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described, again)
@@ -303,8 +303,8 @@ def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) ->
     """The model, options and inputs as they were given."""
     from ..identity import inputs_of, plain
 
-    given = {name: plain(value) for name, value in options.items() if name != "jac"}
-    return {**describe(module), "options": given, "inputs": inputs_of(module, forcing)}
+    raw = {name: plain(value) for name, value in options.items() if name != "jac"}
+    return {**describe(module), "options": raw, "inputs": inputs_of(module, forcing)}
 
 
 def _plain(value: Any) -> Any:
@@ -326,7 +326,7 @@ def passed_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: flo
 
     A coordinate that rests at its limit may be beyond it by what the tolerances of the run leave of it.
     """
-    found: list[str] = []
+    result: list[str] = []
     for name, limits in layout.limits.items() if layout.info.limits_told else ():
         for key in ("lower", "upper", "velocity"):
             limit = limits.get(key)
@@ -338,18 +338,18 @@ def passed_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: flo
             passed = np.flatnonzero(beyond > 10.0 * (atol + rtol * (1.0 + abs(limit))))
             if passed.size:
                 first, worst = int(passed[0]), int(np.nanargmax(beyond))
-                found.append(f"{column} {key} {limit:g} at t = {trajectory.t[first]:.4g} s (to {values[worst]:.4g})")
-    return found
+                result.append(f"{column} {key} {limit:g} at t = {trajectory.t[first]:.4g} s (to {values[worst]:.4g})")
+    return result
 
 
 def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: float) -> None:
     """Tell the line of the user's that called of limits that a run passes."""
-    found = [] if is_inner_run() else passed_limits(trajectory, layout, rtol, atol)
-    if found:
-        more = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+    passed = [] if is_inner_run() else passed_limits(trajectory, layout, rtol, atol)
+    if passed:
+        more = f", and {len(passed) - SHOWN} more" if len(passed) > SHOWN else ""
         warnings.warn(
-            f"the run passes limits of joints: {'; '.join(found[:SHOWN])}{more}. Joint limits are not enforced: load a "
-            "robot with limits='stop', or add forces of type stop to a model; limits: off turns this warning off",
+            f"the run passes limits of joints: {'; '.join(passed[:SHOWN])}{more}. Joint limits are not enforced: load "
+            "a robot with limits='stop', or add forces of type stop to a model; limits: off turns this warning off",
             LimitWarning,
             stacklevel=calls_within() + 1,
         )

@@ -213,13 +213,13 @@ def integrator(
     method, step = declared_step(module, method, options.pop("step", None))
     options |= {"method": method, "step": step}
     refuse_moreau(method, "integrator")
-    given = {name: declared[name] for name in ("method", "rtol", "atol")}
-    given.update({name: value for name, value in options.items() if value is not None})
-    return Integrator(module.bind(parameters, inputs), **given)
+    raw = {name: declared[name] for name in ("method", "rtol", "atol")}
+    raw.update({name: value for name, value in options.items() if value is not None})
+    return Integrator(module.bind(parameters, inputs), **raw)
 
 
-def _vector(label: str, given: Any, n: int) -> Any:
+def _vector(label: str, raw: Any, n: int) -> Any:
     """A new array (n,) of what is given, or None."""
-    if given is None and label != "x":
+    if raw is None and label != "x":
         return None
-    return np.array(read_vector(label, given, n))
+    return np.array(read_vector(label, raw, n))

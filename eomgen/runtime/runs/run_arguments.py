@@ -52,16 +52,16 @@ def assemble_with_inputs(layout: Layout, forcing: Forcing, t: float, assembled: 
     def assemble(u: Array) -> tuple[Array, Array]:
         """The state at inputs u, and the inputs at this state."""
         x = assembled(u)
-        found = forcing(t, x)
+        result = forcing(t, x)
         forcing.require_finite()
-        return x, found
+        return x, result
 
     u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
     forcing.require_finite()
     secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
     for _ in range(ROUNDS):
-        x, found = assemble(u)
-        gap = (found - u)[places]
+        x, result = assemble(u)
+        gap = (result - u)[places]
         if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
             return x
         if before is not None:  # Broyden's update: the slope that explains the last step
@@ -70,13 +70,13 @@ def assemble_with_inputs(layout: Layout, forcing: Forcing, t: float, assembled: 
         move = algebra.lstsq(secant, -gap, rcond=None)
         if not np.isfinite(move).all() or not move.any():
             break
-        before, u = (move, gap), found.copy()
-        u[places] = found[places] - gap + move
+        before, u = (move, gap), result.copy()
+        u[places] = result[places] - gap + move
     names = ", ".join(layout.u[i] for i in places)
-    given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
+    raw, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
     raise AssemblyError(
         f"the inputs {names} depend on the state, and no state that satisfies them and the constraints was found at "
-        f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
+        f"t = {t:.6g} s: the last state was assembled with {raw}, but there the inputs are {gives}; "
         "give initial values nearer to such a state, or write the inputs in t",
         [],
         code="EG-CONTRADICTION",
@@ -121,29 +121,29 @@ def check_first_step(options: Mapping[str, Any], span: float) -> None:
         raise off_range(f"first_step must not exceed the span of {span:.6g} s, not {options['first_step']:.6g}")
 
 
-def _tolerance(name: str, given: Any, n: int) -> Any:
-    if type(given) is float and 0.0 <= given < np.inf:
-        return given
-    values = as_real(read_number(name, given) if isinstance(given, str) else given)
+def _tolerance(name: str, raw: Any, n: int) -> Any:
+    if type(raw) is float and 0.0 <= raw < np.inf:
+        return raw
+    values = as_real(read_number(name, raw) if isinstance(raw, str) else raw)
     if values is None:
-        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
+        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {shown(raw)}")
     if values.shape not in ((), (n,)):
         raise ill_shaped(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise off_range(f"{name} must not be negative and must be finite, not {shown(given)}")
+        raise off_range(f"{name} must not be negative and must be finite, not {shown(raw)}")
     return values if values.ndim else float(values)
 
 
-def check_step(name: str, given: Any) -> float:
+def check_step(name: str, raw: Any) -> float:
     """A length of steps (s), or a UsageError that names it."""
-    if type(given) is float and 0.0 < given < np.inf:
-        return given
-    found = as_real(read_number(name, given) if isinstance(given, str) else given)
-    if found is None or found.ndim:
-        raise no_number(f"{name} must be a number of seconds, not {shown(given)}")
-    value = float(found)
+    if type(raw) is float and 0.0 < raw < np.inf:
+        return raw
+    result = as_real(read_number(name, raw) if isinstance(raw, str) else raw)
+    if result is None or result.ndim:
+        raise no_number(f"{name} must be a number of seconds, not {shown(raw)}")
+    value = float(result)
     if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
-        raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
+        raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {raw}")
     return value
 
 
@@ -224,11 +224,11 @@ def steps_of(
     if size is not None:
         require_steps("step", size, *span)
         options = {**options, "max_step": size, "first_step": size}
-    given = {name: value for name, value in options.items() if value is not None}
+    raw = {name: value for name, value in options.items() if value is not None}
     own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
-    found = check_tolerances(module.n_x, abs(span[1] - span[0]), own | given)
-    require_steps("max_step", float(found.get("max_step", np.inf)), *span)
-    return found
+    result = check_tolerances(module.n_x, abs(span[1] - span[0]), own | raw)
+    require_steps("max_step", float(result.get("max_step", np.inf)), *span)
+    return result
 
 
 def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
@@ -291,10 +291,10 @@ def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
         return None
     q, v = np.array(x[: module.n_q]), np.array(x[module.n_q :])
     try:
-        found = module.kernels.meeting_time(q, v, np.zeros_like(v), u=u, t=t)
+        result = module.kernels.meeting_time(q, v, np.zeros_like(v), u=u, t=t)
     except EvaluationError:
         return None  # the run tells of it
-    _, depth, thickness, first, second = (float(number) for number in found)
+    _, depth, thickness, first, second = (float(number) for number in result)
     if depth <= SUNK * thickness:
         return None
     (name, one), (_, other) = (module.info.contact_shapes[int(k)] for k in (first, second))
@@ -303,10 +303,10 @@ def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
 
 def warn_of_depth(module: BoundModel, t: float, x: Array, u: Any) -> None:
     """Tell the line of the user's that called of a start inside each other."""
-    found = None if is_inner_run() else deep_start(module, t, x, u)
-    if found is not None:
+    result = None if is_inner_run() else deep_start(module, t, x, u)
+    if result is not None:
         warnings.warn(
-            f"{module.name} starts with shapes inside each other; {found}. Stiff contacts drive them apart at once, "
+            f"{module.name} starts with shapes inside each other; {result}. Stiff contacts drive them apart at once, "
             "and a bed of soil carries shapes deep in it as if they had sunk there: change the initial values, or put "
             "only shapes that are apart into groups",
             PenetrationWarning,

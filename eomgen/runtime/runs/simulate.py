@@ -103,8 +103,8 @@ def plan_run(
         check_names("option of simulate", options, (), OPTIONS)
     else:
         check_options(solver, options, OPTIONS)
-    given = {name: value for name, value in limits.items() if value is not None}
-    settings = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method) | given | {**options}
+    raw = {name: value for name, value in limits.items() if value is not None}
+    settings = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method) | raw | {**options}
     if solver is None or solver.__module__.startswith("scipy."):  # another's solver may take anything
         settings = check_tolerances(module.n_x, inf, settings)
     title = str(method) if solver is None else solver.__name__
@@ -225,17 +225,17 @@ def simulate(
                 raise not_driven(module.layout)
             from ..prescribed.kinematic import follow_drivers
 
-            asked = {**limits, **others}
-            motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, asked)
+            requested = {**limits, **others}
+            motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, requested)
             if motion is not None:
                 return motion
         if (isinstance(method, str) and method == "moreau") or module.info.rigid_only:
             require_rigid_contacts(module.layout)
             from ..impacts.moreau import step_rigidly
 
-            asked = {**limits, "dense_output": dense_output, "controllers": controllers, **others}
-            given = (module, span, initial, parameters, inputs, method, step, t_eval, events, progress, asked)
-            return step_rigidly(*given)
+            requested = {**limits, "dense_output": dense_output, "controllers": controllers, **others}
+            raw = (module, span, initial, parameters, inputs, method, step, t_eval, events, progress, requested)
+            return step_rigidly(*raw)
         plan = plan_run(module, method, step, inputs, events, controllers, limits, others)
         if plain and plan.kept:
             plan.forcing.attach(module)
@@ -273,8 +273,8 @@ def simulate(
     if any(event.action == WAIT for event in watched.model) and not is_inner_run():
         from ..impacts.impact import describe_negative_gaps
 
-        if words := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
-            warnings.warn(words, stacklevel=calls_within() + 1)
+        if message := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
+            warnings.warn(message, stacklevel=calls_within() + 1)
     if bound.info.contact_shapes:
         from .run_arguments import warn_of_depth
 
