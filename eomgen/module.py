@@ -140,9 +140,10 @@ class Module(BoundModel):
     ``x = [q; v; s]`` are the coordinates and velocities of the spanning tree and the first-order states of the model,
     if it has any, in SI units and radians, in the order of ``x_names``; q' = v but for Euler parameters.  Every state
     may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last axis.  Every call takes
-    ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, or a column for each state, and
-    ``out=None`` to write into; calls of positions alone take ``t=0.0`` too.  A call that fails raises an
-    :class:`~.errors.EvaluationError` with the time and the state.
+    ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None`` to write into; calls of
+    positions alone take ``t=0.0`` too.  The callables below also take arrays p (n_p, k) and u (n_u, k), a column for
+    each state; multipliers and reactions only u.  Values by name are the same for all states.  A call that fails raises
+    an :class:`~.errors.EvaluationError` with the time and the state.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError, cannot, ill_shaped
-from ..runtime.argument_checks import read_numbers
+from ..runtime.argument_checks import read_numbers, read_vector
 from ..runtime.kernels import into
 from ..runtime.refusals import require_support
 
@@ -191,7 +191,8 @@ def inertial_remainder(
 
 
 def _values(module: BoundModel, p: Any) -> Any:
-    return module.kernels.fail.vector("p", p, module.p)
+    p = module.kernels.fail.vector("p", p, module.p)
+    return None if p is None else read_vector("p", p, module.n_p)
 
 
 def _motion(

@@ -163,8 +163,9 @@ cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u b
     int n_pieces, n_in, n_out
     cnp.npy_intp columns
     bint nan
-    const double *c  # constants, and how many numbers after them those of the next column are; 0: they are all the same
-    cnp.npy_intp c_step
+    const double *c  # constants of all columns
+    Piece parameters  # of each column, n of them; n = 0: the constants are the same for all
+    double *column_c  # place for the constants of `width` columns, at least of one, and then for the parameters of one
     double *w
     double *x
     double *y
@@ -197,15 +198,30 @@ cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
     return t
 
 
+cdef void column_constants(const Batch *batch, cnp.npy_intp column, double *constants) noexcept nogil:
+    """The constants that follow from the parameters of one column; NaN where these give none."""
+    cdef int n_const = batch.table.n_const, i
+    cdef double *p = batch.column_c + batch.width * n_const
+    gather(&batch.parameters, column, p)
+    memset(constants, 0, n_const * sizeof(double))
+    if batch.table.precompute(p, constants) != 0:
+        for i in range(n_const):
+            constants[i] = NAN
+
+
 cdef int call_one(const Batch *batch, cnp.npy_intp column, double *result) noexcept nogil:
     """Evaluate one column into the (n_out, columns) result; returns its status."""
     cdef double t = load(batch, column)
+    cdef const double *c = batch.c
     cdef cnp.npy_intp i
     cdef int code
+    if batch.parameters.n:
+        column_constants(batch, column, batch.column_c)
+        c = batch.column_c
     if batch.nan:
         for i in range(batch.n_out):
             batch.y[i] = NAN
-    code = batch.call(t, batch.x, batch.u, batch.c + column * batch.c_step, batch.y, batch.w)
+    code = batch.call(t, batch.x, batch.u, c, batch.y, batch.w)
     for i in range(batch.n_out):
         result[i * batch.columns + column] = entry(batch.y[i], code)
     return code

@@ -265,11 +265,10 @@ cdef class Kernel:
         cdef int i, status = 0
         cdef double now = 0
         cdef list held = []
-        cdef cnp.ndarray constants
         p, u = self.by_name("p", p, self.context.p), self.by_name("u", u, self.context.u)
         batch.table, batch.call, batch.c, batch.nan = self.table, self.call, self.c, self.tolerant
         batch.n_pieces, batch.n_in, batch.n_out = len(values), self.n_in, self.n_out
-        batch.lanes, batch.c_step = NULL, 0
+        batch.lanes, batch.width, batch.parameters = NULL, 1, Piece(NULL, 0, 0, 0)
         for i in range(batch.n_pieces):
             label, length, value = values[i]
             held.append(self.read(value, length, label, &batch.pieces[i], &columns))
@@ -287,8 +286,12 @@ cdef class Kernel:
         if u is not None:
             held.append(self.read(u, self.table.n_u, "u", &batch.inputs, &columns))
         if p is not None:
-            constants = self.constants(p, &columns, &batch)
-            batch.c = <const double *>cnp.PyArray_DATA(constants)
+            p = doubles(p, "p", self.error, self.name, self.table.n_p)
+            if cnp.PyArray_NDIM(<cnp.ndarray>p) == 2:
+                held.append(self.read(p, self.table.n_p, "p", &batch.parameters, &columns))
+            else:
+                constants = self.model.constants(vector(p, self.table.n_p, "p", self.error), self.error)
+                batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
         cdef cnp.ndarray picked = self.target(out, held, columns)
         cdef cnp.ndarray result = picked if self.pick is None else rows(self.n_out, 1 if columns < 0 else columns)
         cdef cnp.npy_intp length_of_all = self.table.n_work + self.n_in + self.n_out + self.table.n_u
@@ -300,14 +303,18 @@ cdef class Kernel:
         if columns >= 0 and lanes != NULL and lanes.kernels[self.index] != NULL:
             batch.lanes, batch.width = lanes.kernels[self.index], lanes.width
             length_of_all += WIDEST + lanes.width * (plain + 1 + self.table.n_const)
+        cdef cnp.npy_intp before_c = length_of_all
+        if batch.parameters.n:
+            length_of_all += batch.width * self.table.n_const + self.table.n_p
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
         batch.columns = 1 if columns < 0 else columns
         batch.x, batch.y = batch.w + self.table.n_work, batch.w + self.table.n_work + self.n_in
         batch.u = batch.y + self.n_out
         batch.side = batch.w + plain
+        batch.column_c = batch.w + before_c
         batch.side += (64 - <uintptr_t>batch.side % 64) % 64 // sizeof(double)
-        at_once = columns > 1 and batch.c_step == 0 and self.model.functions is not None and self.name in self.model.functions.blocks
+        at_once = columns > 1 and batch.parameters.n == 0 and self.model.functions is not None and self.name in self.model.functions.blocks
         if at_once:
             failed = self.call_columns(&batch, result, &status)
         elif self.long or columns > 1:
@@ -318,7 +325,7 @@ cdef class Kernel:
         tell_raised()
         if failed >= 0:
             now = load(&batch, failed)
-            given = p if batch.c_step == 0 else np.asarray(p, dtype=float)[:, failed]
+            given = p if batch.parameters.n == 0 else (<object>p)[:, failed]
             given = () if p is None and u is None else (given, copy(batch.u, self.table.n_u))
             self.report(status, now, copy(batch.x, self.n_in), given)
         if self.pick is not None:
@@ -326,28 +333,6 @@ cdef class Kernel:
         if out is not None and out is not picked:
             out[...] = picked
         return picked if out is None else out
-
-    cdef cnp.ndarray constants(self, object p, cnp.npy_intp *columns, Batch *batch):
-        """The constants of parameters (n_p,), or (n_p, k), a row for each column; NaN where these give none."""
-        cdef Piece piece
-        cdef cnp.ndarray array = doubles(p, "p", self.error, self.name, self.table.n_p)
-        cdef cnp.ndarray found, values
-        cdef double *data
-        cdef cnp.npy_intp j, i
-        if cnp.PyArray_NDIM(array) != 2:
-            return self.model.constants(vector(p, self.table.n_p, "p", self.error), self.error)
-        array = self.read(array, self.table.n_p, "p", &piece, columns)
-        found, values = rows(columns[0], self.table.n_const), rows(1, self.table.n_p)
-        data, batch.c_step = <double *>cnp.PyArray_DATA(found), self.table.n_const
-        for j in range(columns[0]):
-            gather(&piece, j, <double *>cnp.PyArray_DATA(values))
-            memset(data, 0, batch.c_step * sizeof(double))
-            if self.table.precompute(<double *>cnp.PyArray_DATA(values), data) != 0:
-                tell_raised()
-                for i in range(batch.c_step):
-                    data[i] = NAN
-            data += batch.c_step
-        return found
 
     cdef cnp.npy_intp call_columns(self, const Batch *batch, cnp.ndarray result, int *status) except -2:
         """Evaluate all columns at once by the model's Python function; those that are not finite again, one by one."""

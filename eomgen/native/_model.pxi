@@ -565,13 +565,19 @@ cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) n
     cdef double *x = c + width * batch.table.n_const
     cdef double *y = x + width * batch.n_in
     cdef double *w = y + width * batch.n_out
-    cdef Piece constants = Piece(<char *>batch.c, batch.table.n_const, sizeof(double), batch.c_step * sizeof(double))
+    cdef int n_const = batch.table.n_const
+    cdef Piece constants = Piece(<char *>batch.c, n_const, sizeof(double), 0)
+    if batch.parameters.n:
+        constants = Piece(<char *>batch.column_c, n_const, sizeof(double), n_const * sizeof(double))
     while first < batch.columns and (failed < 0 or batch.nan):
         last = min(first + width, batch.columns) - 1
         if first == 0 or batch.time.column != 0:
             spread(&batch.time, first, last, width, t)
-        if first == 0 or batch.c_step != 0:
-            spread(&constants, first, last, width, c)
+        if batch.parameters.n:
+            for i in range(last - first + 1):
+                column_constants(batch, first + i, batch.column_c + i * n_const)
+        if first == 0 or batch.parameters.n:
+            spread(&constants, 0, last - first, width, c)
         if first == 0 or batch.inputs.column != 0:
             spread(&batch.inputs, first, last, width, u)
         k = 0

@@ -14,7 +14,7 @@ from ..base.limits.constraints import STATE as RANK
 from ..base.scales import Scales
 from ..base.texts import shown
 from ..errors import ill_shaped, no_number
-from .argument_checks import as_real, read_number, read_numbers, with_numbers
+from .argument_checks import as_real, read_number, read_numbers, read_vector, with_numbers
 from .kernels import into
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
     layout = module.layout
     read = module.kernels.fail.vector
     p, u = read("p", p, module.p), read("u", u, module.u)
+    p = None if p is None else read_vector("p", p, module.n_p)  # the same for all states
     state = read_numbers("x", x)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise ill_shaped(

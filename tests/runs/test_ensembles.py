@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -302,19 +303,22 @@ def test_results_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any) -> None
     np.testing.assert_allclose(one.simulate_many(2, angles(k), **TIGHT).x, whole.x, rtol=0, atol=3e-8)
 
 
-def shares(module: Any, span: Any, columns: dict[str, Any], k: int, **options: Any) -> list[Any]:
+def shares(module: Any, span: Any, columns: dict[str, Any], k: int, parameters: Any = (), **options: Any) -> list[Any]:
     """The same runs on one thread, on several, in blocks, backwards and some of them alone."""
 
-    def some(chosen: Any) -> dict[str, Any]:
-        return {name: x[chosen] if np.ndim(x) else x for name, x in columns.items()}
+    def some(chosen: Any) -> tuple[dict[str, Any], ...]:
+        return tuple(
+            {n: x[chosen] if np.ndim(x) else x for n, x in part.items()} for part in (columns, dict(parameters))
+        )
 
     few = slice(k // 3, k // 3 + 3)
     return [
-        (module.simulate_many(span, some(slice(None)), threads=1, **options), slice(None)),
-        (module.simulate_many(span, some(slice(None)), threads=3, **options), slice(None)),
-        (module.simulate_many(span, some(slice(None)), threads=2, block=5, **options), slice(None)),
-        (module.simulate_many(span, some(slice(None, None, -1)), threads=2, **options), slice(None, None, -1)),
-        (module.simulate_many(span, some(few), **options), few),
+        (module.simulate_many(span, *some(slice(None)), threads=1, **options), slice(None)),
+        (module.simulate_many(span, *some(slice(None)), threads=3, **options), slice(None)),
+        (module.simulate_many(span, *some(slice(None)), threads=2, block=5, **options), slice(None)),
+        (module.simulate_many(span, *some(slice(None)), threads=2, block=1, **options), slice(None)),
+        (module.simulate_many(span, *some(slice(None, None, -1)), threads=2, **options), slice(None, None, -1)),
+        (module.simulate_many(span, *some(few), **options), few),
     ]
 
 
@@ -339,11 +343,14 @@ def test_the_bits_of_a_tree(pendulum: Any, method: str) -> None:
 
 def test_the_bits_of_a_loop(crank: Any) -> None:
     columns = {"theta": np.linspace(0.1, 1.2, 14), "theta_dot": np.linspace(5, 12, 14)}
-    compare(shares(crank, 0.5, columns, 14, t_eval=[0.1, 0.5], **TIGHT))
+    lengths, masses = {"r": np.linspace(0.09, 0.11, 14)}, {"m_s": np.linspace(1, 2, 14)}
+    for chosen, parameters in ((columns, {}), (columns, lengths), ({"theta_dot": 5.0}, lengths), (columns, masses)):
+        compare(shares(crank, 0.5, chosen, 14, parameters, t_eval=[0.1, 0.5], **TIGHT))
 
 
+@pytest.mark.filterwarnings("ignore:theta = ")
 def test_loops_of_many_runs_close_as_that_of_one(crank: Any) -> None:
-    """Also through a dead centre of what is given, and out of reach."""
+    """Also through a dead centre of what is given, out of reach, and far away."""
     r, theta = np.linspace(0.09, 0.11, 7), np.linspace(-3, 4, 7)
     for initial, parameters in (
         ({}, {"r": r, "l": 0.3 + r}),
@@ -351,6 +358,8 @@ def test_loops_of_many_runs_close_as_that_of_one(crank: Any) -> None:
         ({"s": np.linspace(0.2, 0.5, 7), "s_dot": 0.1}, {}),
         ({"theta_dot": theta}, {"r": [*r[:6], 1.0]}),
         ({"B": 0.2}, {"l": 0.3 + r}),
+        ({"s": [1e300, -1e18, 1e5, 0.4, 0.41, 0.42, 0.43]}, {}),
+        ({"theta": [1e19, 1e4, 1000, 999, 195, 40, 1]}, {}),
     ):
         runs = crank.simulate_many((0, 1e-9), initial or None, parameters, t_eval=[0.0])
         for k in range(7):
@@ -371,6 +380,14 @@ def test_parameters_by_column(target: str) -> None:
     each = np.array([crank.rhs(0.0, x[:, k], p=p[:, k]) for k in range(9)]).T
     np.testing.assert_allclose(crank.rhs(0.0, x, p=p), each, rtol=1e-13, atol=1e-13)
     refuses("EG-SHAPE p rhs (6, 9)", crank.rhs, 0.0, x[:, 0], p=p)
+    refuses("EG-SHAPE p (6,) (6, 9)", crank.multipliers, 0.0, x, p=p)
+    refuses("EG-SHAPE p (6,) (6, 9)", crank.regressor, x[:3], x[3:], x[3:], p=p)
+    many = np.tile(x, 100), np.tile(p, 100)
+    tracemalloc.start()
+    size = crank.rhs(0.0, many[0], p=many[1]).nbytes
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2 * size  # no constants of all columns at a time
     p[0, 4] = np.nan
     refuses("EG-NOT-FINITE rhs theta", crank.rhs, 0.0, x, p=p)
 

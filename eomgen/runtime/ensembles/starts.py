@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.algebra import Array, Indices
+from ...base.continuation import LONGEST
 from ...base.limits.constraints import (
     CONTRADICTION,
     EXACT,
@@ -92,14 +93,13 @@ def _assemble_all(
     if every and not (led or varied.differ):
         assemble(every)
         return x, {}
-    if varied.states is None and not led:
-        differ = any(np.ndim(value) and name in layout.q for name, value in varied.values.items())
-        if free or differ or len(varied.alike(layout, every)) > 1:
-            most = max(ROOM // (layout.n_c * layout.n_v + 1), 1)
-            parts = [varied.part(i, i + most) for i in range(0, varied.count, most)]
-            found = [_assemble_side_by_side(module, part, t) for part in parts]
-            good = np.concatenate([good[:0], *(one for _, one in found)])
-            x[:, good] = np.hstack([x[:, :0], *(one for one, _ in found)])[:, good]
+    differ = varied.starts_differ and layout.n_v <= DENSE  # the same for every block
+    if varied.states is None and not led and (free or differ):
+        most = max(ROOM // (layout.n_c * layout.n_v + 1), 1)
+        parts = [varied.part(i, i + most) for i in range(0, varied.count, most)]
+        found = [_assemble_side_by_side(module, part, t) for part in parts]
+        good = np.concatenate([good[:0], *(one for _, one in found)])
+        x[:, good] = np.hstack([x[:, :0], *(one for one, _ in found)])[:, good]
     return x, varied.in_groups(layout, np.flatnonzero(~good).tolist(), led, assemble)
 
 
@@ -135,6 +135,7 @@ ROOM = 2**21  #: numbers of Jacobians at a time
 ROUNDS = 12  #: steps of Newton's method
 SHRINK = 0.25  #: largest first scaled step, and largest part of the one before that a further step has
 SAFE = 1e-3  #: least singular value, relative to the largest, of what follows from held values
+DENSE = 200  #: largest n_v with loops; beyond it dense matrices take as long as the runs one by one
 STRIDE = 0.1  #: scaled way of held values from one closed position to the next
 
 
@@ -174,6 +175,8 @@ class SideBySide:
         self.good[runs] = False
         last, before = np.ones(len(runs)), np.full(len(runs), np.inf)
         for _ in range(ROUNDS):
+            if not len(runs):
+                break
             J, given = self.jacobian(runs)
             e = (self.C(self.q[:, runs], **given) / self.sizes[n : n + h, runs]).T
             size = np.abs(e).max(axis=1, initial=0.0)
@@ -193,6 +196,7 @@ class SideBySide:
         """Lead held coordinates straight to values (h, k), with the loops closed on the way."""
         start = self.q[held]
         way = np.abs((values - start) / self.sizes[held]).max(axis=0, initial=0.0)
+        self.good &= way <= LONGEST
         steps = np.ceil(np.where(self.good, way, 0.0) / STRIDE).astype(int)
         for step in range(1, steps.max(initial=0) + 1):
             runs = np.flatnonzero(self.good & (steps >= step))

@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,6 +82,8 @@ class Variations:
         Initial states, not yet projected.
     values : dict of str to float or (k,) array
         Named initial values where there are no states.
+    starts_differ : bool
+        Whether the positions where the runs start may differ; of all runs, also in a part of them.
     """
 
     count: int
@@ -89,13 +91,14 @@ class Variations:
     u: Array
     states: Array | None
     values: dict[str, Any]
+    starts_differ: bool = False
 
     def part(self, start: int, stop: int) -> Variations:
         """The runs from `start` to before `stop`."""
         values = {name: x[start:stop] if np.ndim(x) else x for name, x in self.values.items()}
         states = None if self.states is None else self.states[:, start:stop]
         p, u = (a if a.ndim == 1 else a[:, start:stop] for a in (self.p, self.u))
-        return Variations(min(stop, self.count) - start, p, u, states, values)
+        return Variations(min(stop, self.count) - start, p, u, states, values, self.starts_differ)
 
     @property
     def differ(self) -> bool:
@@ -103,13 +106,16 @@ class Variations:
         values = () if self.states is not None else self.values.values()
         return self.p.ndim > 1 or self.u.ndim > 1 or self.states is not None or any(np.ndim(x) for x in values)
 
-    def alike(self, layout: Layout, runs: Sequence[int]) -> list[list[int]]:
-        """Runs by what of their parameters and inputs decides where they can start."""
+    def deciding(self, layout: Layout) -> Array:
+        """The parameters and inputs (n, k) that decide where runs can start."""
         p, u = self.p, self.u
         if not any(place_of_marker(n) or layout.plain(n) in layout.y for n in (*self.values, *layout.initial_outputs)):
             p, u = p[layout.start_parameters], u[layout.constraint_inputs]
-        rows = np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)]).T
-        groups: dict[bytes, list[int]] = {}
+        return np.vstack([a if a.ndim > 1 else np.repeat(a[:, None], self.count, axis=1) for a in (p, u)])
+
+    def alike(self, layout: Layout, runs: Sequence[int]) -> list[list[int]]:
+        """Runs by what of their parameters and inputs decides where they can start."""
+        rows, groups = self.deciding(layout).T, dict[bytes, list[int]]()
         for k in runs:
             groups.setdefault(rows[k].tobytes(), []).append(k)
         return list(groups.values())
@@ -180,7 +186,10 @@ def collect_variations(
     require_size(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
-    return Variations(k, p, u, states, values)
+    varied = Variations(k, p, u, states, values)
+    rows = varied.deciding(module.layout)
+    differ = any(np.ndim(value) and name in module.layout.q for name, value in values.items())
+    return replace(varied, starts_differ=bool(differ or (rows != rows[:, :1]).any()))
 
 
 def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
