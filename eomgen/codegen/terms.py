@@ -9,6 +9,7 @@ from functools import cached_property, partial
 from ..base.kernel_table import Sizes
 from ..base.names import acceleration_name
 from ..base.operations import operations_with
+from ..contact.pairs import pair_call
 from ..elements.forces.force import where
 from ..elements.frames import Frame, Marker
 from ..errors import UsageError
@@ -326,7 +327,8 @@ def _size(terms: ForceTerms) -> Expr | None:
         return None
     graph = entries[0].graph
     fragile = operations_with(lambda row: row.fragile)
-    if not any(graph.nodes[i][0] in fragile for i in reachable(graph, [e.id for e in entries])):
+    operations = {str(graph.nodes[i][0]) for i in reachable(graph, [e.id for e in entries])}
+    if operations.isdisjoint(fragile) and not any(pair_call(graph, operation) for operation in operations):
         return None
     return total(graph.apply("abs", entry) for entry in entries)
 

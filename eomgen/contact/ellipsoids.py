@@ -11,14 +11,16 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
-from .limits import COMMON, EQUAL, FOCAL, NEAREST, POLISHED, TWICE, UNIQUE
+from .limits import ASIDE, COMMON, EQUAL, FOCAL, NEAREST, NOWHERE, POLISHED, TWICE, UNIQUE
 from .point import Contact, Touch
 from .rounds import along_axis, direction, seen_from, settled
 
 # -- ellipsoids --------------------------------------------------------------------------------------------------------
 
 
-_TOO_BENT = 0.05  #: part of the plain step's determinant below which Newton's step is not taken
+#: Part of the plain step's determinant below which Newton's step is not taken: it is (1 - UNIQUE)^2 of spheres that are
+#: as deep as they may be.
+_TOO_BENT = 0.002
 
 
 @dataclass(frozen=True)
@@ -101,15 +103,22 @@ def _square(x: Sequence[Expr]) -> Expr:
     return reduce(lambda a, b: a + b, (one * one for one in x))
 
 
-def least_curvature(axes: Sequence[Expr]) -> Expr:
-    """The least radius of curvature of an ellipsoid, as far as nearest places are taken to be unique.
+def unique_depth(axes: Sequence[Expr], width: Expr) -> Expr:
+    """How deep in an ellipsoid every point has one nearest place, below that of a normal with the half width h.
 
-    Those of the sum of two convex bodies are unique within the sum of their least radii of curvature (W. Blaschke,
-    Kreis und Kugel, 1916).
+    The line along the normal n from there, (a^2 n_x / h, ...), is at a^2 / h in the plane across the least axis a,
+    where two places are as near.  A ball of this radius lies in the ellipsoid, so that in the sum of two convex bodies
+    that of the sum of both does, and the place is the nearest of all.
     """
     least = reduce(lambda a, b: a.graph.apply("min", a, b), axes)
-    most = reduce(lambda a, b: a.graph.apply("max", a, b), axes)
-    return UNIQUE * least * least / most
+    return UNIQUE * least * least / width
+
+
+def unless_spheres(axes: Sequence[Sequence[Expr]], depth: Expr) -> Expr:
+    """A depth; without end where the axes of each ellipsoid are equal, as lines between centres are normals then."""
+    graph = depth.graph
+    equal = [graph.apply("and", graph.apply("eq", x, y), graph.apply("eq", y, z)) for x, y, z in axes]
+    return where(reduce(lambda a, b: graph.apply("and", a, b), equal), NOWHERE, depth)
 
 
 @dataclass(frozen=True)
@@ -179,7 +188,9 @@ class EllipsoidRod(EllipsoidRound):
     half: Expr
 
     def deepest(self, view: View) -> Expr:
-        return self.radius + least_curvature(self.axes)
+        normal = vec.transpose_times(view.rotation(self.first), self.touch(view)[0])
+        width = sqrt(_square([a * x for a, x in zip(self.axes, normal, strict=True)]))
+        return unless_spheres([self.axes], self.radius + unique_depth(self.axes, width))
 
     def touch(self, view: View) -> Touch:
         graph = view.graph
@@ -239,9 +250,22 @@ class EllipsoidEllipsoid(Contact):
     axes: tuple[tuple[Expr, Expr, Expr], tuple[Expr, Expr, Expr]]
 
     def deepest(self, view: View) -> Expr:
-        return least_curvature(self.axes[0]) + least_curvature(self.axes[1])
+        """Nothing where the steps did not come to a common normal, of slim ellipsoids that are deep in each other."""
+        n, (h1, h2), (own, other, reach) = self._met(view)
+        size, way = h1 + h2, vec.sub(reach, vec.add(vec.scale(1.0 / h1, own), vec.scale(1.0 / h2, other)))
+        aside = vec.sub(way, vec.scale(vec.dot(n, way), n))
+        common = view.graph.apply("le", vec.dot(aside, aside), ASIDE * size * size)
+        most = unique_depth(self.axes[0], h1) + unique_depth(self.axes[1], h2)
+        return unless_spheres(self.axes, where(common, most, 0.0))
 
     def touch(self, view: View) -> Touch:
+        n, (h1, h2), (own, _, reach) = self._met(view)
+        depth = h1 + h2 - vec.dot(n, reach)
+        first = vec.sub(vec.scale(1.0 / h1, own), vec.scale(0.5 * depth, n))
+        return n, depth, first, vec.sub(first, reach)
+
+    def _met(self, view: View) -> tuple[Vec3, tuple[Expr, Expr], tuple[Vec3, Vec3, Vec3]]:
+        """The normal n, half widths along it, B1 n, B2 n and the way between centres."""
         graph = view.graph
         markers = zip((self.first, self.second), self.axes, strict=True)
         forms = [quadratic_form(view.rotation(marker), axes) for marker, axes in markers]
@@ -255,10 +279,7 @@ class EllipsoidEllipsoid(Contact):
                 n = settled(view, x), settled(view, y), settled(view, z)
             n = self._step(forms, reach, n)
         own, other = (vec.times(B, n) for B in forms)
-        h1, h2 = sqrt(vec.dot(n, own)), sqrt(vec.dot(n, other))
-        depth = h1 + h2 - vec.dot(n, reach)
-        first = vec.sub(vec.scale(1.0 / h1, own), vec.scale(0.5 * depth, n))
-        return n, depth, first, vec.sub(first, reach)
+        return n, (sqrt(vec.dot(n, own)), sqrt(vec.dot(n, other))), (own, other, reach)
 
     @staticmethod
     def _begin(forms: list[Mat3], reach: Vec3) -> Vec3:
@@ -317,11 +338,22 @@ class BlockEllipsoid(Contact):
     axes: tuple[Expr, Expr, Expr]
 
     def deepest(self, view: View) -> Expr:
-        return least_curvature(self.axes)
+        graph, (n, width, _) = view.graph, self._met(view)
+        facing = reduce(lambda a, b: graph.apply("max", a, b), (graph.apply("abs", x) for x in n))
+        face = graph.apply("le", 1.0, facing)  # its normal is the same at all depths
+        return unless_spheres([self.axes], where(face, NOWHERE, unique_depth(self.axes, width)))
 
     def touch(self, view: View) -> Touch:
+        reach, R, _ = seen_from(self, view)
+        best, size, (toward, d) = self._met(view)
+        depth = size - vec.dot(best, d)
+        second = vec.times(R, vec.sub(vec.scale(0.5 * depth, best), vec.scale(1.0 / size, toward)))
+        return vec.times(R, best), depth, vec.add(reach, second), second
+
+    def _met(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3]]:
+        """The normal n, the ellipsoid's half width along it, B n and the way from the corner, in the cuboid's axes."""
         graph = view.graph
-        reach, R, place = seen_from(self, view)
+        _, R, place = seen_from(self, view)
         turn = vec.product(vec.transpose(R), view.rotation(self.second))
         form = quadratic_form(turn, self.axes)
         signs = self._eighth(place, turn)
@@ -341,10 +373,7 @@ class BlockEllipsoid(Contact):
             best = (a, b, c)
         assert best is not None
         toward = vec.times(form, best)
-        size = sqrt(vec.dot(best, toward))
-        depth = size - vec.dot(best, d)
-        second = vec.times(R, vec.sub(vec.scale(0.5 * depth, best), vec.scale(1.0 / size, toward)))
-        return vec.times(R, best), depth, vec.add(reach, second), second
+        return best, sqrt(vec.dot(best, toward)), (toward, d)
 
     def _normals(self, view: View, turn: Mat3, form: Mat3, signs: Vec3, d: Vec3) -> list[Vec3]:
         """Directions in which a gap may be greatest: along faces, from edges, from the corner."""

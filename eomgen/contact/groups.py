@@ -286,7 +286,7 @@ class ContactGroups(Force):
 
 #: Kind of shape -> where its law ends.
 _ENDS = {
-    "ellipsoid": "an ellipsoid is deeper in another solid than their least radii of curvature: make the law stiffer",
+    "ellipsoid": "an ellipsoid is so deep in another solid that its nearest place is not unique: make the law stiffer",
     FIELD_SHAPE: "a shape lies in a hollow of the height field that is sharper than itself: make the shape smaller",
 }
 

@@ -20,9 +20,6 @@ EVEN = 1e-9
 #: Part of the room inside a smooth outline, measured between points of its arcs, that is taken to be there: of 12
 #: points to an arc of up to 180 degrees the nearest two are 15 degrees apart, and 1 / cos(15 deg) is 1.035.
 ROOM = 0.9
-#: How long an edge without an end is, by all pieces of a profile: beside 1e-16 of it, which places along it are known
-#: to, pieces are long.
-ENDLESS = 1e5
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
 #: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where
@@ -62,14 +59,17 @@ UNSHEARED = 0.025
 #: of steps, 1e-6 of a cell, so that rates are continuous for integrators, and far below ruts, of which it is 1 / 200
 #: where they are as deep as cells are long: a load that vibrates in a rut can deepen it by this and no more.
 FOLLOWED = 0.005
-#: Part of the least radius of curvature of ellipsoids up to which they may sink into cuboids, capsules and each other:
-#: at it the stiffness of the nearest place has no limit.  Measured to 0.95 on 4,800 random pairs each with known
-#: normals and half axes of up to 10 : 1: depths are right to 1e-9 in all.
+#: Part of the depth to which the nearest place of an ellipsoid is unique at which its law ends: on end, at all of it,
+#: the stiffness of that place has no limit.  Measured up to here on 4,800 random pairs each with known normals and half
+#: axes of up to 10 : 1: depths are right to 1e-9 in all.
 UNIQUE = 0.95
 #: Steps of Newton's method for the common normal of two ellipsoids, and before these towards the normal at which
 #: ellipsoids scaled by one factor touch: each of these squares the distance less than it halves it, and Newton's method
 #: needs a start within some degrees.  Measured as above; after 6 steps before it the normal was another in 3 of 4,800.
 COMMON, TWICE = 12, 10
+#: Square of the part of the size of two ellipsoids by which their deepest points may lie beside their common normal:
+#: depths have errors of about this square.
+ASIDE = 1e-8
 #: Part of a rod's radius by which gaps differ from which on another place is nearer: gaps have errors of 1e-16, and
 #: places of equal gaps are 1e-8 apart.
 EQUAL = 1e-12

@@ -25,7 +25,7 @@ from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
-from .rounds import AtHeight, BlockRound, EdgeRod, PolygonRound, RodRod, RoundRound, SegmentRound
+from .rounds import AtHeight, BlockRound, EdgeRod, PolygonRound, RodCorner, RodRod, RoundRound, SegmentRound
 from .shapes import WHOLE_PLATE, greatest
 from .soil_beds import SoilCell
 from .soil_wheels import SoilWheel
@@ -57,8 +57,8 @@ def _each(first: str, second: Sequence[str], make: Make) -> dict[tuple[str, str]
     return {(first, one): make for one in second}
 
 
-def _on_segment(g: Given) -> Contact:
-    return SegmentRound(*g.laws, g.first[0], (g.first[1], g.radius))
+def _on_segment(kind: type[SegmentRound]) -> Make:
+    return lambda g: kind(*g.laws, g.first[0], (g.first[1], g.radius))
 
 
 def _two_rods(kind: type[RodRod]) -> Make:
@@ -92,8 +92,9 @@ _OUTLINED = ("round", "corner", "vertex", "pad")
 MEETINGS: dict[tuple[str, str], Make] = {
     ("round", "round"): lambda g: RoundRound(*g.laws, (g.first[0], g.radius)),
     ("rod", "rod"): _two_rods(RodRod),
-    **_each("rod", ("round", "rounded_corner"), _on_segment),
-    **_each("segment", ("round", "corner", "vertex"), _on_segment),
+    ("rod", "round"): _on_segment(SegmentRound),
+    ("rod", "rounded_corner"): _on_segment(RodCorner),
+    **_each("segment", ("round", "corner", "vertex"), _on_segment(SegmentRound)),
     ("ellipsoid", "round"): lambda g: EllipsoidRound(*g.laws, g.first, g.radius),
     ("ellipsoid", "rod"): lambda g: EllipsoidRod(*g.laws, g.first, g.second[1], g.radius),
     ("ellipsoid", "ellipsoid"): lambda g: EllipsoidEllipsoid(*g.laws, (g.first, g.second)),

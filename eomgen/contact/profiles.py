@@ -17,7 +17,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
-from .limits import ENDLESS, EVEN, FLAT_CORNER, ROOM, SHARED
+from .limits import EVEN, FLAT_CORNER, ROOM, SHARED
 from .pair_features import PIECE
 from .point import Contact, Touch
 
@@ -223,7 +223,8 @@ def part(side: Expr, width: Expr) -> Expr:
 class ProfilePiece(Contact):
     """A circle about the second marker on a piece of a profile in the x-y plane of the first.
 
-    The last of ``sizes`` is how deep a centre may be in the solid; deeper ones :class:`InsideRound` pushes out.
+    The last of ``sizes`` is how deep a centre may be in the solid.  A deeper one feels nothing of a profile; out of an
+    outline :class:`InsideRound` pushes it.
     """
 
     sizes: tuple[Expr, ...]
@@ -401,20 +402,11 @@ def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
 
 
 def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
-    """Of each piece those that :mod:`~eomgen.contact.pair_features` reads.
-
-    An edge without an end is :data:`~.limits.ENDLESS` times as long as all pieces together.
-    """
+    """Of each piece those that :mod:`~eomgen.contact.pair_features` reads."""
     found: list[Expr] = []
-    far = ENDLESS * reduce(lambda a, b: a + b, (one.half for one in pieces))
     for one in pieces:
-        if one.kind == "arc":
-            found += [*one.origin, *one.along, one.sizes[1], one.sizes[0]]
-            continue
-        behind, ahead = (far * (1.0 - one.sizes[end]) for end in (3, 6))
-        middle = times(one.along, 0.5 * (ahead - behind))
-        half = one.half + 0.5 * (ahead + behind)
-        found += [one.origin[0] + middle[0], one.origin[1] + middle[1], *one.along, half, half.graph.zero]
+        half, bend = (one.half, one.half.graph.zero) if one.kind == "edge" else (one.sizes[1], one.sizes[0])
+        found += [*one.origin, *one.along, half, bend]
     return found
 
 
@@ -425,7 +417,7 @@ def clearance_of_arcs(pieces: Sequence[ProfilePart]) -> float:
     with the way w between two points and the inward normal n at the first, over points of all arcs.
     """
     numbers = [[x.value for x in (*one.origin, *one.along, *one.sizes[:2])] for one in pieces if one.kind == "arc"]
-    if not numbers or any(None in row for row in numbers):
+    if len(numbers) < len(pieces) or any(None in row for row in numbers):
         return math.inf
     x, y, c, s, bend, half = np.array(numbers, dtype=float).T[:, :, None]
     part = (np.arange(_SAMPLES) + 0.5) * 2.0 / _SAMPLES - 1.0
@@ -663,16 +655,16 @@ def _pitch_radius(teeth: int, pitch: Expr) -> Expr:
     return pitch / (2.0 * math.sin(math.pi / teeth))
 
 
-def half_gap(points: Sequence[Pair], closed: bool = True) -> float:
-    """Half of the least distance between edges of an outline that are no neighbours."""
+def half_gap(points: Sequence[Pair]) -> float:
+    """Half of the least distance between edges of a closed outline that are no neighbours."""
     n, least = len(points), math.inf
-    edges = [(points[k], points[(k + 1) % n]) for k in range(n if closed else n - 1)]
-    for i, j in itertools.combinations(range(len(edges)), 2):
-        if j - i == 1 or (closed and j - i == n - 1):
+    edges = [(points[k], points[(k + 1) % n]) for k in range(n)]
+    for i, j in itertools.combinations(range(n), 2):
+        if j - i in (1, n - 1):
             continue
         for one, (start, end) in ((edges[i], edges[j]), (edges[j], edges[i])):
             least = min(least, *(_away(point, start, end) for point in one))
-    if closed and n == 3:  # all are neighbours: the smallest height
+    if n == 3:  # all are neighbours: the smallest height
         least = min(_away(points[k - 1], *edges[k]) for k in range(3))
     return 0.5 * least
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from abc import abstractmethod
 from collections.abc import Sequence
 
 from ..elements.forces.force import View, where
@@ -233,21 +234,11 @@ def _rising(x: Expr) -> Expr:
     return within * within * (3.0 - 2.0 * within)
 
 
-@dataclass(frozen=True)
-class EdgeRod(RodRod):
-    """An edge of a cuboid on an edge or a rod: where they cross, not where one ends, as corners touch there.
+class SharedEnergy(Contact):
+    """A contact of bodies with corners, whose energy is a part of that of the law; the force is its slope."""
 
-    The energy is that of the law times the square of the sine of their angle, and times parts that go to 0 towards both
-    ends of both within their radii.  The force is its slope.
-    """
-
-    def share(self, view: View) -> Expr:
-        a, b, s, t, _ = self._nearest(view)
-        cross = vec.cross(a, b)
-        part = vec.dot(cross, cross)
-        for x, half, radius in zip((s, t), self.halves, self.radii, strict=True):
-            part = part * _rising((half - view.graph.apply("max", x, -x)) / radius)
-        return part
+    @abstractmethod
+    def share(self, view: View) -> Expr: ...
 
     def _change(self, view: View) -> tuple[Vec3, Vec3]:
         """How the share changes as the second body moves along axes of the ground, and as it turns about them."""
@@ -269,6 +260,49 @@ class EdgeRod(RodRod):
         _, depth, _, arm = self.touch(view)
         about = vec.scale(-self.law_here(view).energy(depth), self._change(view)[1])
         return vec.sub(about, vec.cross(arm, self.aside(view)))
+
+
+@dataclass(frozen=True)
+class EdgeRod(SharedEnergy, RodRod):
+    """An edge of a cuboid on an edge or a rod: where they cross, not where one ends, as corners touch there.
+
+    The energy is that of the law times the square of the sine of their angle, and times parts that go to 0 towards both
+    ends of both within their radii.
+    """
+
+    def share(self, view: View) -> Expr:
+        a, b, s, t, _ = self._nearest(view)
+        cross = vec.cross(a, b)
+        part = vec.dot(cross, cross)
+        for x, half, radius in zip((s, t), self.halves, self.radii, strict=True):
+            part = part * _rising((half - view.graph.apply("max", x, -x)) / radius)
+        return part
+
+
+@dataclass(frozen=True)
+class RodCorner(SharedEnergy, SegmentRound):
+    """A corner of a cuboid on a rod, between its ends, which touch the cuboid by themselves.
+
+    With the depths d of the corner in the rod and e in the sphere at the rod's nearer end the energy is that of the law
+    times 1 - (e / d)^2: with that of the sphere it is the law's at the end and far from it, and between them no more,
+    of laws that are linear or stiffen.
+    """
+
+    def share(self, view: View) -> Expr:
+        graph, depth = view.graph, self.touch(view)[1]
+        place = vec.dot(along_axis(view, self.first, 0), vec.sub(view.position(self.second), view.position(self.first)))
+        beside = graph.apply("max", 0.0, self.half - graph.apply("max", place, -place))
+        across = self.radii[0] + self.radii[1] - depth
+        at_end = graph.apply("max", 0.0, self.radii[0] + self.radii[1] - _hypot(across, beside))
+        deep = graph.apply("lt", 0.0, depth)
+        part = at_end / where(deep, depth, 1.0)
+        return where(deep, 1.0 - part * part, 1.0)
+
+
+def _hypot(x: Expr, y: Expr) -> Expr:
+    square = x * x + y * y
+    apart = x.graph.apply("lt", 0.0, square)
+    return where(apart, sqrt(where(apart, square, 1.0)), 0.0)
 
 
 @dataclass(frozen=True)

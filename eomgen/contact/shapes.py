@@ -28,7 +28,6 @@ from .profiles import (
     arc_points,
     clearance_of_arcs,
     cross,
-    half_gap,
     hollow_arcs,
     inner_corners,
     length,
@@ -234,7 +233,7 @@ class ContactShape:
         depth = solid_depth(pieces, depth)
         surface = [one for one in pieces if one.kind in ("edge", "arc")]
         told = depth  # by each piece for itself
-        if math.isfinite(most := self._clearance(surface)):
+        if self.kind == "smooth_outline" and math.isfinite(most := clearance_of_arcs(surface)):
             told = zero.graph.apply("min", depth, most)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
@@ -242,20 +241,13 @@ class ContactShape:
         ]
         hollows = [*inner_corners(pieces), *hollow_arcs(pieces)]
         found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
-        reach = None if self.kind in GROUNDS else greatest([length(one.origin) + one.half for one in surface])
-        numbers = (*piece_numbers(surface), told)
-        found.append(Feature(INSIDE, frame, numbers, reach, depth, number=len(surface)))
+        if self.kind not in GROUNDS:
+            reach = greatest([length(one.origin) + one.half for one in surface])
+            numbers = (*piece_numbers(surface), told)
+            found.append(Feature(INSIDE, frame, numbers, reach, depth, number=len(surface)))
         for k, (x, y) in tops:
             found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
         return found
-
-    def _clearance(self, surface: Sequence[ProfilePart]) -> float:
-        """How deep below arcs, or below an open line, every point has one nearest place, as far as numbers tell."""
-        if self.kind in ("smooth_outline", "smooth_profile"):
-            return clearance_of_arcs(surface)
-        points = [(x.value, y.value) for x, y in self._points()] if self.kind == "profile" else []
-        known = [(x, y) for x, y in points if x is not None and y is not None]
-        return half_gap(known, False) if points and len(known) == len(points) else math.inf
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""

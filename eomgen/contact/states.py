@@ -181,7 +181,7 @@ def _profile(how: str, least: int) -> Fields:
             dimension=LENGTH,
         ),
         "depth": Scalar(
-            "how far below it its pieces tell by themselves which is nearest (m); a tenth of its length unless given",
+            "how far the solid reaches below it (m); a tenth of its length unless given",
             dimension=LENGTH,
         ),
     }
