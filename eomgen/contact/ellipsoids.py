@@ -222,8 +222,8 @@ def _solved(rows: Mat3, right: Vec3) -> tuple[Vec3, Expr]:
     """The solution of three equations times the determinant, and that."""
     a, b, c = rows
     first = vec.cross(b, c)
-    found = vec.add(vec.scale(right[0], first), vec.scale(right[1], vec.cross(c, a)))
-    return vec.add(found, vec.scale(right[2], vec.cross(a, b))), vec.dot(a, first)
+    result = vec.add(vec.scale(right[0], first), vec.scale(right[1], vec.cross(c, a)))
+    return vec.add(result, vec.scale(right[2], vec.cross(a, b))), vec.dot(a, first)
 
 
 def _weighed(weight: Expr, a: Mat3, other: Expr, b: Mat3) -> Mat3:
@@ -378,15 +378,15 @@ class BlockEllipsoid(Contact):
     def _normals(self, view: View, turn: Mat3, form: Mat3, signs: Vec3, d: Vec3) -> list[Vec3]:
         """Directions in which a gap may be greatest: along faces, from edges, from the corner."""
         zero = view.graph.zero
-        found: list[Vec3] = [(signs[0], zero, zero), (zero, signs[1], zero), (zero, zero, signs[2])]
+        result: list[Vec3] = [(signs[0], zero, zero), (zero, signs[1], zero), (zero, zero, signs[2])]
         for i, j in itertools.combinations(range(3), 2):
             nx, ny, _ = silhouette_normal(view, (-d[i], -d[j]), (form[i][i], form[i][j], form[j][j]))
             n = [zero, zero, zero]
             n[i], n[j] = -nx, -ny
-            found.append((n[0], n[1], n[2]))
+            result.append((n[0], n[1], n[2]))
         (x, y, z), _ = nearest(view, self.axes, vec.neg(vec.transpose_times(turn, d)))
-        found.append(vec.neg(vec.times(turn, (x, y, z))))
-        return found
+        result.append(vec.neg(vec.times(turn, (x, y, z))))
+        return result
 
     def _eighth(self, place: Vec3, turn: Mat3) -> Vec3:
         """1 or -1 along each axis: where the point of the cuboid is that is least by the ellipsoid's form.
@@ -418,7 +418,7 @@ class BlockEllipsoid(Contact):
 
     def _points(self, form: Mat3, place: Vec3) -> list[list[Expr]]:
         """The least points of the planes of faces and of the lines of edges."""
-        found: list[list[Expr]] = []
+        result: list[list[Expr]] = []
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             det = form[i][i] * form[j][j] - form[i][j] * form[i][j]
@@ -428,10 +428,10 @@ class BlockEllipsoid(Contact):
                 x = list(place)
                 x[k] = side * self.halves[k]
                 x[i], x[j] = place[i] + slope_i * (x[k] - place[k]), place[j] + slope_j * (x[k] - place[k])
-                found.append(x)
+                result.append(x)
             for one, other in itertools.product((-1.0, 1.0), repeat=2):  # along the edge k
                 x = list(place)
                 x[i], x[j] = one * self.halves[i], other * self.halves[j]
                 x[k] = place[k] - (form[k][i] * (x[i] - place[i]) + form[k][j] * (x[j] - place[j])) / form[k][k]
-                found.append(x)
-        return found
+                result.append(x)
+        return result

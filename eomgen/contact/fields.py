@@ -62,11 +62,11 @@ def planted(height: Expr, graph: Graph, own: Callable[[Expr], Expr]) -> HeightFi
         operation, *ids = source.nodes[i]
         if operation in ("const", "sym") or not any(k in new for k in ids):
             continue
-        found = [operand(k) for k in ids]
+        result = [operand(k) for k in ids]
         if operation in source.calls:
-            new[i] = graph.call(*source.calls[operation], found)
+            new[i] = graph.call(*source.calls[operation], result)
         else:
-            new[i] = graph.make(operation, *found)
+            new[i] = graph.make(operation, *result)
     h = Expr(graph, operand(height.id))
     slopes = gradient(h, [x, y])
     (xx, xy), (_, yy) = (gradient(slope, [x, y]) for slope in slopes)

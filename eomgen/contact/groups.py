@@ -95,40 +95,40 @@ class ContactGroups(Force):
         if not self.states:
             return ()
         markers, results = self._results(view, "")
-        found = results[6 * len(markers) + 1 :]
+        result = results[6 * len(markers) + 1 :]
         if self.on_bed:
             assert isinstance(self.friction, SoilShear)
-            return tuple(bed_rates(self.states, found, self.friction.recovery))
+            return tuple(bed_rates(self.states, result, self.friction.recovery))
         if isinstance(self.friction, LuGre) and self._pieces:
-            return self._bent(self.friction, found)
+            return self._bent(self.friction, result)
         if self._pieces:
-            found = self._shared_out(found)
-        return tuple(map(Expr.__add__, self._rates_apart(), found))
+            result = self._shared_out(result)
+        return tuple(map(Expr.__add__, self._rates_apart(), result))
 
     def _shared_out(self, sums: list[Expr]) -> list[Expr]:
         """What pieces add to the rates of the states that they share, which is its mean where several touch."""
-        found: list[Expr] = []
+        result: list[Expr] = []
         for k in range(0, len(sums), self._slots):
             *added, touching = sums[k : k + self._slots]
-            found += [x / x.graph.apply("max", 1.0, touching) for x in added]
-        return found
+            result += [x / x.graph.apply("max", 1.0, touching) for x in added]
+        return result
 
     def _bent(self, friction: LuGre, sums: list[Expr]) -> tuple[Expr, ...]:
         """Rates of bristles from what all pieces add."""
-        found: list[Expr] = []
+        result: list[Expr] = []
         for k, start in enumerate(range(0, len(sums), self._slots)):
             own = friction.holding(self.states[k * self._each : (k + 1) * self._each], None)
-            found += own.rates_of(sums[start : start + self._slots])
-        return tuple(found)
+            result += own.rates_of(sums[start : start + self._slots])
+        return tuple(result)
 
     def _rates_apart(self) -> list[Expr]:
         """Rates of all states where no shapes meet."""
-        found: list[Expr] = []
+        result: list[Expr] = []
         law = self._pair_law(False)
         for k in range(0, len(self.states), self._each):
             friction, normal = law.holding(self.normal_law, self.friction, self.states[k : k + self._each], None)
-            found += [*(() if friction is None else friction.rates_apart()), *normal.rates_apart()]
-        return found
+            result += [*(() if friction is None else friction.rates_apart()), *normal.rates_apart()]
+        return result
 
     @property
     def _each(self) -> int:
@@ -246,10 +246,10 @@ class ContactGroups(Force):
 
     def _held(self, graph: Graph) -> list[Expr]:
         """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""
-        found: list[Expr] = []
+        result: list[Expr] = []
         for k in range(0, len(self.states), self._each or 1):
-            found += [*self.states[k : k + self._each], *[graph.zero] * (self._slots - self._each)]
-        return found
+            result += [*self.states[k : k + self._each], *[graph.zero] * (self._slots - self._each)]
+        return result
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         shapes = [self.first, self.second] if self.second else [self.first]
@@ -330,7 +330,7 @@ def _lines(parts: Sequence[_Part]) -> tuple[tuple[int, int], ...]:
 
 def _features(shapes: Sequence[ContactShape]) -> dict[FeatureKind, list[_Part]]:
     """Features of shapes, by class; parts are numbered in this order."""
-    found: dict[FeatureKind, list[_Part]] = {}
+    result: dict[FeatureKind, list[_Part]] = {}
     before: dict[str, int] = {}
     heights: dict[Expr, int] = {}  # fields of one height are of one class
     for number, shape in enumerate(shapes):
@@ -338,15 +338,15 @@ def _features(shapes: Sequence[ContactShape]) -> dict[FeatureKind, list[_Part]]:
             column, kind = before.get(feature.kind, 0) + feature.slot, FeatureKind(feature.kind, feature.number)
             if feature.kind == FIELD:
                 kind = FeatureKind(FIELD, heights.setdefault(shape.sizes[0], 1 + len(heights)))
-            found.setdefault(kind, []).append(_Part(shape, feature, number, column))
+            result.setdefault(kind, []).append(_Part(shape, feature, number, column))
         for name, count in shape.parts().parts.items():
             before[name] = before.get(name, 0) + count
     polygons = 0  # which are of one class, whatever the number of their corners
-    for kind, parts in found.items():
+    for kind, parts in result.items():
         if kind.name == POLYGON:
-            found[kind] = [part._replace(column=polygons + k) for k, part in enumerate(parts)]
+            result[kind] = [part._replace(column=polygons + k) for k, part in enumerate(parts)]
             polygons += len(parts)
-    return found
+    return result
 
 
 def _vector(x: Sequence[Expr]) -> Vec3:
@@ -390,9 +390,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         axes = len(_axes(e.values, groups, lateral)) if pairs else 0
         axes = len(STATES) - 1 if bed else axes
         if pairs > MOST_PAIRS:
-            told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
+            message = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
-            e.fault("", told, remedy, "EG-TOO-LARGE")
+            e.fault("", message, remedy, "EG-TOO-LARGE")
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e["restitution"])
 
 
@@ -496,8 +496,8 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
             elif a in GROUNDS and b in GROUNDS and (second or a != b or _differ(first, a)):
-                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
-                e.fault("second" if second else "first", told, _ALLOWED)
+                message = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
+                e.fault("second" if second else "first", message, _ALLOWED)
     for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
         if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
             e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
@@ -505,10 +505,10 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
     for key, group, others in (("first", first, second or first), ("second", second, first)):
         cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
         if cornered and (second or _differ_in_body(first)):
-            told = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
+            message = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
             for shape in group:
                 if shape.kind == "segment":
-                    e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", told)
+                    e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", message)
         if e.at_fault(key):
             break
     for key, shapes in (("first", first), ("second", second)):
@@ -532,8 +532,10 @@ def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for other in second or first:
             kinds = {one.kind, other.kind}
             if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
-                told = f"{one.kind} and {other.kind} have no states where their edges meet"
-                e.fault("friction_law", told, "use friction_law: coulomb or brown_mcphee for cuboids among themselves")
+                message = f"{one.kind} and {other.kind} have no states where their edges meet"
+                e.fault(
+                    "friction_law", message, "use friction_law: coulomb or brown_mcphee for cuboids among themselves"
+                )
                 return
 
 

@@ -61,14 +61,14 @@ def facing(law: Law, corners: tuple[int, int], rates: bool = False) -> Law:
 
     def chosen(numbers: Sequence[Any]) -> Sequence[Any]:
         half = len(numbers) // 2 if rates else len(numbers)
-        found: list[Any] = []
+        result: list[Any] = []
         choice: _Choice | None = None
         for start in range(0, len(numbers), half):
-            given = numbers[start : start + half]
-            first, second = _array(given[:middle]), _array(given[middle:end])
+            raw = numbers[start : start + half]
+            first, second = _array(raw[:middle]), _array(raw[middle:end])
             choice = choice or _choose_edges(first, second, corners)
-            found += [*_kept(first, choice, 0, start > 0), *_kept(second, choice, 1, start > 0), *given[end:]]
-        return law(found)
+            result += [*_kept(first, choice, 0, start > 0), *_kept(second, choice, 1, start > 0), *raw[end:]]
+        return law(result)
 
     return chosen
 
@@ -142,16 +142,16 @@ def _kept(shape: np.ndarray, choice: _Choice, which: int, rates: bool) -> list[A
         return list(_at(sizes[:, at : at + 2], number))
 
     edge, next_edge = choice.edges[which], choice.next_edges[which]
-    found = [*of(edge, 0), *of((edge + 1) % count, 0), *of(edge, 2), *of((edge - 1) % count, 2)]
-    found += [*of((edge + 1) % count, 2), *of(choice.corners[which], 0), *of(choice.next_corners[which], 0)]
-    found += [*of(next_edge, 0), *of(next_edge, 2)]
+    result = [*of(edge, 0), *of((edge + 1) % count, 0), *of(edge, 2), *of((edge - 1) % count, 2)]
+    result += [*of((edge + 1) % count, 2), *of(choice.corners[which], 0), *of(choice.next_corners[which], 0)]
+    result += [*of(next_edge, 0), *of(next_edge, 2)]
     if which == 0:
-        told = (choice.of_second, choice.next_of_second)
-        found += [np.zeros(x.shape) if rates else np.where(x, 1.0, 0.0) for x in told]
+        flags = (choice.of_second, choice.next_of_second)
+        result += [np.zeros(x.shape) if rates else np.where(x, 1.0, 0.0) for x in flags]
     else:
         reach = sizes[:, 0] * sizes[:, 0] + sizes[:, 1] * sizes[:, 1]
-        found.append(np.zeros(edge.shape) if rates else np.sqrt(np.asarray(reach, dtype=float).max(axis=0)))
-    return [*shape[:POSE], *found]
+        result.append(np.zeros(edge.shape) if rates else np.sqrt(np.asarray(reach, dtype=float).max(axis=0)))
+    return [*shape[:POSE], *result]
 
 
 # -- pieces of outlines ------------------------------------------------------------------------------------------------
@@ -175,16 +175,16 @@ def nearest(law: Law, count: int, rates: bool = False) -> Law:
 
     def chosen(numbers: Sequence[Any]) -> Sequence[Any]:
         half = len(numbers) // 2 if rates else len(numbers)
-        found: list[Any] = []
+        result: list[Any] = []
         choice: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         for start in range(0, len(numbers), half):
-            given = numbers[start : start + half]
-            shape = np.stack(np.broadcast_arrays(*given[:end], given[end])[:-1])
-            choice = choice or _nearest_piece(np.asarray(shape, dtype=float), given[end : end + 3], count)
+            raw = numbers[start : start + half]
+            shape = np.stack(np.broadcast_arrays(*raw[:end], raw[end])[:-1])
+            choice = choice or _nearest_piece(np.asarray(shape, dtype=float), raw[end : end + 3], count)
             piece, *flags = choice
             kept = _at(shape[POSE:-1].reshape(count, PIECE, *shape.shape[1:]), piece)
-            found += [*shape[:POSE], *kept, *(np.where(flag, float(not start), 0.0) for flag in flags), *given[end:]]
-        return law(found)
+            result += [*shape[:POSE], *kept, *(np.where(flag, float(not start), 0.0) for flag in flags), *raw[end:]]
+        return law(result)
 
     chosen.inner = True  # type: ignore[attr-defined]
     return chosen

@@ -128,16 +128,16 @@ class ShapeMotion(NamedTuple):
     angular_velocity: Vec3
 
 
-def touching(names: tuple[str, str], given: Given) -> Contact:
+def touching(names: tuple[str, str], raw: Given) -> Contact:
     """The contact of one feature with another at one of its places, by laws that are not yet of their radii."""
-    normal, friction = given.laws[3:]
-    normal = normal.at(lambda: joint_radius(given.first[0], given.radius) if names[0] == "round" else given.radius)
-    radius = given.radius
+    normal, friction = raw.laws[3:]
+    normal = normal.at(lambda: joint_radius(raw.first[0], raw.radius) if names[0] == "round" else raw.radius)
+    radius = raw.radius
     if names[1] == "pad":
-        area, width = given.second
+        area, width = raw.second
         normal, radius = normal.on_pad(area, width), radius.graph.zero
         friction = None if friction is None else friction.on_pad(area)
-    return MEETINGS[names](given._replace(laws=(*given.laws[:3], normal, friction), radius=radius))
+    return MEETINGS[names](raw._replace(laws=(*raw.laws[:3], normal, friction), radius=radius))
 
 
 def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
@@ -187,7 +187,7 @@ class PairStates(NamedTuple):
 
 def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int, int, str, str], PairStates], int]:
     """Blocks of pairs by (group of the first, of the second, class of the first, class of the second); all pairs."""
-    found: dict[tuple[int, int, str, str], PairStates] = {}
+    result: dict[tuple[int, int, str, str], PairStates] = {}
     start = 0
     for g, h in [(0, 0)] if len(groups) == 1 else [(0, 1), (1, 0)]:
         for first in (*_APART, "surface"):
@@ -202,9 +202,9 @@ def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int,
                 count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
                 places = places_of((first, second))
                 block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once, places)
-                found[g, h, first, second] = block
+                result[g, h, first, second] = block
                 start += places * (count * (count - 1) // 2 if once else len(own) * columns)
-    return found, start
+    return result, start
 
 
 def class_of(first: str, second: str) -> str:
@@ -239,11 +239,11 @@ class _PairView:
         """A symbol for a number to which iterations came; see :func:`~.rounds.settled`."""
         if x.value is not None:
             return x
-        found = next((symbol for symbol, known in self._rounded.items() if known.id == x.id), None)
-        if found is None:
-            found = self.graph.symbol(f"settled{len(self._rounded)}")
-            self._rounded[found] = x
-        return found
+        result = next((symbol for symbol, known in self._rounded.items() if known.id == x.id), None)
+        if result is None:
+            result = self.graph.symbol(f"settled{len(self._rounded)}")
+            self._rounded[result] = x
+        return result
 
     def unsettled(self, results: Sequence[Expr]) -> list[Expr]:
         """Expressions with the numbers themselves in the places of their symbols."""
@@ -363,9 +363,7 @@ def pair_kind(
     inside = names[0] == INSIDE
     corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else (sizes[0] // PIECE,) if inside else ()
     sizes = (OWN, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
-    given = [
-        tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
-    ]
+    raw = [tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)]
     out = vec.transpose(view.rotation(markers[names[0] == "half"]))[2] if law.planar else vec.zero(graph)
     exerted: list[list[Expr]] = []
     held: list[Expr] = []
@@ -378,14 +376,14 @@ def pair_kind(
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         sides = (law.name, *markers)
         laws = (*sides, push, dry)
-        one = Given(laws, given[0], given[1], given[1][0], witness, field, pair.height if flat else None)
+        one = Given(laws, raw[0], raw[1], raw[1][0], witness, field, pair.height if flat else None)
         contact = touching(names, one)
         on_cell = isinstance(contact, SoilCell)
         if flat and not on_cell:
             contact = AtHeight(*sides, contact.normal_law, contact.friction, contact, pair.height())
         if names[1] == "wheel" and not on_cell:
             across = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2]
-            contact = SoilWheel(*sides, push, dry, contact, given[1][0], given[1][1], across)
+            contact = SoilWheel(*sides, push, dry, contact, raw[1][0], raw[1][1], across)
         exerted.append(_exerted(contact, view, lost))
         if states and (lost or names[0] in HOLLOWS):
             rates += [graph.zero] * law.slots
@@ -396,7 +394,7 @@ def pair_kind(
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
         facing, gap = contact.nearness(view)
-        touch = [*facing, gap, turning_radius(names[1], given[1], graph)]
+        touch = [*facing, gap, turning_radius(names[1], raw[1], graph)]
         if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
             owned = graph.apply("lt", 0.0, share)
             # what is inside has come there through the outline
@@ -404,16 +402,16 @@ def pair_kind(
             touch[3] = where(owned, depth, away)
             depth = where(owned, depth, -NOWHERE)
         witnesses += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
-    results = [*(reduce(add, found) for found in zip(*exerted, strict=True)), *rates]
+    results = [*(reduce(add, result) for result in zip(*exerted, strict=True)), *rates]
     symbols = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
     symbols += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
     seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in symbols}
-    counts = [len(found) for found in (results, results, touch, witnesses)]
+    counts = [len(result) for result in (results, results, touch, witnesses)]
     every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses])
     starts = [0, *itertools.accumulate(counts)]
     results, slopes, touch, witnesses = (every[a:b] for a, b in itertools.pairwise(starts))
     nodes, renamed = _kept(graph, [*results, *slopes, *touch, *witnesses])
-    ids, seen, met = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, witnesses))
+    ids, seen, met = ([renamed[x.id] for x in result] for result in ((*results, *slopes), touch, witnesses))
     return PairKind(
         f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
         *tables,
@@ -450,9 +448,9 @@ def _rates(contact: Contact, view: View, counts: bool) -> list[Expr]:
         return list(sums)
     part = graph.one if share is None or sums is not None else share  # a load of 0 counts as apart
     pairs = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
-    found = [(x - apart) * part for x, apart in pairs]
+    result = [(x - apart) * part for x, apart in pairs]
     touches = [where(graph.apply("lt", 0.0, contact.touch(view)[1]), part, 0.0)] if counts else []
-    return [*found, *touches]
+    return [*result, *touches]
 
 
 def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ...], ...], dict[int, int]]:

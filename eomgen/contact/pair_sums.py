@@ -106,24 +106,24 @@ class PairSum:
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
         return pairs_of_rows(self.tables[first], self.tables[second], first == second)
 
-    def __call__(self, given: Sequence[Any]) -> list[Any]:
+    def __call__(self, raw: Sequence[Any]) -> list[Any]:
         """Force and torque about the origin of each body, and the energy: 6 bodies + 1 numbers or arrays."""
-        data = _stacked(given)
+        data = _stacked(raw)
         return self._sum(data, None)
 
-    def slope(self, given: Sequence[Any], rates: Sequence[Any]) -> list[Any]:
+    def slope(self, raw: Sequence[Any], rates: Sequence[Any]) -> list[Any]:
         """The derivative of the value in the direction of the rates of what is given."""
-        both = _stacked([*given, *rates])
-        return self._sum(both[: len(given)], both[len(given) :])
+        both = _stacked([*raw, *rates])
+        return self._sum(both[: len(raw)], both[len(raw) :])
 
-    def slope_along(self, given: Sequence[Any], places: Sequence[int], rates: Sequence[Any]) -> list[Any]:
+    def slope_along(self, raw: Sequence[Any], places: Sequence[int], rates: Sequence[Any]) -> list[Any]:
         """The derivative in the direction of the rates of what is given at some places."""
-        every = [0.0 * given[0] for _ in given]
+        every = [0.0 * raw[0] for _ in raw]
         for k, rate in zip(places, rates, strict=True):
             every[k] = rate
-        return self.slope(given, every)
+        return self.slope(raw, every)
 
-    def meeting(self, given: Sequence[Any], accelerations: Sequence[Any]) -> list[Any]:
+    def meeting(self, raw: Sequence[Any], accelerations: Sequence[Any]) -> list[Any]:
         """Time (s) within which no two shapes that are apart meet, or get deeper than a part of their thickness.
 
         Distances and their rates are those of the shapes, as seen from the first one, or of the spheres about them
@@ -134,7 +134,7 @@ class PairSum:
 
         Parameters
         ----------
-        given : sequence
+        raw : sequence
         accelerations : sequence of ``MOTION`` numbers for each body
             Of its origin and angular, ground axes.
 
@@ -142,8 +142,8 @@ class PairSum:
         -------
         list of ``MEETING`` numbers or arrays
         """
-        both = _stacked([*given, *accelerations])
-        data, own = both[: len(given)], both[len(given) :].reshape(self.bodies, MOTION, *both.shape[1:])
+        both = _stacked([*raw, *accelerations])
+        data, own = both[: len(raw)], both[len(raw) :].reshape(self.bodies, MOTION, *both.shape[1:])
         placed = [self._place(table, data, None)[:2] for table in self.tables]
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
         deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
@@ -201,16 +201,16 @@ class PairSum:
                 *(np.take_along_axis(np.broadcast_to(x, gap.shape), far, axis=0)[0] for x in (thick, *names)),
             ]
             deepest = np.where(depth > deepest[0], np.array(mine), deepest)
-        found = [least, *deepest]
-        return [x if np.ndim(x) else float(x) for x in found]
+        result = [least, *deepest]
+        return [x if np.ndim(x) else float(x) for x in result]
 
-    def witnesses(self, given: Sequence[Any]) -> list[Any]:
+    def witnesses(self, raw: Sequence[Any]) -> list[Any]:
         """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
 
         Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where
         one has no far side.  Records that are not used are 0.
         """
-        data = _stacked(given)
+        data = _stacked(raw)
         out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
         for column in np.ndindex(data.shape[1:]):
             place = (slice(None), *column)
@@ -224,7 +224,7 @@ class PairSum:
         """Records of one state."""
         placed = [self._place(table, data, None)[0] for table in self.tables]
         starts = np.cumsum([0, *map(len, self.tables)])
-        found = [np.zeros((0, RECORD))]
+        result = [np.zeros((0, RECORD))]
         for first, second, planar, law, _, _, _, witness, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             thick = data[tables[0][:, -1]], data[tables[1][:, -1]]
@@ -241,8 +241,8 @@ class PairSum:
             values = _table(witness(numbers), len(i), data)
             places = [values[k : k + WITNESS] for k in range(0, len(values), WITNESS)]
             rows = np.stack([np.concatenate([[starts[first] + i, starts[second] + j], one]).T for one in places], 1)
-            found.append(rows[np.stack([one[3] for one in places], 1) > -margin[:, None]])
-        return np.concatenate(found)
+            result.append(rows[np.stack([one[3] for one in places], 1) > -margin[:, None]])
+        return np.concatenate(result)
 
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
@@ -311,16 +311,16 @@ class PairSum:
         ]
         return np.concatenate(numbers, axis=1), arm, np.concatenate(changes, axis=1), d_arm
 
-    def counts(self, given: Sequence[Any]) -> list[tuple[int, int]]:
+    def counts(self, raw: Sequence[Any]) -> list[tuple[int, int]]:
         """For each kind how many pairs are tested for their distance, and of how many the law is evaluated."""
-        data = _stacked(given)
+        data = _stacked(raw)
         placed = [self._place(table, data, None)[0] for table in self.tables]
-        found = []
+        result = []
         for first, second, planar, _, _, _, _, _, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
-            found.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
-        return found
+            result.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
+        return result
 
     def _candidates(
         self, a: np.ndarray, b: np.ndarray, planar: int, which: tuple[int, int], data: np.ndarray, more: Any = 0.0
@@ -399,11 +399,11 @@ def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray
     return np.asarray(own[:, 0:3] + across(own[:, 3:6], arm) + across(turning, across(turning, arm)))
 
 
-def _stacked(given: Sequence[Any]) -> np.ndarray:
-    if all(type(x) is float for x in given):
-        return np.array(given)
-    kind = float if all(isinstance(x, (int, float, np.ndarray, np.generic)) for x in given) else object
-    spread = np.broadcast_arrays(*(np.asarray(x, dtype=kind) for x in given))
+def _stacked(raw: Sequence[Any]) -> np.ndarray:
+    if all(type(x) is float for x in raw):
+        return np.array(raw)
+    kind = float if all(isinstance(x, (int, float, np.ndarray, np.generic)) for x in raw) else object
+    spread = np.broadcast_arrays(*(np.asarray(x, dtype=kind) for x in raw))
     stacked = np.empty((len(spread), *spread[0].shape), dtype=kind)
     for k, x in enumerate(spread):
         stacked[k] = x[()]  # an array of no axes would stand there as it is

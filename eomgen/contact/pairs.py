@@ -177,14 +177,14 @@ class PairFunction:
     @cached_property
     def holders(self) -> tuple[frozenset[int], ...]:
         """For each state the bodies on whose contact it depends."""
-        found: list[set[int]] = [set() for _ in range(self.states)]
+        result: list[set[int]] = [set() for _ in range(self.states)]
         for kind in self.kinds if self.states else ():
             first, second = self.tables[kind.first], self.tables[kind.second]
             for i, j in zip(*pairs_of_rows(first, second, kind.first == kind.second), strict=True):
                 at = kind.held[0][i] + kind.held[1][j]
                 for k in range(at, at + kind.states):
-                    found[k] |= {first[i][0], second[j][0]}
-        return tuple(map(frozenset, found))
+                    result[k] |= {first[i][0], second[j][0]}
+        return tuple(map(frozenset, result))
 
     @cached_property
     def room(self) -> int:
@@ -204,14 +204,14 @@ class PairFunction:
     @cached_property
     def touching(self) -> tuple[frozenset[int], ...]:
         """For each body those with which it may be in contact."""
-        found: list[set[int]] = [set() for _ in range(self.bodies)]
+        result: list[set[int]] = [set() for _ in range(self.bodies)]
         for kind in self.kinds:
             first, second = ({row[0] for row in self.tables[k]} for k in (kind.first, kind.second))
             for body in first:
-                found[body] |= second
+                result[body] |= second
             for body in second:
-                found[body] |= first
-        return tuple(frozenset(bodies - {k}) for k, bodies in enumerate(found))
+                result[body] |= first
+        return tuple(frozenset(bodies - {k}) for k, bodies in enumerate(result))
 
     def evaluator(self, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> PairSum:
         """Its loops on numbers, with an evaluator of expressions for the laws."""
@@ -275,8 +275,8 @@ class PairCall:
         made: dict[str, Callable[..., Any]] = {
             "given": lambda *operands: list(operands),
             "sum": loops,
-            "slope": lambda given, *rates: loops.slope_along(given, self.numbers, rates),
-            "meeting": lambda given, *accelerations: loops.meeting(given, accelerations),
+            "slope": lambda raw, *rates: loops.slope_along(raw, self.numbers, rates),
+            "meeting": lambda raw, *accelerations: loops.meeting(raw, accelerations),
             "witnesses": loops.witnesses,
         }
         return itemgetter(self.numbers[0]) if self.item else made[self.part]
@@ -338,8 +338,8 @@ class PairCall:
 
 def pair_call(graph: Graph, operation: str) -> PairCall | None:
     """What a node does, if it is one of a sum over pairs."""
-    found = graph.calls.get(operation)
-    return found[0] if found is not None and isinstance(found[0], PairCall) else None
+    result = graph.calls.get(operation)
+    return result[0] if result is not None and isinstance(result[0], PairCall) else None
 
 
 def pairs_of_bodies(graph: Graph) -> int:
@@ -385,8 +385,8 @@ def pair_meeting(
 ) -> list[Expr]:
     """When shapes that are apart may meet, and more: see :meth:`~eomgen.contact.pair_sums.PairSum.meeting`."""
     assert len(accelerations) == MOTION * function.bodies
-    given = _list(graph, function, "given", [x.id for x in operands])
-    listed = _list(graph, function, "meeting", [given, *(x.id for x in accelerations)])
+    raw = _list(graph, function, "given", [x.id for x in operands])
+    listed = _list(graph, function, "meeting", [raw, *(x.id for x in accelerations)])
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
 
 
@@ -402,8 +402,8 @@ def without_pairs(outputs: Sequence[Expr], listed: Sequence[Expr]) -> list[Expr]
         return []
     graph = outputs[0].graph
 
-    def calls(found: Sequence[Expr]) -> list[tuple[int, str]]:
-        nodes = ((i, pair_call(graph, graph.nodes[i][0])) for i in reachable(graph, (y.id for y in found)))
+    def calls(result: Sequence[Expr]) -> list[tuple[int, str]]:
+        nodes = ((i, pair_call(graph, graph.nodes[i][0])) for i in reachable(graph, (y.id for y in result)))
         return [(i, call.function.element) for i, call in nodes if call is not None and call.part == "item"]
 
     rigid = {element for _, element in calls(listed)}

@@ -169,9 +169,9 @@ class PolygonPolygon(Contact):
         # the deeper point: that of the least overlap, which it is as long as the edges face each other
         deep = _witness_of(faces, witnesses[self.witness], least)
         # the other: up to the next overlap
-        room, mine = other.depth - least.depth, witnesses[self.witness]
-        short = [graph.apply("lt", room, witness.depth) for witness in witnesses]
-        limited = _witness_of(short[self.witness], other._replace(depth=room), mine)
+        slack, mine = other.depth - least.depth, witnesses[self.witness]
+        short = [graph.apply("lt", slack, witness.depth) for witness in witnesses]
+        limited = _witness_of(short[self.witness], other._replace(depth=slack), mine)
         limited = limited._replace(depth=where(faces, limited.depth, -NOWHERE))
         engaged = _witness_of(main, deep, limited)
         apart = mine._replace(depth=where(beside, mine.depth, -NOWHERE))
@@ -180,7 +180,7 @@ class PolygonPolygon(Contact):
             _witness_of(meets, engaged, apart),
             where(meets, where(main, 1.0, share), 1.0),
             where(meets, where(main, 0.0, slope), 0.0),
-            room,
+            slack,
             relieved,
         )
 
@@ -216,10 +216,10 @@ class PolygonPolygon(Contact):
         flags = self.edges[FACING + 8 : OWN]
 
         def witness(
-            told: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]
+            flag: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]
         ) -> _Witness:
             """Of the edge of the first polygon or the second, by start and normal, the deepest corner of the other."""
-            of_second = graph.apply("lt", 0.5, told)
+            of_second = graph.apply("lt", 0.5, flag)
             place = _either(of_second, *corners)
             normal = _either(of_second, times(unit(two[1]), -graph.one), one[1])
             depths = dot(two[1], minus(two[0], corners[0])), dot(one[1], minus(one[0], corners[1]))

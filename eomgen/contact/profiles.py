@@ -149,7 +149,7 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
 
 def beside_hollow_arcs(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The pieces of a smooth ring, with the hollow arcs that lie beyond their ends."""
-    found = []
+    result = []
     for k, one in enumerate(ring):
         passes = list(one.sizes[-8:])
         for place, other in ((0, ring[k - 1]), (4, ring[(k + 1) % len(ring)])):
@@ -158,28 +158,28 @@ def beside_hollow_arcs(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
                 inwards = bend.graph.apply("lt", 0.0, bend)
                 turned = (cosine * cosine - sine * sine, where(inwards, 2.0 * sine * cosine, 0.0))
                 passes[place : place + 4] = hollow(1.0 / where(inwards, bend, 1.0), turned)
-        found.append(one._replace(sizes=(*one.sizes[:-8], *passes)))
-    return found
+        result.append(one._replace(sizes=(*one.sizes[:-8], *passes)))
+    return result
 
 
 def arc_points(one: ProfilePart) -> list[Point]:
     """Points along a circular arc in its own axes, from left to right, for pictures."""
     bend, half = one.sizes[:2]
-    found = []
+    result = []
     for part in (-1.0, -0.85, -0.5, 0.0, 0.5, 0.85, 1.0):
         x = part * half
-        found.append((x, bend * x * x / (1.0 + sqrt(half.graph.apply("max", 0.0, 1.0 - bend * bend * x * x)))))
-    return found
+        result.append((x, bend * x * x / (1.0 + sqrt(half.graph.apply("max", 0.0, 1.0 - bend * bend * x * x)))))
+    return result
 
 
 def peaks(points: Sequence[Point]) -> list[tuple[int, Point]]:
     """Inner points, numbered, at which the profile turns down, as far as numbers tell: they meet what is flat."""
-    found = []
+    result = []
     for k, (a, b, c) in enumerate(zip(points, points[1:], points[2:], strict=False)):
         turn = cross(minus(b, a), minus(c, b)).value
         if turn is None or turn < 0.0:
-            found.append((k, b))
-    return found
+            result.append((k, b))
+    return result
 
 
 def minus(a: Point, b: Point) -> Point:
@@ -276,9 +276,9 @@ class SurfaceRound(ProfilePiece):
             away = radius + where(apart, sqrt(where(apart, square, 1.0)), 0.0)
             weight = beyond / where(graph.apply("lt", 0.0, both), both, 1.0)
             on = graph.apply("lt", 0.0, far)  # towards its other end the piece hands the circle over to the next
-            room = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
-            next_room = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond * short))
-            own, next_one = weight * room, (1.0 - weight) * next_room
+            share = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
+            next_share = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond * short))
+            own, next_one = weight * share, (1.0 - weight) * next_share
             known = graph.apply("lt", 0.0, own + next_one)
             whole = where(known, own / where(known, own + next_one, 1.0), weight)
             taken = where(graph.apply("lt", 0.0, radius), own, whole)  # at a corner both take off the whole together
@@ -389,8 +389,8 @@ def hollow_arcs(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
 
 def inner_corners(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The inner corners among some corners, as far as numbers tell."""
-    found = [one for one in pieces if one.kind == "inner_corner"]
-    return [one for one in found if one.sizes[0].value is None or one.sizes[0].value > EVEN]
+    result = [one for one in pieces if one.kind == "inner_corner"]
+    return [one for one in result if one.sizes[0].value is None or one.sizes[0].value > EVEN]
 
 
 def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
@@ -403,11 +403,11 @@ def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
 
 def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
     """Of each piece those that :mod:`~eomgen.contact.pair_features` reads."""
-    found: list[Expr] = []
+    result: list[Expr] = []
     for one in pieces:
         half, bend = (one.half, one.half.graph.zero) if one.kind == "edge" else (one.sizes[1], one.sizes[0])
-        found += [*one.origin, *one.along, half, bend]
-    return found
+        result += [*one.origin, *one.along, half, bend]
+    return result
 
 
 def clearance_of_arcs(pieces: Sequence[ProfilePart]) -> float:
@@ -521,11 +521,11 @@ def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     ways = [unit(one) for one in edges]
     sides = [None, *edges, None]
     last = len(edges) - 1
-    found = [
+    result = [
         edge(points[k], one, sides[k], sides[k + 2], width, walls=True, endless=(k == 1, k == last - 1))
         for k, one in enumerate(edges)
     ]
-    return found + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
+    return result + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
 
 
 def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
@@ -538,10 +538,10 @@ def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     ways = _tangents(points)
     first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
     ray = times(ways[0], length(first))
-    found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
+    result = [edge(minus(points[0], ray), ray, None, ways[0], width)]
     for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
-        found += biarcs(a, b, s, t, width)
-    return beside_hollow_arcs([*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
+        result += biarcs(a, b, s, t, width)
+    return beside_hollow_arcs([*result, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
 
 
 def _tangents(points: Sequence[Point]) -> list[Point]:
@@ -564,18 +564,18 @@ def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
     edges = [minus(b, a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
     ways = [unit(one) for one in edges]
     n = len(points)
-    found = [edge(points[k], edges[k], edges[k - 1], edges[(k + 1) % n], width, walls=True) for k in range(n)]
-    return found + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(n)]
+    result = [edge(points[k], edges[k], edges[k - 1], edges[(k + 1) % n], width, walls=True) for k in range(n)]
+    return result + [inner_corner(points[k], ways[k - 1], ways[k], width) for k in range(n)]
 
 
 def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
     """Two circular arcs of one tangent from point to point, clockwise."""
     width, n = _width(points), len(points)
     ways = [tangent(points[k - 1], points[k], points[(k + 1) % n]) for k in range(n)]
-    found: list[ProfilePart] = []
+    result: list[ProfilePart] = []
     for k in range(n):
-        found += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
-    return beside_hollow_arcs(found)
+        result += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
+    return beside_hollow_arcs(result)
 
 
 class Tooth(NamedTuple):

@@ -213,19 +213,19 @@ def cuboid_parts(size: Sequence[Expr], edge: Expr) -> list[CuboidPart]:
     x, y, z = inner
     plain = (0, 1, 2)
     reach = sqrt(halves[0] * halves[0] + halves[1] * halves[1] + halves[2] * halves[2])
-    found: list[CuboidPart] = [(BLOCK, (zero, zero, zero), plain, (*halves, zero), reach, 0)]
+    result: list[CuboidPart] = [(BLOCK, (zero, zero, zero), plain, (*halves, zero), reach, 0)]
     ways = list(itertools.product((-1.0, 1.0), repeat=3))
     for n, (i, j, k) in enumerate(ways):
-        found.append(("end", (i * halves[0], j * halves[1], k * halves[2]), plain, (zero,), zero, n))
-    found.append((CORE, (zero, zero, zero), plain, (x, y, z, edge), reach, 0))
-    found += [("rounded_corner", (i * x, j * y, k * z), plain, (edge,), edge, n) for n, (i, j, k) in enumerate(ways)]
+        result.append(("end", (i * halves[0], j * halves[1], k * halves[2]), plain, (zero,), zero, n))
+    result.append((CORE, (zero, zero, zero), plain, (x, y, z, edge), reach, 0))
+    result += [("rounded_corner", (i * x, j * y, k * z), plain, (edge,), edge, n) for n, (i, j, k) in enumerate(ways)]
     for k in range(3):
         for n, (i, j) in enumerate(itertools.product((-1.0, 1.0), repeat=2)):
             place = [zero, i * inner[(k + 1) % 3], j * inner[(k + 2) % 3]]
             order = (k, (k + 1) % 3, (k + 2) % 3)
             at = (place[-k % 3], place[(1 - k) % 3], place[(2 - k) % 3])
-            found.append(("rounded_edge", at, order, (inner[k], edge), inner[k] + edge, 4 * k + n))
-    return found
+            result.append(("rounded_edge", at, order, (inner[k], edge), inner[k] + edge, 4 * k + n))
+    return result
 
 
 def _rising(x: Expr) -> Expr:

@@ -187,12 +187,12 @@ class ContactShape:
         exact.
         """
         length, width, _ = self.sizes
-        zero, found = length.graph.zero, list[Feature]()
+        zero, result = length.graph.zero, list[Feature]()
         for x, weight in zip(*np.polynomial.legendre.leggauss(self._whole(2)), strict=True):
             area = 0.5 * float(weight) * length * width
             place = _moved(frame, (0.5 * float(x) * length, zero, zero))
-            found.append(Feature("pad", place, (area, width), zero, length, len(found)))
-        return found
+            result.append(Feature("pad", place, (area, width), zero, length, len(result)))
+        return result
 
     def _cells(self, frame: Frame) -> list[Feature]:
         """Cells of a bed, from the marker on."""
@@ -232,22 +232,24 @@ class ContactShape:
         pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
         surface = [one for one in pieces if one.kind in ("edge", "arc")]
-        told = depth  # by each piece for itself
+        own_depth = depth  # by each piece for itself
         if self.kind == "smooth_outline" and math.isfinite(most := clearance_of_arcs(surface)):
-            told = zero.graph.apply("min", depth, most)
-        found = [
-            Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
+            own_depth = zero.graph.apply("min", depth, most)
+        result = [
+            Feature(
+                one.kind, one.frame(frame), (*one.sizes, own_depth), None if one.open else one.half + own_depth, depth
+            )
             for one in surface
         ]
         hollows = [*inner_corners(pieces), *hollow_arcs(pieces)]
-        found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
+        result += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
         if self.kind not in GROUNDS:
             reach = greatest([length(one.origin) + one.half for one in surface])
-            numbers = (*piece_numbers(surface), told)
-            found.append(Feature(INSIDE, frame, numbers, reach, depth, number=len(surface)))
+            numbers = (*piece_numbers(surface), own_depth)
+            result.append(Feature(INSIDE, frame, numbers, reach, depth, number=len(surface)))
         for k, (x, y) in tops:
-            found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
-        return found
+            result.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
+        return result
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -285,9 +287,9 @@ class ContactShape:
             seen = [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in line)) for line in lines]
             return [*seen] or [Drawn((marker,), about=PLANE)]
         if self.kind == "cuboid":
-            found = [feature.frame for feature in self.features() if feature.kind == "end"]
+            result = [feature.frame for feature in self.features() if feature.kind == "end"]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
-            return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
+            return [Drawn(tuple(Marker(marker.body, result[k], marker.label) for k in way)) for way in ways]
         if self.kind == BED:
             zero = self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (zero, self.sizes[0])]
@@ -313,11 +315,11 @@ def by_edges(
         meets = any(shape.kind in ("box", "polygon") or shape.convex_corners() for shape in other)
         if not meets or any(shape.kind == "plate" or shape.is_wheel for shape in other):
             return tuple(own)
-        found = []
+        result = []
         for shape in own:
             corners = tuple(x for corner in shape.convex_corners() for x in corner)
-            found.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
-        return tuple(found)
+            result.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
+        return tuple(result)
 
     return changed(first, second or first), changed(second, first)
 

@@ -151,16 +151,16 @@ class SoilCell(Contact):
         return UNSHEARED + (1.0 - UNSHEARED) * shear.shears[0].graph.apply("abs", shear.shears[0]) / shear.modulus
 
     def loads(self, view: View) -> list[Load]:
-        found = self._pressing(view)
+        result = self._pressing(view)
         graph = view.graph
         _, shear = self._laws()
-        most = found.most
+        most = result.most
         root = beyond_zero(most * self._reference(), sqrt)
         grip = root * shear.shears[1] / (GRIP * shear.modulus)
         drag = graph.apply("max", -most, graph.apply("min", most, grip))
-        drag = drag * where(graph.apply("lt", drag * found.sliding, 0.0), found.quick, 1.0)
-        force = vec.neg(vec.add(vec.scale(found.push, found.outward), vec.scale(drag, found.along)))
-        return self._pair(found.arms, force)
+        drag = drag * where(graph.apply("lt", drag * result.sliding, 0.0), result.quick, 1.0)
+        force = vec.neg(vec.add(vec.scale(result.push, result.outward), vec.scale(drag, result.along)))
+        return self._pair(result.arms, force)
 
     def remainder(self, view: View) -> list[Load]:
         return self.loads(view)
@@ -170,15 +170,15 @@ class SoilCell(Contact):
 
     def sums(self, view: View) -> list[Expr]:
         """What this adds to the sums of :func:`bed_rates`."""
-        found, graph = self._pressing(view), view.graph
+        result, graph = self._pressing(view), view.graph
         law, shear = self._laws()
         assert law.deepest is not None
-        speed = graph.apply("abs", found.sliding)
-        build = found.sliding - speed * shear.shears[0] / shear.modulus
-        root = beyond_zero(found.most / self._reference(), sqrt)
-        held = root * found.sliding - speed * shear.shears[1] / (GRIP * shear.modulus)
-        deeper = self._deeper(found.depth, found.rate)
-        return [found.met * build, found.quick * held, deeper, found.met, deeper * deeper]
+        speed = graph.apply("abs", result.sliding)
+        build = result.sliding - speed * shear.shears[0] / shear.modulus
+        root = beyond_zero(result.most / self._reference(), sqrt)
+        held = root * result.sliding - speed * shear.shears[1] / (GRIP * shear.modulus)
+        deeper = self._deeper(result.depth, result.rate)
+        return [result.met * build, result.quick * held, deeper, result.met, deeper * deeper]
 
     def _deeper(self, depth: Expr, rate: Expr) -> Expr:
         """z_m' by what presses the cell."""
@@ -261,12 +261,12 @@ def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> l
     Shear is forgotten where nothing presses; the greatest sinkage stays.  What deepens a cell counts by how quickly it
     does: sum of squares by sum, which is the rate of one that deepens it alone.
     """
-    found: list[Expr] = []
+    result: list[Expr] = []
     each, slots = len(STATES), len(STATES) + COUNTS
     for k in states[0].graph.marked(range(len(states) // each)):
         *rates, deeper, pressed, squares = sums[k * slots : (k + 1) * slots]
         free = pressed.graph.apply("max", 0.0, 1.0 - pressed) / recovery
         own = states[k * each : k * each + each - 1]
-        found += [rate - free * state for rate, state in zip(rates, own, strict=True)]
-        found.append(beyond_zero(deeper, partial(truediv, squares)))
-    return found
+        result += [rate - free * state for rate, state in zip(rates, own, strict=True)]
+        result.append(beyond_zero(deeper, partial(truediv, squares)))
+    return result

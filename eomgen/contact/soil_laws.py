@@ -370,10 +370,10 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
         e.require("rebound", part, Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
         return part, None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
-    found = [e[key] if key in e.values else e.graph.zero for key in keys]
-    for key, value in zip(keys, found, strict=True):
+    result = [e[key] if key in e.values else e.graph.zero for key in keys]
+    for key, value in zip(keys, result, strict=True):
         e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    return None, (found[0], found[1])
+    return None, (result[0], result[1])
 
 
 def _peak(e: Entry) -> tuple[Expr, Expr] | None:

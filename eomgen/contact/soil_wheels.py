@@ -131,7 +131,7 @@ class SoilWheel(Contact):
         spin = sqrt(motion.rim * motion.rim / (self.radius * self.radius) + slow * slow)
         entry = _angle(motion.depth, self.radius)
         gain = graph.apply("max", 0.0, 1.0 + law.dissipation * motion.rate)
-        pressed, found = [graph.zero] * 2, [graph.zero] * 6
+        pressed, result = [graph.zero] * 2, [graph.zero] * 6
         for node in self._nodes(law, motion, entry):
             c, s = cos(node.angle), sin(node.angle)
             angle, sine = (node.angle, s) if node.ahead else (-node.angle, -s)
@@ -153,8 +153,8 @@ class SoilWheel(Contact):
                 c * drag * aside,
                 front * drag * aside,
             )
-            found = [x + y for x, y in zip(found, added, strict=True)]
-        return pressed, found
+            result = [x + y for x, y in zip(result, added, strict=True)]
+        return pressed, result
 
     def _nodes(self, law: SoilPressure, motion: _Rolling, entry: Expr) -> list[_Node]:
         """Points of the arc; where pressure begins as a power of the depth they lie at squares of Gauss's."""
@@ -168,22 +168,22 @@ class SoilWheel(Contact):
         if law.peak is not None:
             place = law.peak[0] + law.peak[1] * _slip(motion, law.reversal)
             most = depth.graph.apply("min", FOREMOST, place) * entry
-            rest, found = entry - most, list[_Node]()
+            rest, result = entry - most, list[_Node]()
             for u, weight in _gauss():
                 seen = bekker(entry - rest * u * u)
-                found.append(_Node(entry - rest * u * u, 2.0 * u * weight * rest, seen, True))
-                found.append(_Node(most * u * u, 2.0 * u * weight * most, seen, True))
-            return found
+                result.append(_Node(entry - rest * u * u, 2.0 * u * weight * rest, seen, True))
+                result.append(_Node(most * u * u, 2.0 * u * weight * most, seen, True))
+            return result
         slope = law.unloading_slope(depth, top)
         left = _angle(depth.graph.apply("min", depth, top / slope), radius)
-        found = []
+        result = []
         for u, weight in _gauss():
             ahead, behind = entry * (1.0 - u * u), left * u
-            found.append(_Node(ahead, 2.0 * u * weight * entry, bekker(ahead), True))
+            result.append(_Node(ahead, 2.0 * u * weight * entry, bekker(ahead), True))
             half = sin(0.5 * behind)
             rest = depth.graph.apply("max", 0.0, top - slope * (2.0 * radius * half * half))
-            found.append(_Node(behind, weight * left, rest, False))
-        return found
+            result.append(_Node(behind, weight * left, rest, False))
+        return result
 
 
 def _gauss() -> list[tuple[float, float]]:

@@ -70,7 +70,7 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
 
     A wheel, which is a circle with a width, has one part, which has no states.
     """
-    found = {
+    result = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
         "capsule": {"rod": 1, "end": 2, "tip": 2, "axis": 1}, "ellipsoid": {"ellipsoid": 1},
@@ -79,7 +79,7 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"wheel": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2}, BED: {BED_CELL: points},
     }  # fmt: skip
-    return ShapeParts(kind, found.get(kind, {}))
+    return ShapeParts(kind, result.get(kind, {}))
 
 
 def cells_of(groups: Sequence[Sequence[ShapeParts]]) -> int:
@@ -88,30 +88,30 @@ def cells_of(groups: Sequence[Sequence[ShapeParts]]) -> int:
 
 
 # -- from what the user gave ------------------------------------------------------------------------------------------
-def _whole(given: Any) -> int | None:
+def _whole(raw: Any) -> int | None:
     """A whole number, also one that is written with decimals, such as 2.0; None if it is none."""
-    found = as_count(given)
-    if found is not None or isinstance(given, bool) or not isinstance(given, Real):
-        return found
-    value = float(given)
+    result = as_count(raw)
+    if result is not None or isinstance(raw, bool) or not isinstance(raw, Real):
+        return result
+    value = float(raw)
     return int(value) if value.is_integer() else None
 
 
-def points_of_plate(given: Mapping[str, Any]) -> int | None:
+def points_of_plate(raw: Mapping[str, Any]) -> int | None:
     """At how many points a plate is felt; None where that is no number."""
-    count = _whole(given.get("points", PLATE))
+    count = _whole(raw.get("points", PLATE))
     return count if count is not None and 1 <= count <= POINTS else None
 
 
-def cells_of_bed(given: Mapping[str, Any]) -> int | None:
+def cells_of_bed(raw: Mapping[str, Any]) -> int | None:
     """How many cells a bed has; None where that is no number."""
-    count = _whole(given.get("cells"))
+    count = _whole(raw.get("cells"))
     return count if count is not None and 1 <= count <= MOST_PAIRS else None
 
 
-def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
+def teeth_of_sprocket(raw: Mapping[str, Any]) -> int | None:
     """How many teeth a sprocket has; None where that is no number."""
-    count = _whole(given.get("teeth"))
+    count = _whole(raw.get("teeth"))
     return count if count is not None and count >= TEETH else None
 
 
@@ -127,7 +127,7 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _shapes_of_entry(value: Any) -> list[ShapeParts]:
-    found: list[ShapeParts] = []
+    result: list[ShapeParts] = []
     for shape in _listed(value):
         if not isinstance(shape, Mapping):
             continue
@@ -142,8 +142,8 @@ def _shapes_of_entry(value: Any) -> list[ShapeParts]:
             kind, count = WHEEL, 1
         else:
             count = len(_listed(shape.get("points", ())))
-        found += [parts_of(kind, count)] * len(_listed(shape.get("on")))
-    return found
+        result += [parts_of(kind, count)] * len(_listed(shape.get("on")))
+    return result
 
 
 # -- keys of shapes ----------------------------------------------------------------------------------------------------
